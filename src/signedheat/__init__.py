@@ -1,0 +1,46 @@
+"""Generalized signed distance to broken geometry, by the signed heat method."""
+
+from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
+from .discretization import Diagnostics
+from .domains.grid import Grid
+from .domains.point_cloud import PointCloud
+from .domains.polygon_mesh import PolygonMesh
+from .domains.triangle_mesh import TriangleMesh
+from .errors import (
+    ConstraintError,
+    FileFormatError,
+    GeometryError,
+    MemoryLimitError,
+    OutsideError,
+    SignedHeatError,
+    SourceError,
+    UnreachedWarning,
+)
+from .solver import SignedHeatSolver
+from .sources.curves import Curve, SurfacePoints
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ConstraintError",
+    "Curve",
+    "Diagnostics",
+    "EachComponent",
+    "FileFormatError",
+    "Free",
+    "GeometryError",
+    "Grid",
+    "LevelValues",
+    "MemoryLimitError",
+    "OutsideError",
+    "PointCloud",
+    "PolygonMesh",
+    "SignedHeatError",
+    "SignedHeatSolver",
+    "Soft",
+    "SourceError",
+    "SurfacePoints",
+    "TriangleMesh",
+    "UnreachedWarning",
+    "ZeroSet",
+]

@@ -1,0 +1,144 @@
+"""Constraints on φ at the source (Sec. 7.1): values that say how the integration step changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .discretization import Integration, Levels, SourceTerm
+from .errors import ConstraintError
+
+
+class Constraint(Protocol):
+    """Anything that can finish step 3."""
+
+    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+        """φ, from the divergence of Y."""
+
+
+@dataclass(frozen=True)
+class Free:
+    """No constraint: φ is shifted so that its weighted mean over the source is zero.
+
+    Examples
+    --------
+    >>> Free()
+    Free()
+    """
+
+    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+        return integration.solve(divergence, source)
+
+
+@dataclass(frozen=True)
+class ZeroSet:
+    """φ = 0 on the source (Eq. 14). The default.
+
+    Parameters
+    ----------
+    hard : bool
+        On grids the default pulls φ to zero along the source by a smooth correction, which is cheaper and, on broken
+        input, more accurate than interpolating every sample; ``hard=True`` interpolates. On meshes both are the same.
+
+    Examples
+    --------
+    >>> ZeroSet(hard=True)
+    ZeroSet(hard=True)
+    """
+
+    hard: bool = False
+
+    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+        levels = Levels(np.zeros(len(source.weights)))
+        return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
+
+
+@dataclass(frozen=True)
+class EachComponent:
+    """φ is constant on every connected component of the source, each at its own unknown level (Fig. 10).
+
+    Examples
+    --------
+    >>> EachComponent()
+    EachComponent()
+    """
+
+    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+        return integration.fit(divergence, source, Levels(np.zeros(len(source.weights)), source.components))
+
+
+@dataclass(frozen=True)
+class LevelValues:
+    """Given levels: φ = ``values[k]`` on the k-th source, as for the contour lines of a map.
+
+    Parameters
+    ----------
+    values : sequence of float
+        One level for each source passed to the solver; or, where there are as many values as the sources have connected
+        components in all, one for each component (components of the first source first).
+
+    Raises
+    ------
+    ConstraintError
+        If a value is not finite; when solving, if their number fits neither.
+
+    Examples
+    --------
+    >>> LevelValues([0.0, 1.0]).values
+    (0.0, 1.0)
+    """
+
+    values: Sequence[float]
+
+    def __post_init__(self) -> None:
+        values = tuple(float(v) for v in np.atleast_1d(np.asarray(self.values, dtype=np.float64)))
+        if not np.isfinite(values).all():
+            raise ConstraintError(f"level values must be finite, not {list(values)}")
+        object.__setattr__(self, "values", values)
+
+    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+        n_sources, n_components = int(source.owners.max()) + 1, int(source.components.max()) + 1
+        if len(self.values) == n_sources:
+            index = source.owners
+        elif len(self.values) == n_components:
+            index = source.components
+        else:
+            raise ConstraintError(
+                f"{len(self.values)} level values were given for {n_sources} sources with {n_components} connected "
+                "components in all: give one value for each source, or one for each component"
+            )
+        return integration.fit(divergence, source, Levels(np.array(self.values)[index]))
+
+
+@dataclass(frozen=True)
+class Soft:
+    """A penalty pulls φ to zero on the source (Fig. 11): zero weight is `Free`, infinite weight `ZeroSet`.
+
+    Parameters
+    ----------
+    weight : float
+        λ, in 1/length: residuals at the source decay over a width of about 1/λ.
+
+    Raises
+    ------
+    ConstraintError
+        If the weight is not positive and finite.
+
+    Examples
+    --------
+    >>> Soft(10.0)
+    Soft(weight=10.0)
+    """
+
+    weight: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.weight) and self.weight > 0):
+            raise ConstraintError(f"the weight of a soft constraint must be positive and finite, not {self.weight}")
+
+    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+        return integration.penalize(divergence, source, float(self.weight))

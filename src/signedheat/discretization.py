@@ -1,0 +1,133 @@
+"""What the method needs to know of a domain, and how a domain comes to say it.
+
+Every domain lowers to a `Discretization` through `discretize`, a function that dispatches on the domain's type.
+The method (`method.py`) runs once, on discretisations, and never learns what the domain was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import singledispatch
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class SourceTerm(Protocol):
+    """Sources lowered to one discretisation."""
+
+    @property
+    def vectors(self) -> Any:
+        """X₀, the right-hand side of Eq. 12, in the discretisation's own layout."""
+
+    @property
+    def time(self) -> float:
+        """t of Eq. 12: ``diffusion · max(h_domain, h_source)²``."""
+
+    @property
+    def rows(self) -> Any:
+        """A: sparse (s, n), row i interpolates φ at source sample i."""
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(s,) line or area element of each sample."""
+
+    @property
+    def components(self) -> NDArray[np.int64]:
+        """(s,) connected component of the source that each sample lies on, from 0."""
+
+    @property
+    def owners(self) -> NDArray[np.int64]:
+        """(s,) which of the sources that were passed in each sample comes from, from 0."""
+
+
+class Integration(Protocol):
+    """Step 3 on one discretisation: C, and the ways to constrain it.
+
+    Without given levels, φ is known up to a constant on each connected part of the domain; what comes back has a
+    weighted mean of zero over the source samples of each part. A part without samples is NaN.
+    """
+
+    def solve(self, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² with nothing imposed."""
+
+    def fit(self, divergence: Any, source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels at the samples, in the way that suits the domain best."""
+
+    def fit_exactly(self, divergence: Any, source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels at the samples, exactly (where the rows allow it)."""
+
+    def penalize(self, divergence: Any, source: SourceTerm, strength: float) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² + strength · Σ weight · φ(sample)²."""
+
+
+class Discretization(Protocol):
+    """A domain, as the three steps see it."""
+
+    @property
+    def integration(self) -> Integration:
+        """Step 3."""
+
+    def lower(self, sources: Sequence[Any], diffusion: float) -> SourceTerm:
+        """Bring sources into this discretisation."""
+
+    def diffuse(self, source: SourceTerm) -> Any:
+        """Solve ``(M + tL) X = X₀``, right in direction however small X becomes."""
+
+    def to_cells(self, vectors: Any) -> NDArray[Any]:
+        """X at the cells on which ∇φ lives: complex numbers on surfaces, rows of components in space."""
+
+    def divergence(self, directions: NDArray[Any]) -> Any:
+        """b, the right-hand side of ``C φ = b``."""
+
+    def field(self, values: NDArray[np.float64], source: SourceTerm, diagnostics: Diagnostics) -> Any:
+        """The result, as users see it."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """What a constraint says of φ at the source samples.
+
+    Attributes
+    ----------
+    values : (s,) float
+        Level of each sample: absolute, or up to its group's unknown constant where there are groups.
+    groups : (s,) int, optional
+        Samples of one group share one unknown constant.
+    """
+
+    values: NDArray[np.float64]
+    groups: NDArray[np.int64] | None = None
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """What happened on the way to a field.
+
+    Attributes
+    ----------
+    timings : mapping of str to float
+        Seconds per step.
+    time : float
+        Diffusion time t, in squared units of length.
+    unreached : (k,) int
+        Unknowns to which no source is connected; φ is NaN there.
+    notes : mapping of str to object
+        Residuals, what was repaired, subdivided or cured: named by the step that met it.
+    """
+
+    timings: Mapping[str, float] = field(default_factory=dict)
+    time: float = float("nan")
+    unreached: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    notes: Mapping[str, Any] = field(default_factory=dict)
+
+
+@singledispatch
+def discretize(domain: Any, **options: Any) -> Discretization:
+    """Lower a domain to its discretisation; each kind of domain registers its own way."""
+    raise TypeError(
+        f"{type(domain).__name__} is not a domain: use TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, "
+        "TetMesh or Grid"
+    )

@@ -1,0 +1,1 @@
+"""What distance is measured on, or to: one frozen dataclass per kind of geometry."""

@@ -1,0 +1,97 @@
+"""Regular grids of any dimension."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError
+from .validation import frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Nodes at ``origin + index * spacing``, in any number of dimensions.
+
+    Parameters
+    ----------
+    origin : (d,) float
+        Position of node ``(0, …, 0)``.
+    spacing : (d,) float, or one float for all axes
+        Distance between neighbouring nodes along each axis, in the units of the shape.
+    shape : (d,) int
+        Number of nodes along each axis. Arrays on the grid are indexed ``[i, j, k]`` ↔ x, y, z.
+
+    Raises
+    ------
+    GeometryError
+        If the spacing is not positive and finite, or an axis has fewer than two nodes.
+
+    Examples
+    --------
+    >>> grid = Grid(origin=(0, 0, 0), spacing=0.5, shape=(3, 4, 5))
+    >>> grid.n_nodes
+    60
+    >>> grid.upper
+    array([1. , 1.5, 2. ])
+    """
+
+    origin: NDArray[np.float64]
+    spacing: NDArray[np.float64]
+    shape: tuple[int, ...]
+
+    def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike) -> None:
+        corner = np.atleast_1d(np.array(origin, dtype=np.float64))
+        counts = np.atleast_1d(np.asarray(shape))
+        if corner.ndim != 1 or not np.isfinite(corner).all():
+            raise GeometryError(f"grid origin must be a finite vector, not {np.asarray(origin).tolist()}")
+        if counts.shape != corner.shape or not np.issubdtype(counts.dtype, np.integer):
+            raise GeometryError(f"grid shape must be {len(corner)} integers, not {np.asarray(shape).tolist()}")
+        if (counts < 2).any():
+            raise GeometryError(f"a grid needs at least 2 nodes along every axis, not {counts.tolist()}")
+        steps = np.asarray(spacing, dtype=np.float64)
+        if steps.ndim > 1 or (steps.ndim == 1 and steps.shape != corner.shape):
+            raise GeometryError(f"grid spacing must be one number or {len(corner)}, not {steps.tolist()}")
+        if not (np.isfinite(steps).all() and (steps > 0).all()):
+            raise GeometryError(f"grid spacing must be positive and finite, not {steps.tolist()}")
+        object.__setattr__(self, "origin", frozen(corner))
+        object.__setattr__(self, "spacing", frozen(np.broadcast_to(steps, corner.shape).copy()))
+        object.__setattr__(self, "shape", tuple(int(n) for n in counts))
+
+    @property
+    def dimension(self) -> int:
+        """Number of axes."""
+        return len(self.shape)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    @property
+    def upper(self) -> NDArray[np.float64]:
+        """Position of the last node."""
+        return self.origin + self.spacing * (np.array(self.shape) - 1)
+
+    @cached_property
+    def axes(self) -> tuple[NDArray[np.float64], ...]:
+        """Node coordinates along each axis."""
+        return tuple(
+            frozen(o + s * np.arange(n)) for o, s, n in zip(self.origin, self.spacing, self.shape, strict=True)
+        )
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(*shape, d) node positions; made anew at each call, since they take d times the memory of a field."""
+        return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
+
+    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Which of the (n, d) points lie within the box of the nodes."""
+        points = np.asarray(points, dtype=np.float64)
+        return ((points >= self.origin) & (points <= self.upper)).all(axis=-1)
+
+    def __repr__(self) -> str:
+        return f"Grid(origin={self.origin.tolist()}, spacing={self.spacing.tolist()}, shape={self.shape})"

@@ -1,0 +1,107 @@
+"""Polygon meshes: faces with any number of corners, nonconvex and mildly nonplanar ones included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError
+from .validation import finite_rows, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class PolygonMesh:
+    """Polygons in space.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions.
+    polygons : sequence of sequences of int
+        Vertex ids of each polygon, three or more, counter-clockwise seen from where its normal points to.
+
+    Raises
+    ------
+    GeometryError
+        If there is no polygon, one has fewer than three corners or names a vertex that does not exist,
+        or a coordinate is NaN or infinite.
+
+    Examples
+    --------
+    >>> mesh = PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    >>> mesh.polygon_area_vectors
+    array([[0., 0., 1.]])
+    """
+
+    vertices: NDArray[np.float64]
+    corners: NDArray[np.int64]
+    offsets: NDArray[np.int64]
+
+    def __init__(self, vertices: ArrayLike, polygons: Sequence[Sequence[int]]) -> None:
+        positions = finite_rows(vertices, "vertices", 3)
+        counts = np.fromiter((len(p) for p in polygons), dtype=np.int64, count=len(polygons))
+        if len(counts) == 0:
+            raise GeometryError("there are no polygons: the shape is empty")
+        if (counts < 3).any():
+            first = int(np.argmax(counts < 3))
+            raise GeometryError(f"polygon {first} has {counts[first]} corners, and needs at least 3")
+        corners = np.concatenate([np.asarray(p) for p in polygons])
+        if not np.issubdtype(corners.dtype, np.integer):
+            raise GeometryError(f"polygons must hold integer vertex ids, not {corners.dtype}")
+        offsets = np.concatenate([[0], np.cumsum(counts)])
+        outside = np.flatnonzero((corners < 0) | (corners >= len(positions)))
+        if len(outside):
+            first = int(np.searchsorted(offsets, outside[0], side="right") - 1)
+            raise GeometryError(
+                f"polygon {first} names vertex {corners[outside[0]]}, but vertex ids go from 0 to {len(positions) - 1}"
+            )
+        object.__setattr__(self, "vertices", positions)
+        object.__setattr__(self, "corners", frozen(corners.astype(np.int64)))
+        object.__setattr__(self, "offsets", frozen(offsets))
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, used by a polygon or not."""
+        return len(self.vertices)
+
+    @property
+    def n_polygons(self) -> int:
+        """Number of polygons."""
+        return len(self.offsets) - 1
+
+    @property
+    def polygons(self) -> list[NDArray[np.int64]]:
+        """Vertex ids of each polygon."""
+        return np.split(self.corners, self.offsets[1:-1])
+
+    @cached_property
+    def corner_polygons(self) -> NDArray[np.int64]:
+        """Polygon of each entry of `corners`."""
+        return np.repeat(np.arange(self.n_polygons), np.diff(self.offsets))
+
+    @cached_property
+    def next_corners(self) -> NDArray[np.int64]:
+        """Vertex that follows each entry of `corners` around its polygon."""
+        following = np.roll(self.corners, -1)
+        following[self.offsets[1:] - 1] = self.corners[self.offsets[:-1]]
+        return following
+
+    @cached_property
+    def polygon_centroids(self) -> NDArray[np.float64]:
+        """(p, 3) mean of each polygon's corners."""
+        sums = np.add.reduceat(self.vertices[self.corners], self.offsets[:-1], axis=0)
+        return sums / np.diff(self.offsets)[:, None]
+
+    @cached_property
+    def polygon_area_vectors(self) -> NDArray[np.float64]:
+        """(p, 3) vector areas: exact for every polygon, planar or not."""
+        center = self.polygon_centroids[self.corner_polygons]
+        a, b = self.vertices[self.corners] - center, self.vertices[self.next_corners] - center
+        return 0.5 * np.add.reduceat(np.cross(a, b), self.offsets[:-1], axis=0)
+
+    def __repr__(self) -> str:
+        return f"PolygonMesh({self.n_vertices} vertices, {self.n_polygons} polygons)"

@@ -1,0 +1,79 @@
+"""Triangle meshes: as a domain on which distance is measured, and as a shape in space to which it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..operators.edges import EdgeTable, face_edges
+from .validation import element_ids, finite_rows
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Triangles in space: manifold or not, orientable or not, closed or not.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions; vertices that no face uses are allowed.
+    faces : (m, 3) int
+        Vertex ids. A face's normal points to you when its corners run counter-clockwise as you see it.
+
+    Raises
+    ------
+    GeometryError
+        If there is no face, a coordinate is NaN or infinite, or a face names a vertex that does not exist.
+
+    Examples
+    --------
+    >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> mesh.face_areas
+    array([0.5])
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+        positions = finite_rows(vertices, "vertices", 3)
+        object.__setattr__(self, "vertices", positions)
+        object.__setattr__(self, "faces", element_ids(faces, "faces", 3, len(positions)))
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, used by a face or not."""
+        return len(self.vertices)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return len(self.faces)
+
+    @cached_property
+    def edges(self) -> EdgeTable:
+        """The edges, numbered by first appearance in the faces (corner 0–1, 1–2, 2–0, face after face)."""
+        return face_edges(self.faces)
+
+    @cached_property
+    def face_area_vectors(self) -> NDArray[np.float64]:
+        """(m, 3) area times unit normal."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return 0.5 * np.cross(b - a, c - a)
+
+    @cached_property
+    def face_areas(self) -> NDArray[np.float64]:
+        """(m,) areas."""
+        return np.linalg.norm(self.face_area_vectors, axis=1)
+
+    @cached_property
+    def edge_lengths(self) -> NDArray[np.float64]:
+        """(e,) lengths, in the order of `edges`."""
+        tail, head = self.edges.vertices.T
+        return np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
+
+    def __repr__(self) -> str:
+        return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"

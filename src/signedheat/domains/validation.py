@@ -1,0 +1,51 @@
+"""Checks shared by all domains: arrays come in any shape and leave frozen, or not at all."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError
+
+
+def frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """The array made contiguous and read-only, so that nothing derived from it can go stale."""
+    array = np.ascontiguousarray(array)
+    array.flags.writeable = False
+    return array
+
+
+def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDArray[np.float64]:
+    """`values` as a frozen float64 array of shape (n, columns) without NaN or infinity."""
+    array = np.array(values, dtype=np.float64)
+    if array.ndim != 2 or (columns is not None and array.shape[1] != columns):
+        wanted = f"(n, {columns})" if columns is not None else "(n, d)"
+        raise GeometryError(f"{name} must have shape {wanted}, not {array.shape}")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        raise GeometryError(
+            f"{len(bad)} of {len(array)} {name} hold NaN or infinity, first number {bad[0]}: remove or repair them"
+        )
+    return frozen(array)
+
+
+def element_ids(values: ArrayLike, name: str, corners: int, n_vertices: int) -> NDArray[np.int64]:
+    """`values` as a frozen int64 array of shape (m, corners), every id within 0 … n_vertices − 1."""
+    array = np.asarray(values)
+    if array.size == 0:
+        raise GeometryError(f"there are no {name}: the shape is empty")
+    if array.ndim != 2 or array.shape[1] != corners:
+        raise GeometryError(f"{name} must have shape (m, {corners}), not {array.shape}")
+    if not np.issubdtype(array.dtype, np.integer):
+        raise GeometryError(f"{name} must hold integer vertex ids, not {array.dtype}")
+    ids = array.astype(np.int64)
+    outside = np.flatnonzero(((ids < 0) | (ids >= n_vertices)).any(axis=1))
+    if len(outside):
+        first = outside[0]
+        raise GeometryError(
+            f"{len(outside)} {name} name a vertex that does not exist; number {first} is {ids[first].tolist()}, "
+            f"but vertex ids go from 0 to {n_vertices - 1}"
+        )
+    return frozen(ids)

@@ -1,0 +1,1 @@
+"""What goes beyond the three steps; uses the core through its public face."""

@@ -1,0 +1,1 @@
+"""Results: values that know their domain."""

@@ -1,0 +1,1 @@
+"""Sparse factorisations: one file per back end, one chooser."""

@@ -1,0 +1,53 @@
+"""The signed heat method (Feng & Crane, ACM TOG 43(4) 92, 2024), once, for every domain.
+
+Diffuse the source normals for a short time; normalise; integrate.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .constraints import Constraint
+from .discretization import Discretization, SourceTerm
+
+
+def diffuse(discretization: Discretization, source: SourceTerm) -> Any:
+    """Step 1, Eq. 12: ``(M + tL) X = X₀``."""
+    return discretization.diffuse(source)
+
+
+def normalize(discretization: Discretization, vectors: Any) -> NDArray[Any]:
+    """Step 2: ``Y = X / |X|`` on every cell. Cells that nothing reached keep Y = 0."""
+    return unit(discretization.to_cells(vectors))
+
+
+def integrate(
+    discretization: Discretization, directions: NDArray[Any], source: SourceTerm, constraint: Constraint
+) -> NDArray[np.float64]:
+    """Step 3, Eq. 13: ``C φ = b`` with b the divergence of Y, under the constraint (Sec. 7.1)."""
+    return constraint.integrate(discretization.integration, discretization.divergence(directions), source)
+
+
+def unit(vectors: NDArray[Any]) -> NDArray[Any]:
+    """Vectors scaled to length one; complex numbers are plane vectors, rows of a real array vectors in space.
+
+    Divides by the largest component first, because X falls like exp(−r/√t) and its square underflows long before it.
+
+    Examples
+    --------
+    >>> unit(np.array([[3e-300, 4e-300], [0.0, 0.0]]))
+    array([[0.6, 0.8],
+           [0. , 0. ]])
+    >>> unit(np.array([3e-300 + 4e-300j]))
+    array([0.6+0.8j])
+    """
+    if np.iscomplexobj(vectors):
+        pairs = np.ascontiguousarray(vectors).view(vectors.real.dtype).reshape(*vectors.shape, 2)
+        return unit(pairs).view(vectors.dtype)[..., 0]
+    largest = np.abs(vectors).max(axis=-1, keepdims=True)
+    scaled = vectors / np.where(largest > 0, largest, 1)
+    length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
+    return scaled / np.where(length > 0, length, 1)

@@ -1,0 +1,124 @@
+"""The solver: a domain and a diffusion time, held together with whatever has been factorised for them."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .constraints import Constraint, ZeroSet
+from .discretization import Diagnostics, Discretization, discretize
+from .errors import SourceError
+from .method import diffuse, integrate, normalize
+
+logger = logging.getLogger("signedheat")
+
+Progress = Callable[[float, str], None]
+"""Called with the fraction done, from 0 to 1, and the name of the step that begins."""
+
+
+@dataclass(frozen=True, eq=False)
+class SignedHeatSolver:
+    """Generalized signed distance on one domain.
+
+    What a domain needs factorised is factorised at first use and kept, so that a second distance is cheap.
+
+    Parameters
+    ----------
+    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid
+        What distance is measured on.
+    diffusion : float
+        τ in ``t = τ h²``, h the mean distance between unknowns. Larger values complete broken sources more roundly.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``.
+
+    Raises
+    ------
+    ValueError
+        If `diffusion` is not positive and finite.
+    """
+
+    domain: Any
+    diffusion: float = 1.0
+    progress: Progress | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.diffusion) and self.diffusion > 0):
+            raise ValueError(f"diffusion must be positive and finite, not {self.diffusion}")
+
+    @cached_property
+    def discretization(self) -> Discretization:
+        """The domain as the method sees it."""
+        return discretize(self.domain)
+
+    def distance(self, sources: Any, constraint: Constraint | None = None) -> Any:
+        """Signed distance to sources.
+
+        Parameters
+        ----------
+        sources : one source or a sequence of them
+            On surfaces: `Curve`, `SurfacePoints`. In space: `TriangleMesh`, `PolygonMesh`, `PointCloud`; in the plane:
+            `Polyline`.
+        constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
+            What to impose on φ at the sources; `ZeroSet` by default.
+
+        Returns
+        -------
+        VertexField, GridField or TetField
+            φ > 0 on the side that the source normals point to (on a surface: to the left of a curve).
+
+        Raises
+        ------
+        SourceError
+            If there is no source, or one does not fit the domain.
+        ConstraintError
+            If the constraint does not fit the sources.
+        """
+        constraint = ZeroSet() if constraint is None else constraint
+        stopwatch = Stopwatch(self.progress, steps=5)
+        with stopwatch("prepare"):
+            discretization = self.discretization
+        with stopwatch("sources"):
+            source = discretization.lower(as_list(sources), self.diffusion)
+        with stopwatch("diffuse"):
+            vectors = diffuse(discretization, source)
+        with stopwatch("normalize"):
+            directions = normalize(discretization, vectors)
+            del vectors
+        with stopwatch("integrate"):
+            values = integrate(discretization, directions, source, constraint)
+        diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time)
+        return discretization.field(values, source, diagnostics)
+
+
+def as_list(sources: Any) -> list[Any]:
+    """One source or several, as a list."""
+    listed = list(sources) if isinstance(sources, Sequence) else [sources]
+    if not listed:
+        raise SourceError("there is no source: pass at least one curve, point or shape")
+    return listed
+
+
+class Stopwatch:
+    """Times named steps, logs them, and reports progress."""
+
+    def __init__(self, progress: Progress | None, steps: int) -> None:
+        self.seconds: dict[str, float] = {}
+        self._progress, self._steps = progress, steps
+
+    @contextmanager
+    def __call__(self, step: str) -> Iterator[None]:
+        if self._progress is not None:
+            self._progress(len(self.seconds) / self._steps, step)
+        begin = time.perf_counter()
+        yield
+        self.seconds[step] = time.perf_counter() - begin
+        logger.info("%s: %.3f s", step, self.seconds[step])
+        if self._progress is not None and len(self.seconds) == self._steps:
+            self._progress(1.0, "done")

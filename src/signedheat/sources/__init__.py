@@ -1,0 +1,1 @@
+"""What distance is measured to: curves and points on surfaces, oriented area elements in space."""
