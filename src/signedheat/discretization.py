@@ -70,6 +70,12 @@ class Discretization(Protocol):
     def integration(self) -> Integration:
         """Step 3."""
 
+    def adapt(self, sources: Sequence[Any]) -> tuple[Discretization, Sequence[Any]]:
+        """A discretisation that can hold these sources, and the sources as it knows them: most often itself and they.
+
+        Isolated points and unoriented curves inside faces need edges and vertices of their own.
+        """
+
     def lower(self, sources: Sequence[Any], diffusion: float) -> SourceTerm:
         """Bring sources into this discretisation."""
 

@@ -85,7 +85,8 @@ class SignedHeatSolver:
         with stopwatch("prepare"):
             discretization = self.discretization
         with stopwatch("sources"):
-            source = discretization.lower(as_list(sources), self.diffusion)
+            discretization, sources = discretization.adapt(as_list(sources))
+            source = discretization.lower(sources, self.diffusion)
         with stopwatch("diffuse"):
             vectors = diffuse(discretization, source)
         with stopwatch("normalize"):
