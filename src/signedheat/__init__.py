@@ -8,6 +8,7 @@ from .domains.polygon_mesh import PolygonMesh
 from .domains.triangle_mesh import TriangleMesh
 from .errors import (
     ConstraintError,
+    FactorizationError,
     FileFormatError,
     GeometryError,
     MemoryLimitError,
@@ -26,6 +27,7 @@ __all__ = [
     "Curve",
     "Diagnostics",
     "EachComponent",
+    "FactorizationError",
     "FileFormatError",
     "Free",
     "GeometryError",

@@ -27,6 +27,10 @@ class MemoryLimitError(SignedHeatError):
     """A problem that cannot fit in memory, refused before anything is allocated."""
 
 
+class FactorizationError(SignedHeatError):
+    """A matrix that cannot be factorised: not positive definite, or too large for the memory."""
+
+
 class FileFormatError(SignedHeatError):
     """A file that cannot be read or written: missing, truncated, of unknown kind, unwritable."""
 

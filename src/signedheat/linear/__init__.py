@@ -1,1 +1,67 @@
 """Sparse factorisations: one file per back end, one chooser."""
+
+from __future__ import annotations
+
+import os
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .matrices import upper_triangle, whole
+
+__all__ = ["Factor", "available_backends", "factorize", "upper_triangle", "whole"]
+
+
+class Factor(Protocol):
+    """A factorised Hermitian positive definite matrix."""
+
+    backend: str
+    n: int
+
+    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
+        """Solution for one right-hand side (n,) or several (n, k)."""
+
+
+def available_backends() -> list[str]:
+    """Names of the back ends that this machine has, best first."""
+    from . import pardiso
+
+    return [*(["pardiso"] if pardiso.is_available() else []), "superlu"]
+
+
+def factorize(matrix: Any, backend: str | None = None, order: NDArray[np.integer] | None = None) -> Factor:
+    """Factorise a sparse Hermitian positive definite matrix.
+
+    Parameters
+    ----------
+    matrix : (n, n) sparse, float64 or complex128
+        Only the diagonal and what is above it are read.
+    backend : str, optional
+        One of `available_backends`; by default the environment variable ``SIGNEDHEAT_BACKEND``, or else the best.
+    order : (n,) int, optional
+        Fill-reducing elimination order, where one is known: ``order[k]`` is the unknown eliminated k-th.
+
+    Raises
+    ------
+    FactorizationError
+        If the matrix is not positive definite, or memory does not suffice.
+
+    Examples
+    --------
+    >>> from scipy import sparse
+    >>> factorize(sparse.csr_matrix([[2.0, 1.0], [1.0, 2.0]])).solve(np.array([3.0, 3.0])).round(12)
+    array([1., 1.])
+    """
+    available = available_backends()
+    name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
+    if name not in available:
+        raise ValueError(f"the solver {name!r} is not available here: choose one of {', '.join(available)}")
+    upper = upper_triangle(matrix)
+    if name == "pardiso":
+        from .pardiso import PardisoFactor
+
+        return PardisoFactor(upper, order)
+    from .superlu import SuperLUFactor
+
+    return SuperLUFactor(upper, order)

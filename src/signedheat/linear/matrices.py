@@ -1,0 +1,51 @@
+"""Sparse Hermitian matrices, of which solvers read one half."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+
+def upper_triangle(matrix: Any) -> sparse.csr_matrix:
+    """The diagonal and what is above it, as sorted CSR: the whole or the upper triangle of a Hermitian matrix will do.
+
+    Examples
+    --------
+    >>> upper_triangle(sparse.csr_matrix([[2.0, 1.0], [1.0, 3.0]])).toarray()
+    array([[2., 1.],
+           [0., 3.]])
+    """
+    if sparse.issparse(matrix) and matrix.format == "csr" and _is_upper(matrix):
+        return matrix
+    upper = sparse.triu(matrix, format="csr")
+    upper.sum_duplicates()
+    missing = upper.diagonal() == 0
+    if missing.any():  # solvers want every diagonal entry stored, a zero one too
+        upper = sparse.csr_matrix(upper + sparse.diags_array(np.where(missing, 1.0, 0.0)))
+        upper.sort_indices()
+        upper.data[upper.indptr[:-1][missing]] = 0
+    return upper
+
+
+def whole(upper: sparse.csr_matrix) -> sparse.csr_matrix:
+    """The Hermitian matrix whose upper triangle this is.
+
+    Examples
+    --------
+    >>> whole(sparse.csr_matrix([[2.0, 1.0], [0.0, 3.0]])).toarray()
+    array([[2., 1.],
+           [1., 3.]])
+    """
+    return sparse.csr_matrix(upper + sparse.triu(upper, 1).conj().T)
+
+
+def _is_upper(matrix: sparse.csr_matrix) -> bool:
+    """Whether every row starts with its diagonal entry and goes on in strictly increasing columns."""
+    starts = matrix.indptr[:-1]
+    if (np.diff(matrix.indptr) == 0).any() or (matrix.indices[starts] != np.arange(matrix.shape[0])).any():
+        return False
+    increasing = np.diff(matrix.indices) > 0
+    increasing[starts[1:] - 1] = True
+    return bool(increasing.all())

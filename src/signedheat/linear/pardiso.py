@@ -1,0 +1,143 @@
+"""Intel MKL PARDISO, called in the shared library that the ``mkl`` wheel brings."""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import importlib.metadata
+import sys
+import threading
+import weakref
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import FactorizationError
+
+_ANALYZE_AND_FACTORIZE, _SOLVE, _RELEASE = 12, 33, -1
+_POSITIVE_DEFINITE = {np.dtype(np.float64): 2, np.dtype(np.complex128): 4}
+_CAUSES = {
+    -1: "inconsistent input",
+    -2: "not enough memory",
+    -3: "reordering failed",
+    -4: "the matrix is not positive definite",
+    -8: "32-bit integer overflow",
+}
+
+
+class PardisoFactor:
+    """Cholesky factor of a Hermitian positive definite matrix, freed with the object.
+
+    Parameters
+    ----------
+    upper : sparse CSR, float64 or complex128
+        Upper triangle, as `upper_triangle` makes it.
+    order : (n,) int, optional
+        Elimination order: ``order[k]`` is the unknown eliminated k-th. Without it, METIS finds one.
+    """
+
+    backend = "pardiso"
+
+    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
+        self.n, self.dtype = upper.shape[0], upper.dtype
+        self._call = _Call(upper, order)
+        self._lock = threading.Lock()
+        self._finalizer = weakref.finalize(self, _Call.release, self._call)
+        self._call(_ANALYZE_AND_FACTORIZE)
+
+    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
+        """Solution for one right-hand side (n,) or several (n, k)."""
+        columns = np.asfortranarray(rhs, dtype=self.dtype)
+        solution = np.empty_like(columns, order="F")
+        with self._lock:
+            self._call(_SOLVE, columns, solution)
+        return solution
+
+    @property
+    def nonzeros(self) -> int:
+        """Entries stored in the factor."""
+        return int(self._call.parameters[17])
+
+
+class _Call:
+    """The arguments that every phase of one factorisation shares."""
+
+    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None) -> None:
+        wide = upper.nnz >= 2**31
+        index = np.int64 if wide else np.int32
+        self._function = _library().pardiso_64 if wide else _library().pardiso
+        self._handle = np.zeros(64, dtype=np.int64)
+        self._matrix = (upper.data, upper.indptr.astype(index, copy=False), upper.indices.astype(index, copy=False))
+        self._integer = ctypes.c_longlong if wide else ctypes.c_int
+        self._kind, self._n = _POSITIVE_DEFINITE[upper.dtype], upper.shape[0]
+        self._order = np.zeros(1, dtype=index) if order is None else np.ascontiguousarray(order, dtype=index)
+        self.parameters = np.zeros(64, dtype=index)
+        self.parameters[0] = 1  # nothing by default
+        self.parameters[1] = 3  # nested dissection in parallel
+        self.parameters[4] = 0 if order is None else 1
+        self.parameters[17] = -1  # report the nonzeros of the factor
+        self.parameters[23] = 1  # two-level parallel factorisation
+        self.parameters[34] = 1  # indices count from zero
+
+    def __call__(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
+        integer = self._integer
+        one, status = integer(1), integer(0)
+        n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])
+        empty = np.zeros(1, dtype=self._matrix[0].dtype)
+        self._function(
+            _address(self._handle),
+            ctypes.byref(one),
+            ctypes.byref(one),
+            ctypes.byref(integer(self._kind)),
+            ctypes.byref(integer(phase)),
+            ctypes.byref(integer(self._n)),
+            *(_address(array) for array in self._matrix),
+            _address(self._order),
+            ctypes.byref(n_columns),
+            _address(self.parameters),
+            ctypes.byref(integer(0)),
+            _address(empty if rhs is None else rhs),
+            _address(empty if solution is None else solution),
+            ctypes.byref(status),
+        )
+        if status.value != 0:
+            cause = _CAUSES.get(status.value, "see the PARDISO manual")
+            raise FactorizationError(f"PARDISO failed with error {status.value} on {self._n} unknowns: {cause}")
+
+    def release(self) -> None:
+        self(_RELEASE)
+
+
+def _address(array: NDArray[Any]) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    """``mkl_rt``, from the wheel, the environment's prefix or the system."""
+    names = {"win32": "mkl_rt*.dll", "darwin": "libmkl_rt*.dylib"}.get(sys.platform, "libmkl_rt.so*")
+    try:
+        installed = [Path(f.locate()) for f in importlib.metadata.files("mkl") or [] if f.match(names)]
+    except importlib.metadata.PackageNotFoundError:
+        installed = []
+    prefix = Path(sys.prefix) / ("Library/bin" if sys.platform == "win32" else "lib")
+    found = ctypes.util.find_library("mkl_rt")
+    for path in [*installed, *sorted(prefix.glob(names)), *([found] if found else [])]:
+        try:
+            return ctypes.CDLL(str(path))
+        except OSError:
+            continue
+    raise ImportError("the library mkl_rt was not found: install the package mkl")
+
+
+def is_available() -> bool:
+    """Whether the library can be loaded."""
+    try:
+        _library()
+    except ImportError:
+        return False
+    return True
