@@ -1,0 +1,201 @@
+"""Compiled kernels on intrinsic triangulations: triangles known by their gluing and their edge lengths alone.
+
+Halfedge ``3 f + k`` runs from corner k to corner k + 1 of face f. Two halfedges of one edge may lie in one face, and
+two edges may join the same two vertices, so nothing here is ever looked up by vertex ids.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
+"""Kinds of steps in a history."""
+
+
+class Gluing(NamedTuple):
+    """An intrinsic triangulation under construction; arrays are longer than what is used of them.
+
+    `tail`, `edge`, `forward`, `front` and `ring` have one entry per halfedge: its tail vertex; its edge; whether it
+    runs along the edge's own direction; which of the edge's two sides it is on (moved along, so that the two sides of
+    a source keep their names); and the next halfedge of the same edge, cyclically: itself at a boundary.
+    `start`, `length` and `fixed` have one entry per edge: one of its halfedges; its length; whether it must not be
+    flipped. `counts` holds the number of faces, edges, vertices and steps. `steps` and `weights` are the history: kind,
+    two halfedges or faces; and four numbers that say how points move. `scratch` is room to work in,
+    and lengths are in multiples of `unit`.
+    """
+
+    tail: NDArray[np.int64]
+    edge: NDArray[np.int64]
+    forward: NDArray[np.bool_]
+    front: NDArray[np.bool_]
+    ring: NDArray[np.int64]
+    start: NDArray[np.int64]
+    length: NDArray[np.float64]
+    fixed: NDArray[np.bool_]
+    counts: NDArray[np.int64]
+    steps: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    scratch: NDArray[np.int64]
+    unit: float
+
+
+@njit(cache=True, inline="always")
+def following(h):
+    """The next halfedge around the face."""
+    return h + 1 if h % 3 < 2 else h - 2
+
+
+@njit(cache=True, inline="always")
+def preceding(h):
+    """The halfedge before, around the face."""
+    return h - 1 if h % 3 else h + 2
+
+
+@njit(cache=True)
+def half_tangent(a, b, c):
+    """Numerator and denominator of tan²(α/2), α opposite to a, without cancellation (Kahan).
+
+    Their product is 16 times the squared area; impossible triangles count as flat ones.
+    """
+    if b < c:
+        b, c = c, b
+    difference = a - b
+    numerator = (a + (b - c)) * max(c + difference, 0.0)
+    denominator = (a + (b + c)) * max(c - difference, 0.0)
+    return numerator, denominator
+
+
+@njit(cache=True)
+def tangent_at(g, h):
+    """`half_tangent` of the corner at the tail of a halfedge."""
+    n = following(h)
+    return half_tangent(g.length[g.edge[n]], g.length[g.edge[h]], g.length[g.edge[preceding(h)]])
+
+
+@njit(cache=True)
+def is_interior(g, h):
+    """Whether exactly two different faces meet at the halfedge's edge."""
+    other = g.ring[h]
+    return other != h and g.ring[other] == h and other // 3 != h // 3
+
+
+@njit(cache=True)
+def violates_delaunay(g, h):
+    """Whether the two angles opposite to an interior edge sum to more than π (by more than rounding)."""
+    n, d = tangent_at(g, preceding(h))
+    m, e = tangent_at(g, preceding(g.ring[h]))
+    return n * m > d * e * (1.0 + 1e-10)
+
+
+@njit(cache=True)
+def move(g, old, new):
+    """Move halfedges old[k] to the places new[k], a permutation of them, all at once; corners are left alone."""
+    successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
+    for k in range(len(old)):
+        after = g.ring[old[k]]
+        before = after
+        while g.ring[before] != old[k]:
+            before = g.ring[before]
+        for l in range(len(old)):
+            if before == old[l]:
+                before = -1
+        for l in range(len(old)):
+            if after == old[l]:
+                after = new[l]
+                break
+        successors[k], predecessors[k], edges[k] = after, before, g.edge[old[k]]
+        flags[k] = 2 * g.forward[old[k]] + g.front[old[k]]
+    for k in range(len(old)):
+        h = new[k]
+        g.ring[h], g.edge[h], g.forward[h], g.front[h] = successors[k], edges[k], flags[k] >= 2, flags[k] % 2 == 1
+        g.start[edges[k]] = h
+        if predecessors[k] >= 0:
+            g.ring[predecessors[k]] = h
+
+
+@njit(cache=True)
+def record(g, kind, first, second, a, b, c, d):
+    """Write one step into the history."""
+    n = g.counts[3]
+    g.steps[n, 0], g.steps[n, 1], g.steps[n, 2] = kind, first, second
+    g.weights[n, 0], g.weights[n, 1], g.weights[n, 2], g.weights[n, 3] = a, b, c, d
+    g.counts[3] = n + 1
+
+
+@njit(cache=True)
+def turn_over(g, face):
+    """Reverse a face: corners (0, 1, 2) become (0, 2, 1)."""
+    h = 3 * face
+    move(g, (h, h + 2), (h + 2, h))
+    g.tail[h + 1], g.tail[h + 2] = g.tail[h + 2], g.tail[h + 1]
+    for k in range(3):
+        g.forward[h + k] = not g.forward[h + k]
+    record(g, TURN, face, -1, 0.0, 0.0, 0.0, 0.0)
+
+
+@njit(cache=True)
+def flip(g, h):
+    """Flip an interior edge, if the two faces form a strictly convex quadrilateral; whether it was done.
+
+    ``h: i → j`` with apex a and its twin ``t: j → i`` with apex b become ``h: b → a`` with apex i, ``t: a → b`` with
+    apex j. Faces and places are kept, so that a history can be run backwards.
+    """
+    t = g.ring[h]
+    if g.forward[h] == g.forward[t]:
+        turn_over(g, t // 3)
+        t = g.ring[h]
+    h1, h2, t1, t2 = following(h), preceding(h), following(t), preceding(t)
+    ja, ai, ib, bj = g.length[g.edge[h1]], g.length[g.edge[h2]], g.length[g.edge[t1]], g.length[g.edge[t2]]
+    n1, d1 = tangent_at(g, h)
+    n2, d2 = tangent_at(g, t1)
+    sine, cosine, norm = np.sqrt(n1 * d2) + np.sqrt(n2 * d1), np.sqrt(d1 * d2) - np.sqrt(n1 * n2), (n1 + d1) * (n2 + d2)
+    m1, e1 = tangent_at(g, h1)
+    m2, e2 = tangent_at(g, t)
+    sine_j, cosine_j, norm_j = (
+        np.sqrt(m1 * e2) + np.sqrt(m2 * e1),
+        np.sqrt(e1 * e2) - np.sqrt(m1 * m2),
+        (m1 + e1) * (m2 + e2),
+    )
+    if not (norm > 0.0 and norm_j > 0.0):
+        return False
+    area_iab, area_jab = ai * ib * sine * cosine / norm, ja * bj * sine_j * cosine_j / norm_j
+    length = np.sqrt((ai - ib) ** 2 + 4.0 * ai * ib * sine * sine / norm)
+    if not (length > 0.0 and area_iab > 0.0 and area_jab > 0.0):
+        return False
+    record(g, FLIP, h, t, area_jab, area_iab, 0.25 * np.sqrt(n2 * d2), 0.25 * np.sqrt(n1 * d1))
+    i, j, a, b = g.tail[h], g.tail[t], g.tail[h2], g.tail[t2]
+    move(g, (h1, h2, t1, t2), (t2, h1, h2, t1))
+    g.tail[h], g.tail[h1], g.tail[h2] = b, a, i
+    g.tail[t], g.tail[t1], g.tail[t2] = a, b, j
+    g.length[g.edge[h]] = length
+    g.forward[h], g.forward[t] = True, False
+    return True
+
+
+@njit(cache=True)
+def make_delaunay(g, queue, queued, head, waiting):
+    """Flip until every edge that is not fixed has the Delaunay property, or the history is full.
+
+    `queue` is a ring buffer with room for every edge: those still to be looked at, `waiting` of them from `head` on;
+    `queued` says which they are. Returns the new head and how many are waiting.
+    """
+    while waiting > 0 and g.counts[3] + 2 <= len(g.steps):
+        e = queue[head]
+        head = (head + 1) % len(queue)
+        waiting -= 1
+        queued[e] = False
+        h = g.start[e]
+        if g.fixed[e] or not is_interior(g, h) or not violates_delaunay(g, h) or not flip(g, h):
+            continue
+        t = g.ring[h]
+        for side in (following(h), preceding(h), following(t), preceding(t)):
+            neighbor = g.edge[side]
+            if not queued[neighbor]:
+                queue[(head + waiting) % len(queue)] = neighbor
+                queued[neighbor] = True
+                waiting += 1
+    return head, waiting
