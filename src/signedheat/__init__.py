@@ -17,6 +17,8 @@ from .errors import (
     SourceError,
     UnreachedWarning,
 )
+from .fields.vertex_field import VertexField
+from .lowering import surface as _surface  # noqa: F401  registers the lowering
 from .solver import SignedHeatSolver
 from .sources.curves import Curve, SurfacePoints
 
@@ -44,5 +46,6 @@ __all__ = [
     "SurfacePoints",
     "TriangleMesh",
     "UnreachedWarning",
+    "VertexField",
     "ZeroSet",
 ]

@@ -1,0 +1,154 @@
+"""Step 3 by factorising C: unknowns at the vertices of a mesh, constraints at any samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..discretization import Levels, SourceTerm
+from ..linear import Factor, factorize, upper_triangle, whole
+
+_SPRING = 1e7  # of the constraints, times the largest diagonal entry of C
+_MAX_ROUNDS = 12
+_BATCH = 32  # right-hand sides solved at a time
+
+
+@dataclass(frozen=True, eq=False)
+class DirectIntegration:
+    """``C φ = b`` on vertices, under any of the constraints of Sec. 7.1.
+
+    Parameters
+    ----------
+    stiffness : (n, n) sparse
+        Upper triangle of C, as `upper_triangle` makes it; a constant on each connected part is its kernel.
+    prolongation : (m, n) sparse, optional
+        Where sources speak of m vertices of which only n are unknowns, the others being averages of them.
+    """
+
+    stiffness: sparse.csr_matrix
+    prolongation: sparse.csr_matrix | None = None
+    _last: list[Any] = field(default_factory=list, repr=False)
+
+    @cached_property
+    def parts(self) -> NDArray[np.int64]:
+        """(n,) connected part of the domain that each unknown lies in."""
+        return sparse.csgraph.connected_components(self.stiffness, directed=False)[1].astype(np.int64)
+
+    @cached_property
+    def factor(self) -> Factor:
+        """Factor of C, with one vertex of each part grounded."""
+        return factorize(_grounded(self.stiffness, self._first_vertices))
+
+    def solve(self, divergence: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² with nothing imposed."""
+        return self._centered(self.factor.solve(divergence), source)
+
+    def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels at the samples, or levels up to one unknown constant for each group of samples.
+
+        The constants are those at which no group pulls: the multipliers of each add up to zero. One constant per
+        connected part of the domain stays free, and is chosen by the mean.
+        """
+        rows = self.rows(source)
+        if levels.groups is None:
+            values, _ = self._interpolate(rows, divergence[:, None], levels.values[:, None])
+            return self._reached(values[:, 0], rows)
+        group, values = levels.groups, levels.values
+        part = self._part_of(rows)
+        free = np.ones(int(group.max()) + 1, dtype=bool)
+        free[group[np.unique(part, return_index=True)[1]]] = False
+        loads = sparse.csr_matrix((np.ones(len(group)), (np.arange(len(group)), group)))[:, np.flatnonzero(free)]
+        _, pull = self._interpolate(rows, divergence[:, None], values[:, None])
+        constants = np.zeros(loads.shape[1])
+        if len(constants):
+            capacitance = np.empty((len(constants), len(constants)))
+            for begin in range(0, len(constants), _BATCH):
+                batch = slice(begin, begin + _BATCH)
+                lifted = loads[:, batch].toarray()
+                _, multipliers = self._interpolate(rows, np.zeros((len(divergence), lifted.shape[1])), lifted)
+                capacitance[:, batch] = loads.T @ multipliers
+            constants = np.linalg.solve(capacitance, -(loads.T @ pull[:, 0]))
+        fitted, _ = self._interpolate(rows, divergence[:, None], (values + loads @ constants)[:, None])
+        return self._centered(fitted[:, 0], source)
+
+    fit = fit_exactly
+
+    def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
+        """``(C + λ Aᵀ W A) φ = b``."""
+        rows = self.rows(source)
+        return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
+
+    def rows(self, source: SourceTerm) -> sparse.csr_matrix:
+        """A, on the unknowns."""
+        return source.rows if self.prolongation is None else sparse.csr_matrix(source.rows @ self.prolongation)
+
+    def _interpolate(
+        self, rows: sparse.csr_matrix, forces: NDArray[np.float64], levels: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f``.
+
+        An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite however many rows repeat each other, and
+        stiff springs leave two or three rounds to do. Every round starts from true residuals, which also mends what
+        the springs cost in accuracy.
+        """
+        stiffness = whole(self.stiffness)
+        spring = _SPRING * self.stiffness.diagonal().max()
+        factor = self._pulled_factor(rows, np.full(rows.shape[0], spring))
+        values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
+        gap, worst = levels, np.inf
+        for _ in range(_MAX_ROUNDS):
+            force = forces - stiffness @ values - rows.T @ multipliers
+            step = factor.solve(force + spring * (rows.T @ gap))
+            values += step
+            multipliers -= spring * (gap - rows @ step)
+            gap = levels - rows @ values
+            previous, worst = worst, np.abs(gap).max(initial=0.0)
+            if worst <= 1e-14 * np.abs(values).max() or worst > 0.5 * previous:
+                break
+        return values, multipliers
+
+    def _pulled_factor(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
+        """Factor of ``C + Aᵀ S A``; the last one is kept."""
+        key = (rows.indptr, rows.indices, rows.data, springs)
+        if self._last and all(np.array_equal(old, new) for old, new in zip(self._last[0], key, strict=True)):
+            return self._last[1]
+        matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
+        unreached = np.isin(self.parts[self._first_vertices], self._part_of(rows), invert=True)
+        factor = factorize(_grounded(matrix, self._first_vertices[unreached]))
+        self._last[:] = key, factor
+        return factor
+
+    @cached_property
+    def _first_vertices(self) -> NDArray[np.int64]:
+        """One vertex of each part."""
+        return np.unique(self.parts, return_index=True)[1]
+
+    def _part_of(self, rows: sparse.csr_matrix) -> NDArray[np.int64]:
+        """(s,) part of the domain that each sample lies in."""
+        return self.parts[rows.indices[rows.indptr[:-1]]]
+
+    def _reached(self, values: NDArray[np.float64], rows: sparse.csr_matrix) -> NDArray[np.float64]:
+        """NaN on parts without samples."""
+        return np.where(np.isin(self.parts, self._part_of(rows)), values, np.nan)
+
+    def _centered(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        """The weighted mean over the samples of each part made zero; NaN where a part has none."""
+        rows = self.rows(source)
+        part, n_parts = self._part_of(rows), len(self._first_vertices)
+        weight = np.bincount(part, source.weights, n_parts)
+        mean = np.full(n_parts, np.nan)
+        np.divide(np.bincount(part, source.weights * (rows @ values), n_parts), weight, out=mean, where=weight > 0)
+        return values - mean[self.parts]
+
+
+def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.csr_matrix:
+    """The matrix made definite: since b sums to zero on each part, grounded vertices come out as zero."""
+    data = matrix.data.copy()
+    diagonal = matrix.indptr[vertices]
+    data[diagonal] += np.where(data[diagonal] > 0, data[diagonal], 1.0)
+    return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)

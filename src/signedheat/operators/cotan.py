@@ -1,0 +1,47 @@
+"""The cotan Laplacian and the divergence of face fields (Sec. 5.5)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .laid_out_triangles import LaidOutTriangles
+
+
+def cotan_matrix(triangles: LaidOutTriangles) -> sparse.csr_matrix:
+    """Upper triangle of C, positive semidefinite, one unknown per vertex, its whole diagonal stored.
+
+    ``φᵀ C φ = ∫ |∇φ|²``.
+
+    Examples
+    --------
+    >>> flat = LaidOutTriangles.from_lengths(np.array([[0, 1, 2]]), np.array([[1.0, 2**0.5, 1.0]]), 3)
+    >>> cotan_matrix(flat).toarray().round(12)
+    array([[ 1. , -0.5, -0.5],
+           [ 0. ,  0.5,  0. ],
+           [ 0. ,  0. ,  0.5]])
+    """
+    i = triangles.corner_vertices.ravel()
+    j = np.roll(triangles.corner_vertices, -1, axis=1).ravel()
+    half = 0.5 * np.roll(triangles.corner_cotangents, 1, axis=1).ravel()  # the corner facing edge k is k + 2
+    n = triangles.n_vertices
+    diagonal = np.bincount(i, half, n) + np.bincount(j, half, n)
+    every = np.arange(n)
+    same = i == j
+    diagonal -= 2.0 * np.bincount(i[same], half[same], n)
+    rows = np.concatenate([every, np.minimum(i, j)[~same]])
+    columns = np.concatenate([every, np.maximum(i, j)[~same]])
+    matrix = sparse.coo_matrix((np.concatenate([diagonal, -half[~same]]), (rows, columns)), shape=(n, n)).tocsr()
+    matrix.sum_duplicates()
+    return matrix
+
+
+def divergence(triangles: LaidOutTriangles, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """b with ``C φ = b`` for the φ whose gradient is closest to a face field: ``b_i = ∫ ⟨∇λ_i, Y⟩``.
+
+    The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
+    """
+    opposite = np.roll(triangles.edge_vectors, -1, axis=1)
+    flux = 0.5 * (np.conj(1j * opposite) * directions[:, None]).real
+    return np.bincount(triangles.corner_vertices.ravel(), flux.ravel(), triangles.n_vertices)
