@@ -19,6 +19,7 @@ from .errors import (
 )
 from .fields.vertex_field import VertexField
 from .lowering import surface as _surface  # noqa: F401  registers the lowering
+from .fields.grid_field import GridField
 from .solver import SignedHeatSolver
 from .sources.curves import Curve, SurfacePoints
 
@@ -34,6 +35,7 @@ __all__ = [
     "Free",
     "GeometryError",
     "Grid",
+    "GridField",
     "LevelValues",
     "MemoryLimitError",
     "OutsideError",

@@ -1,0 +1,196 @@
+"""Distance on a grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..discretization import Diagnostics
+from ..domains.grid import Grid
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError, OutsideError
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+
+@dataclass(frozen=True, eq=False)
+class GridField:
+    """Signed distance at the nodes of a grid.
+
+    Parameters
+    ----------
+    grid : Grid
+        Where the nodes are.
+    values : (*grid.shape) float
+        φ at the nodes, in the units of the grid: ``values[i, j, k]`` at ``grid.points[i, j, k]``. Positive on the
+        side that the source normals point to, so negative inside a shape with outward normals.
+    diagnostics : Diagnostics
+        What happened on the way.
+
+    Raises
+    ------
+    GeometryError
+        If the values do not have the shape of the grid.
+
+    Examples
+    --------
+    >>> grid = Grid(origin=(-1, -1, -1), spacing=0.1, shape=(21, 21, 21))
+    >>> phi = GridField(grid, np.linalg.norm(grid.points, axis=-1) - 0.5)
+    >>> phi([[0.7, 0.0, 0.0]]).round(3)
+    array([0.2])
+    >>> phi.gradient([[0.7, 0.0, 0.0]]).round(2)
+    array([[1., 0., 0.]])
+    >>> phi.contour(0.0).n_faces > 0
+    True
+    """
+
+    grid: Grid
+    values: NDArray[np.float64]
+    diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+
+    def __post_init__(self) -> None:
+        values = np.ascontiguousarray(self.values, dtype=np.float64)
+        if values.shape != self.grid.shape:
+            raise GeometryError(f"values have shape {values.shape}, but the grid has {self.grid.shape} nodes")
+        object.__setattr__(self, "values", values)
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        """φ at points in space, linear along each axis between nodes.
+
+        Outside the grid φ continues straight from the nearest point of the grid's box, along the gradient there. For a
+        convex shape inside the box this is a lower bound of the distance; it is continuous everywhere.
+
+        Parameters
+        ----------
+        points : (n, d) or (d,) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (n,) float, or one float
+            Signed distances.
+        """
+        points, inside = self._into_box(points)
+        values = self._interpolate(inside)
+        away = points - inside
+        outside = np.flatnonzero(away.any(axis=-1))
+        if len(outside):
+            slopes = self._slopes(inside[outside])
+            values[outside] += np.einsum("ij,ij->i", slopes, away[outside])
+        return values.reshape(points.shape[:-1]) if points.ndim == 2 else values[0]
+
+    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+        """∇φ at points in space: central differences of the nodes, interpolated.
+
+        Outside the grid it is the gradient at the nearest point of the grid's box.
+
+        Parameters
+        ----------
+        points : (n, d) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (n, d) float
+            Gradients; of length about 1, since φ is a distance.
+        """
+        _, inside = self._into_box(points)
+        return self._slopes(inside)
+
+    def contour(self, level: float = 0.0) -> TriangleMesh:
+        """The surface φ = level: closed, manifold, normals pointing to greater φ.
+
+        Where the surface runs out of the grid, as it does for an open shape whose completion has no end, it is closed
+        along the box of the grid (1 % of a cell outside it).
+
+        Parameters
+        ----------
+        level : float
+            In the units of the grid.
+
+        Returns
+        -------
+        TriangleMesh
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the level anywhere on the grid.
+        GeometryError
+            If the grid is not three-dimensional, or values are NaN.
+        """
+        from .contouring import closed_surface
+
+        return closed_surface(self.grid, self.values, level)
+
+    def offset(self, distance: float) -> TriangleMesh:
+        """The surface at a signed distance from the shape: `contour`, but refused where the grid is too small for it.
+
+        Parameters
+        ----------
+        distance : float
+            Positive outwards, in the units of the grid.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the value on the grid, or its level set leaves the grid although the shape itself does
+            not: the grid then needs more padding.
+        """
+        walls = self._wall_range()
+        bounded = walls[0] > 0 or walls[1] < 0
+        if bounded and walls[0] < distance < walls[1]:
+            limit = walls[0] if walls[0] > 0 else walls[1]
+            raise OutsideError(
+                f"the surface at distance {distance:g} leaves the grid, which holds distances up to {limit:g}: "
+                f"use a padding of more than {abs(distance):g}"
+            )
+        return self.contour(distance)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write to a file, in the format that its name ends with; `signedheat.load_field` gives the field back."""
+        from .. import io
+
+        io.save_field(self, path)
+
+    def _wall_range(self) -> tuple[float, float]:
+        """Least and greatest φ on the walls of the box."""
+        walls = [side for axis in range(self.grid.dimension) for side in self._walls(axis)]
+        return min(float(w.min()) for w in walls), max(float(w.max()) for w in walls)
+
+    def _walls(self, axis: int) -> list[NDArray[np.float64]]:
+        return [self.values.take(end, axis=axis) for end in (0, -1)]
+
+    def _into_box(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        points = np.asarray(points, dtype=np.float64)
+        if points.shape[-1:] != (self.grid.dimension,) or not np.isfinite(points).all():
+            raise GeometryError(f"points must be finite, with {self.grid.dimension} coordinates each")
+        return points, np.clip(np.atleast_2d(points), self.grid.origin, self.grid.upper)
+
+    def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        from scipy.ndimage import map_coordinates
+
+        index = (points - self.grid.origin) / self.grid.spacing
+        return map_coordinates(self.values, index.T, order=1, mode="nearest")
+
+    def _slopes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Differences of the interpolant one cell apart to either side: those of the nodes, interpolated."""
+        slopes = np.empty_like(points)
+        for axis, step in enumerate(self.grid.spacing):
+            ahead, behind = points.copy(), points.copy()
+            ahead[:, axis] = np.minimum(ahead[:, axis] + step, self.grid.upper[axis])
+            behind[:, axis] = np.maximum(behind[:, axis] - step, self.grid.origin[axis])
+            rise = self._interpolate(ahead) - self._interpolate(behind)
+            slopes[:, axis] = rise / (ahead[:, axis] - behind[:, axis])
+        return slopes
+
+    def __repr__(self) -> str:
+        low, high = (float(v) for v in (self.values.min(), self.values.max()))
+        return f"GridField({self.grid!r}, values from {low:g} to {high:g})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.grid, self.values, self.diagnostics)
