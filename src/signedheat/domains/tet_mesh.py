@@ -1,0 +1,139 @@
+"""Tet meshes: volumes in space, convex or not, manifold or not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError
+from .triangle_mesh import TriangleMesh
+from .validation import element_ids, finite_rows, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class TetMesh:
+    """Tetrahedra in space.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions; vertices that no tet uses are allowed.
+    tets : (m, 4) int
+        Vertex ids. Seen from the first corner the other three run clockwise when the volume is positive; tets given
+        inside out are turned (their last two corners swapped) and listed in `reoriented`. Flat tets are allowed.
+
+    Attributes
+    ----------
+    reoriented : (k,) int
+        Tets that were given inside out.
+
+    Raises
+    ------
+    GeometryError
+        If there is no tet, a coordinate is NaN or infinite, a tet names a vertex that does not exist, or no tet has
+        any volume.
+
+    Examples
+    --------
+    >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 3, 2]])
+    >>> mesh.tets, mesh.reoriented
+    (array([[0, 1, 2, 3]]), array([0]))
+    >>> mesh.boundary.n_faces
+    4
+    """
+
+    vertices: NDArray[np.float64]
+    tets: NDArray[np.int64]
+    reoriented: NDArray[np.int64]
+
+    def __init__(self, vertices: ArrayLike, tets: ArrayLike) -> None:
+        from ..operators.tetrahedral import signed_volumes
+
+        positions = finite_rows(vertices, "vertices", 3)
+        ids = element_ids(tets, "tets", 4, len(positions))
+        volumes = signed_volumes(positions, ids)
+        if not volumes.any():
+            raise GeometryError(f"none of the {len(ids)} tets has any volume: the vertices lie in one plane or point")
+        inside_out = np.flatnonzero(volumes < 0)
+        if len(inside_out):
+            ids = ids.copy()
+            ids[inside_out] = ids[inside_out][:, [0, 1, 3, 2]]
+        object.__setattr__(self, "vertices", positions)
+        object.__setattr__(self, "tets", frozen(ids))
+        object.__setattr__(self, "reoriented", frozen(inside_out))
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices, used by a tet or not."""
+        return len(self.vertices)
+
+    @property
+    def n_tets(self) -> int:
+        """Number of tets."""
+        return len(self.tets)
+
+    @cached_property
+    def geometry(self) -> Any:
+        """Areas, volumes and the operators made of them: an `operators.tetrahedral.Tetrahedra`."""
+        from ..operators.tetrahedral import Tetrahedra
+
+        return Tetrahedra(self.vertices, self.tets)
+
+    @cached_property
+    def faces(self) -> Any:
+        """The triangles between and around the tets: an `operators.tetrahedral.FaceTable`."""
+        from ..operators.tetrahedral import tet_faces
+
+        return tet_faces(self.tets)
+
+    @property
+    def tet_volumes(self) -> NDArray[np.float64]:
+        """(m,) volumes."""
+        return self.geometry.volumes
+
+    @cached_property
+    def tet_barycenters(self) -> NDArray[np.float64]:
+        """(m, 3) centres."""
+        return self.vertices[self.tets].mean(axis=1)
+
+    @cached_property
+    def boundary(self) -> TriangleMesh:
+        """The faces of a single tet, facing outward, on the vertices of this mesh."""
+        return TriangleMesh(self.vertices, self.faces.vertices[self.faces.tet_counts == 1])
+
+    @cached_property
+    def search_tree(self) -> Any:
+        """A tree of the tets' boxes: an `operators.box_tree.BoxTree`."""
+        from ..operators.box_tree import BoxTree
+
+        corners = self.vertices[self.tets]
+        return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+
+    @classmethod
+    def from_meshio(cls, mesh: Any) -> TetMesh:
+        """The tets of a `meshio.Mesh`; cells of other kinds are left behind.
+
+        Raises
+        ------
+        GeometryError
+            If it holds no tets.
+        """
+        blocks = [block.data for block in mesh.cells if block.type == "tetra"]
+        if not blocks:
+            kinds = sorted({block.type for block in mesh.cells}) or ["no cells"]
+            raise GeometryError(f"the mesh holds no tets, but {', '.join(kinds)}: convert it to tetrahedra first")
+        return cls(mesh.points, np.concatenate(blocks))
+
+    def to_meshio(self, point_data: Any = None, cell_data: Any = None) -> Any:
+        """This mesh as a `meshio.Mesh`, with data at vertices and tets by name."""
+        import meshio
+
+        cells = {name: [values] for name, values in (cell_data or {}).items()}
+        return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data, cell_data=cells)
+
+    def __repr__(self) -> str:
+        return f"TetMesh({self.n_vertices} vertices, {self.n_tets} tets)"

@@ -1,0 +1,208 @@
+"""Tets around a broken shape: a lattice, fine near the shape and coarse away from it.
+
+The mesh need not follow the shape, since sources are clipped against the tets, so nothing in the shape can make the
+lattice fail. Leaves of an octree are joined, through every face that two of them share, by one tet on each edge of
+the face (split where a smaller leaf has split it) and the two centres; equal leaves give the body-centred cubic
+lattice, whose dihedral angles are 60° and 90°; where sizes change they stay between 30° and 135°.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.tet_mesh import TetMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError, MemoryLimitError
+
+LEAST_GRADING = 2.7
+"""Below this, neighbouring leaves could differ by more than a factor of two: g/2 must exceed √3·¾."""
+
+MOST_TETS = 50_000_000
+"""More would need over 20 GB to build."""
+
+
+def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float = 0.25, grading: float = 3.0) -> TetMesh:
+    """Fill a box around a shape with tets of good angles, graded from the shape outward.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh or PointCloud
+        Any shape, however broken.
+    resolution : int
+        Number of lattice cells along the longest side of the shape's box, at the shape.
+    padding : float
+        Room to leave on every side, as a fraction of the longest side. The box is rounded up to whole coarse cells.
+    grading : float
+        A cell is no larger than its distance from the shape divided by `grading`; 2.7 or more. ``inf`` gives a
+        uniform lattice.
+
+    Returns
+    -------
+    TetMesh
+        All dihedral angles lie between 30° and 135°.
+
+    Raises
+    ------
+    GeometryError
+        If the shape has no extent, or a parameter is out of range.
+    MemoryLimitError
+        If the lattice would have more than 50 million tets.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> shape = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> mesh = sh.tetrahedralize(shape, resolution=8)
+    >>> float(mesh.tet_volumes.min()) > 0
+    True
+    """
+    if resolution < 1 or not padding >= 0 or not grading >= LEAST_GRADING:
+        raise GeometryError(
+            f"resolution must be at least 1, padding at least 0 and grading at least {LEAST_GRADING}, not "
+            f"{resolution}, {padding} and {grading}"
+        )
+    lower, upper = bounding_box(shape)
+    longest = float((upper - lower).max())
+    spacing = longest / resolution
+    samples = cKDTree(sample_points(shape, spacing))
+    lower, extent = lower - padding * longest, upper - lower + 2 * padding * longest
+    depth = int(np.clip(np.floor(np.log2(np.maximum(extent.max() / spacing / 4, 1))), 0, 16))
+    if np.isinf(grading):
+        depth = 0
+    coarse = spacing * 2**depth
+    counts = np.maximum(np.ceil(extent / coarse - 1e-9).astype(np.int64), 1)
+    origin = lower - (counts * coarse - extent) / 2
+    if counts.prod() * 12 > MOST_TETS:
+        raise MemoryLimitError(f"the lattice would start from {counts.tolist()} cells: lower the resolution")
+    corners, sizes = _octree(samples, origin, spacing, counts, depth, grading)
+    points, tets = _join_leaves(corners, sizes, counts * 2 ** (depth + 1))
+    return TetMesh(origin + points * (spacing / 2), tets)
+
+
+def bounding_box(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper corner of the part of a shape that its faces use.
+
+    Raises
+    ------
+    GeometryError
+        If it is not a shape in space, or a single point.
+    """
+    match shape:
+        case TriangleMesh():
+            used = shape.vertices[np.unique(shape.faces)]
+        case PolygonMesh():
+            used = shape.vertices[np.unique(shape.corners)]
+        case PointCloud() if shape.points.shape[1] == 3:
+            used = shape.points
+        case _:
+            raise GeometryError(f"{shape!r} is not a shape in space: use a TriangleMesh, PolygonMesh or PointCloud")
+    lower, upper = used.min(axis=0), used.max(axis=0)
+    if not (upper > lower).any():
+        raise GeometryError("the shape is a single point: it has no extent to put a mesh around")
+    return lower, upper
+
+
+def sample_points(shape: Any, spacing: float) -> NDArray[np.float64]:
+    """Points on a shape, so dense that no point of it is farther than `spacing` from one of them."""
+    if isinstance(shape, PointCloud):
+        return shape.points
+    if isinstance(shape, PolygonMesh):
+        center = shape.polygon_centroids[shape.corner_polygons]
+        triangles = np.stack([shape.vertices[shape.corners], shape.vertices[shape.next_corners], center], axis=1)
+    else:
+        triangles = shape.vertices[shape.faces]
+    sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+    pieces = np.maximum(np.ceil(sides / spacing), 1).astype(np.int64)
+    found = []
+    for k in np.unique(pieces):
+        i, j = np.meshgrid(np.arange(k + 1), np.arange(k + 1), indexing="ij")
+        i, j = i[i + j <= k], j[i + j <= k]
+        weights = np.stack([i, j, k - i - j], axis=1) / k
+        found.append(np.einsum("wc,mcd->mwd", weights, triangles[pieces == k]).reshape(-1, 3))
+    return np.concatenate(found)
+
+
+def _octree(
+    samples: cKDTree, origin: NDArray, spacing: float, counts: NDArray, depth: int, grading: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Lower corners and sizes of the leaves, in half cells of the finest level; neighbours differ by at most two.
+
+    The distance to fixed samples changes no faster than the place, so a leaf that was left whole has no neighbour
+    that was split twice: the tree needs no balancing.
+    """
+    size = 2 ** (depth + 1)
+    cells = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) * size
+    octants = np.array(list(itertools.product((0, 1), repeat=3)))
+    corners, sizes = [], []
+    while size > 2:
+        centers = origin + (cells + size / 2) * (spacing / 2)
+        split = samples.query(centers)[0] < grading * size * spacing / 2
+        corners.append(cells[~split])
+        sizes.append(np.full(len(corners[-1]), size))
+        size //= 2
+        cells = (cells[split][:, None] + octants * size).reshape(-1, 3)
+        if len(cells) * 12 > MOST_TETS:
+            raise MemoryLimitError(
+                f"the lattice would have about {12 * len(cells):,} tets: lower the resolution, or raise it less"
+            )
+    corners.append(cells)
+    sizes.append(np.full(len(cells), size))
+    return np.concatenate(corners), np.concatenate(sizes)
+
+
+def _join_leaves(
+    corners: NDArray[np.int64], sizes: NDArray[np.int64], upper: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Points, in half cells of the finest level, and tets between the centres of leaves that share a face."""
+    stride = np.array([(upper[1] + 1) * (upper[2] + 1), upper[2] + 1, 1])
+    leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
+
+    def is_leaf(corner: NDArray, size: NDArray) -> NDArray[np.bool_]:
+        return _contains(leaves, (corner * 32 + np.log2(size).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
+
+    octants = np.array(list(itertools.product((0, 1), repeat=3)))
+    taken = np.unique((corners[:, None] + octants * sizes[:, None, None]).reshape(-1, 3) @ stride)
+    tets = []
+    for axis, side in itertools.product(range(3), (0, 1)):
+        step = np.zeros(3, dtype=np.int64)
+        step[axis] = 2 * side - 1
+        beyond = corners + step * sizes[:, None]
+        outside = (beyond[:, axis] < 0) | (beyond[:, axis] >= upper[axis])
+        equal = ~outside & is_leaf(beyond, sizes)
+        parent = beyond - beyond % (2 * sizes[:, None])
+        larger = ~outside & ~equal & is_leaf(parent, 2 * sizes)
+        half = (sizes // 2)[:, None]
+        center = corners + half
+        opposite = np.where(larger[:, None], parent + 2 * half, beyond + half)
+        opposite = np.where(outside[:, None], center + step * half, opposite)
+        chosen = np.flatnonzero(outside | larger | (equal if side else False))  # equal leaves meet once, not twice
+        u, v = np.roll(np.eye(3, dtype=np.int64), -axis, axis=0)[1:]
+        square = np.array([0 * u, u, u + v, v])
+        face = corners[chosen, None] + (square + side * np.eye(3, dtype=np.int64)[axis]) * sizes[chosen, None, None]
+        for k in range(4):
+            start, end = face[:, k], face[:, (k + 1) % 4]
+            middle = (start + end) // 2
+            split = _contains(taken, middle @ stride)
+            whole = ~split
+            for ends, which in (((start, end), whole), ((start, middle), split), ((middle, end), split)):
+                parts = (center[chosen], opposite[chosen], *ends)
+                tets.append(np.stack([part[which] @ stride for part in parts], axis=1))
+    keys, ids = np.unique(np.concatenate(tets), return_inverse=True)
+    points = np.stack([keys // stride[0], keys % stride[0] // stride[1], keys % stride[1]], axis=1)
+    tets = ids.reshape(-1, 4)
+    a, b, c, d = (points[tets[:, k]] for k in range(4))
+    turned = np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) < 0
+    tets[turned] = tets[turned][:, [0, 1, 3, 2]]
+    return points, tets
+
+
+def _contains(sorted_keys: NDArray, keys: NDArray) -> NDArray[np.bool_]:
+    found = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
+    return sorted_keys[found] == keys

@@ -1,0 +1,78 @@
+"""A tree of boxes, to find what is near a point or crosses a triangle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+LEAF = 4
+"""Boxes per leaf."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoxTree:
+    """A complete binary tree over boxes in Morton order: node i has the children 2i and 2i + 1, the root is 1.
+
+    Attributes
+    ----------
+    bounds : (2 · leaves, 6) float
+        Lower and upper corner of what lies below each node; an empty node has lower > upper.
+    items : (leaves · LEAF,) int
+        Boxes in each leaf, −1 where there are none.
+    """
+
+    bounds: NDArray[np.float64]
+    items: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> BoxTree:
+        """Build the tree of (n, 3) lower and upper corners, in time n log n.
+
+        Examples
+        --------
+        >>> corners = np.arange(6.0).reshape(2, 3)
+        >>> BoxTree.of(corners, corners + 1).bounds[1]
+        array([0., 1., 2., 4., 5., 6.])
+        """
+        n = len(lower)
+        leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / LEAF))), 0)
+        items = np.full(leaves * LEAF, -1, dtype=np.int64)
+        items[:n] = np.argsort(morton_codes((lower + upper) / 2), kind="stable")
+        bounds = np.empty((2 * leaves, 6))
+        boxes = np.full((leaves * LEAF, 6), np.inf)
+        boxes[:, 3:] = -np.inf
+        boxes[:n, :3], boxes[:n, 3:] = lower[items[:n]], upper[items[:n]]
+        bounds[0] = 0
+        level, below = leaves, boxes.reshape(leaves, LEAF, 6)
+        while level:
+            bounds[level : 2 * level, :3] = below[..., :3].min(axis=1)
+            bounds[level : 2 * level, 3:] = below[..., 3:].max(axis=1)
+            below = bounds[level : 2 * level].reshape(-1, 2, 6) if level > 1 else below
+            level //= 2
+        return cls(bounds, items)
+
+
+def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """(n,) position of (n, 3) points along a space-filling curve, 21 bits per axis."""
+    lower = points.min(axis=0)
+    extent = max(float((points.max(axis=0) - lower).max()), np.finfo(float).tiny)
+    cells = ((points - lower) * ((2**21 - 1) / extent)).astype(np.uint64)
+    codes = np.zeros(len(points), dtype=np.uint64)
+    for axis in range(3):
+        codes |= _spread(cells[:, axis]) << np.uint64(axis)
+    return codes
+
+
+def _spread(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """The 21 low bits of x, three apart."""
+    for shift, mask in (
+        (32, 0x1F00000000FFFF),
+        (16, 0x1F0000FF0000FF),
+        (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3),
+        (2, 0x1249249249249249),
+    ):
+        x = (x | (x << np.uint64(shift))) & np.uint64(mask)
+    return x

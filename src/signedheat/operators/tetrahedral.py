@@ -1,0 +1,237 @@
+"""Operators on tetrahedra: Crouzeix–Raviart on faces for diffusion, P1 on vertices for integration (Sec. 8.1, App. B).
+
+Everything follows from the area vectors N_k of the face opposite corner k, pointing out of the tet T: the barycentric
+coordinate λ_k has gradient ``−N_k / (3|T|)``, the Crouzeix–Raviart function ``ψ_k = 1 − 3λ_k`` has ``N_k / |T|``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import sparse
+
+FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+"""Corners of the face opposite each corner, counter-clockwise seen from outside."""
+
+THINNEST = 1e-9
+"""Least volume, over the cube of the longest edge, with which a tet enters a stiffness matrix."""
+
+
+@dataclass(frozen=True, eq=False)
+class FaceTable:
+    """Faces of tets.
+
+    Attributes
+    ----------
+    vertices : (f, 3) int
+        Counter-clockwise as seen from outside the FIRST tet that has the face.
+    of_tets : (m, 4) int
+        Face opposite each corner of each tet.
+    """
+
+    vertices: NDArray[np.int64]
+    of_tets: NDArray[np.int64]
+
+    @cached_property
+    def tet_counts(self) -> NDArray[np.int64]:
+        """(f,) number of tets at each face: 1 on the boundary, more than 2 where nonmanifold."""
+        return np.bincount(self.of_tets.ravel(), minlength=len(self.vertices))
+
+
+def tet_faces(tets: NDArray[np.int64]) -> FaceTable:
+    """Find the faces of tets, numbered by first appearance, in time linear in their number.
+
+    Examples
+    --------
+    >>> table = tet_faces(np.array([[0, 1, 2, 3], [4, 1, 3, 2]]))
+    >>> table.of_tets.tolist()
+    [[0, 1, 2, 3], [0, 4, 5, 6]]
+    >>> table.tet_counts.tolist()
+    [2, 1, 1, 1, 1, 1, 1]
+    """
+    corners = tets[:, FACE_CORNERS].reshape(-1, 3)
+    number, count = _number_triples(np.sort(corners, axis=1))
+    first = np.empty(count, dtype=np.int64)
+    first[number[::-1]] = np.arange(len(number))[::-1]
+    return FaceTable(corners[first], number.reshape(-1, 4))
+
+
+@njit(cache=True)
+def _number_triples(triples):
+    """Number of each triple by first appearance: a hash table with chains."""
+    n = len(triples)
+    bits = 4
+    while (1 << bits) < n:
+        bits += 1
+    heads = np.full(1 << bits, -1, dtype=np.int64)
+    following = np.empty(n, dtype=np.int64)
+    first = np.empty(n, dtype=np.int64)
+    number = np.empty(n, dtype=np.int64)
+    count = 0
+    for i in range(n):
+        mixed = np.uint64(triples[i, 0]) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(triples[i, 1])
+        mixed = mixed * np.uint64(0xC2B2AE3D27D4EB4F) + np.uint64(triples[i, 2])
+        mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0x9E3779B97F4A7C15)
+        slot = np.int64(mixed >> np.uint64(64 - bits))
+        k = heads[slot]
+        while k >= 0:
+            j = first[k]
+            if triples[i, 0] == triples[j, 0] and triples[i, 1] == triples[j, 1] and triples[i, 2] == triples[j, 2]:
+                break
+            k = following[k]
+        if k < 0:
+            k = count
+            first[k] = i
+            following[k] = heads[slot]
+            heads[slot] = k
+            count += 1
+        number[i] = k
+    return number, count
+
+
+@dataclass(frozen=True, eq=False)
+class Tetrahedra:
+    """Tets by their corners, for the operators below.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float
+        Positions.
+    tets : (m, 4) int
+        Corners; of positive volume, or degenerate.
+    """
+
+    vertices: NDArray[np.float64]
+    tets: NDArray[np.int64]
+
+    @cached_property
+    def area_vectors(self) -> NDArray[np.float64]:
+        """(m, 4, 3) N_k: area times outward normal of the face opposite each corner."""
+        a, b, c, d = (self.vertices[self.tets[:, k]] for k in range(4))
+        vectors = np.empty((len(self.tets), 4, 3))
+        vectors[:, 0] = np.cross(c - b, d - b)
+        vectors[:, 1] = np.cross(d - a, c - a)
+        vectors[:, 2] = np.cross(b - a, d - a)
+        vectors[:, 3] = np.cross(c - a, b - a)
+        vectors *= 0.5
+        return vectors
+
+    @cached_property
+    def volumes(self) -> NDArray[np.float64]:
+        """(m,) signed volumes."""
+        return signed_volumes(self.vertices, self.tets)
+
+    @cached_property
+    def longest_edges(self) -> NDArray[np.float64]:
+        """(m,) length of each tet's longest edge."""
+        points = [self.vertices[self.tets[:, k]] for k in range(4)]
+        squares = [np.square(points[i] - points[j]).sum(axis=1) for i in range(4) for j in range(i)]
+        return np.sqrt(np.max(squares, axis=0))
+
+    @cached_property
+    def safe_volumes(self) -> NDArray[np.float64]:
+        """(m,) volumes kept from zero, so that a flat tet ties its faces together instead of tearing them apart."""
+        least = np.maximum(THINNEST * self.longest_edges**3, 1e-15 * np.abs(self.volumes).mean())
+        return np.maximum(self.volumes, least)
+
+    def face_mass(self, faces: FaceTable) -> NDArray[np.float64]:
+        """(f,) M of Eq. 12, lumped: a quarter of the volume at each face."""
+        quarter = np.repeat(self.safe_volumes / 4, 4)
+        return np.bincount(faces.of_tets.ravel(), weights=quarter, minlength=len(faces.vertices))
+
+    def face_laplacian(self, faces: FaceTable) -> sparse.csr_matrix:
+        """(f, f) Crouzeix–Raviart Laplacian: L_ab = Σ_T N_a·N_b / |T|, which is −(3/2) |e| cot θ between two faces."""
+        return _assemble(self.area_vectors, 1 / self.safe_volumes, faces.of_tets, len(faces.vertices))
+
+    def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
+        """(n, n) cotan Laplacian: C_ij = Σ_T N_i·N_j / (9|T|), which is −(1/6) |e| cot θ between two vertices."""
+        return _assemble(self.area_vectors, 1 / (9 * self.safe_volumes), corners, n)
+
+    def divergence(self, directions: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+        """(n,) b of Eq. 13: ∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T for one vector Y per tet."""
+        parts = np.einsum("mki,mi->mk", self.area_vectors, directions) / -3
+        return np.bincount(corners.ravel(), weights=parts.ravel(), minlength=n)
+
+    def gradients(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, 3) gradient of the linear interpolant of (m, 4) corner values; zero on flat tets."""
+        flat = self.volumes <= THINNEST * self.longest_edges**3
+        sums = np.einsum("mki,mk->mi", self.area_vectors, corner_values)
+        return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
+
+
+def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(m,) volumes, negative for tets given inside out.
+
+    Examples
+    --------
+    >>> signed_volumes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]])) * 6
+    array([1.])
+    """
+    a, b, c, d = (vertices[tets[:, k]] for k in range(4))
+    return np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6
+
+
+def _assemble(
+    vectors: NDArray[np.float64], factors: NDArray[np.float64], ids: NDArray[np.int64], n: int
+) -> sparse.csr_matrix:
+    """Σ_T factor · N_a·N_b at the entry (ids of a, ids of b)."""
+    indptr, columns = _pattern(ids, n)
+    data = np.zeros(len(columns))
+    _accumulate(vectors, factors, ids, indptr, columns, data)
+    return sparse.csr_matrix((data, columns, indptr), shape=(n, n))
+
+
+@njit(cache=True)
+def _pattern(ids, n):
+    """Rows and sorted columns of the matrix that couples the four ids of each tet."""
+    starts = np.zeros(n + 1, dtype=np.int64)
+    for t in range(len(ids)):
+        for a in range(4):
+            starts[ids[t, a] + 1] += 1
+    starts = np.cumsum(starts)
+    tets_at = np.empty(starts[n], dtype=np.int32)
+    filled = starts[:-1].copy()
+    for t in range(len(ids)):
+        for a in range(4):
+            tets_at[filled[ids[t, a]]] = t
+            filled[ids[t, a]] += 1
+    seen = np.full(n, -1, dtype=np.int64)
+    indptr = np.zeros(n + 1, dtype=np.int32)
+    for i in range(n):
+        indptr[i + 1] = indptr[i]
+        for k in range(starts[i], starts[i + 1]):
+            for a in range(4):
+                j = ids[tets_at[k], a]
+                if seen[j] != i:
+                    seen[j] = i
+                    indptr[i + 1] += 1
+    columns = np.empty(indptr[n], dtype=np.int32)
+    seen[:] = -1
+    for i in range(n):
+        end = indptr[i]
+        for k in range(starts[i], starts[i + 1]):
+            for a in range(4):
+                j = ids[tets_at[k], a]
+                if seen[j] != i:
+                    seen[j] = i
+                    columns[end] = j
+                    end += 1
+        columns[indptr[i] : end].sort()
+    return indptr, columns
+
+
+@njit(cache=True)
+def _accumulate(vectors, factors, ids, indptr, columns, data):
+    for t in range(len(ids)):
+        for a in range(4):
+            row = ids[t, a]
+            for b in range(4):
+                value = 0.0
+                for i in range(3):
+                    value += vectors[t, a, i] * vectors[t, b, i]
+                k = indptr[row] + np.searchsorted(columns[indptr[row] : indptr[row + 1]], ids[t, b])
+                data[k] += factors[t] * value
