@@ -1,0 +1,52 @@
+"""Faces as flat arrays: what every format comes from and goes to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import FileFormatError
+from .files import PathLike, extension
+
+
+def assemble(
+    vertices: NDArray[np.float64], corners: NDArray[np.int64], counts: NDArray[np.int64]
+) -> TriangleMesh | PolygonMesh:
+    """Faces, as one array of vertex ids and the number of corners of each, as the simplest mesh that holds them."""
+    if (counts == 3).all():
+        return TriangleMesh(vertices, corners.reshape(-1, 3))
+    return PolygonMesh(vertices, np.split(corners, np.cumsum(counts)[:-1]))
+
+
+def faces_of(shape: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The opposite of `assemble`: all corners, and the number of corners of each face; none for points."""
+    if isinstance(shape, TriangleMesh):
+        return shape.faces.ravel(), np.full(shape.n_faces, 3)
+    if isinstance(shape, PolygonMesh):
+        return shape.corners, np.diff(shape.offsets)
+    return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+
+
+def points_of(shape: Any) -> NDArray[np.float64]:
+    """Vertices of a mesh, points of a cloud."""
+    return shape.points if isinstance(shape, PointCloud) else shape.vertices
+
+
+def face_lists(shape: Any) -> Sequence[Sequence[int]]:
+    """Corners of each face, as lists; none for points."""
+    if isinstance(shape, TriangleMesh):
+        return shape.faces.tolist()
+    return [] if isinstance(shape, PointCloud) else [polygon.tolist() for polygon in shape.polygons]
+
+
+def refuse(shape: Any, path: PathLike, holds: str, instead: str) -> FileFormatError:
+    """The error for a format that cannot hold a kind of shape."""
+    return FileFormatError(
+        f"{path}: {extension(path)} files hold {holds}, not a {type(shape).__name__}: save it as {instead}"
+    )

@@ -1,0 +1,238 @@
+"""Grid fields from files and back, exact to the last bit: values, origin, spacing, order of axes."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.grid import Grid
+from ..errors import FileFormatError, GeometryError
+from ..fields.grid_field import GridField
+from .files import PathLike, contents, extension, replacing, unknown_extension
+from .vtk_xml import read_vti, write_vti
+
+CONVENTION = (
+    "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
+    "values[i, j, k] at origin + (i, j, k) * spacing, axes x, y, z, in the units of the shape"
+)
+NAME = "signed_distance"
+
+Parts = tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]
+"""Values, origin, spacing."""
+
+
+def save_field(field: GridField, path: PathLike) -> None:
+    """Write a field on a grid; the extension says the format.
+
+    ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
+    same name beside it, ``.vdb`` (OpenVDB; single precision, and only where a module for it is installed).
+
+    Parameters
+    ----------
+    field : GridField
+        What to write.
+    path : str or path
+        Where to. Written under a temporary name and then renamed: a file that was there before survives a failure.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown, has no room for the field's dimension, or the file cannot be written.
+    """
+    if extension(path) not in _FORMATS:
+        raise unknown_extension(path, _FORMATS, "a field")
+    if not isinstance(field, GridField):
+        raise FileFormatError(f"{path}: a {type(field).__name__} is no field on a grid: it has formats of its own")
+    write, _ = _FORMATS[extension(path)]
+    if extension(path) == ".npy":
+        with replacing(Path(path).with_suffix(".json")) as beside, replacing(path) as temporary:
+            beside.write_text(json.dumps(_description(field.grid), indent=1) + "\n")
+            write(field, temporary)
+    else:
+        with replacing(path) as temporary:
+            write(field, temporary)
+
+
+def load_field(path: PathLike) -> GridField:
+    """Read a field that `save_field` wrote, exactly as it was: values and transform.
+
+    Parameters
+    ----------
+    path : str or path
+        A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file. Images of other programs will
+        do if their axes are x, y, z.
+
+    Returns
+    -------
+    GridField
+        The field; its diagnostics are empty.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown kind, truncated, damaged, or holds no scalar image along x, y, z.
+
+    Examples
+    --------
+    >>> import tempfile, numpy as np, signedheat as sh
+    >>> phi = GridField(sh.Grid((0, 0, 0), (0.1, 0.2, 0.3), (2, 3, 4)), np.random.default_rng(0).random((2, 3, 4)))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_field(phi, f"{folder}/phi.vti")
+    ...     bool((load_field(f"{folder}/phi.vti").values == phi.values).all())
+    True
+    """
+    if extension(path) not in _FORMATS:
+        raise unknown_extension(path, _FORMATS, "a field")
+    _, read = _FORMATS[extension(path)]
+    try:
+        values, origin, spacing = read(path)
+        if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
+            raise FileFormatError(f"{path}: the values are no real numbers but {values.dtype}: it holds no field")
+        return GridField(Grid(origin, spacing, values.shape), np.ascontiguousarray(values))
+    except GeometryError as error:
+        raise FileFormatError(f"{path}: {error}") from error
+
+
+def _description(grid: Grid) -> dict[str, Any]:
+    return {"origin": grid.origin.tolist(), "spacing": grid.spacing.tolist(), "convention": CONVENTION}
+
+
+def _write_npz(field: GridField, path: Path) -> None:
+    with path.open("wb") as file:
+        np.savez(
+            file,
+            values=field.values,
+            origin=field.grid.origin,
+            spacing=field.grid.spacing,
+            convention=np.array(CONVENTION),
+        )
+
+
+def _read_npz(path: PathLike) -> Parts:
+    try:
+        with np.load(io.BytesIO(contents(path)), allow_pickle=False) as file:
+            return file["values"], file["origin"], file["spacing"]
+    except KeyError as error:
+        raise FileFormatError(f"{path}: {error}: a field has values, origin and spacing") from error
+    except FileFormatError:
+        raise
+    except Exception as error:
+        raise FileFormatError(f"{path}: it is no .npz file, or is truncated ({error}): write it again") from error
+
+
+def _write_npy(field: GridField, path: Path) -> None:
+    with path.open("wb") as file:
+        np.save(file, field.values, allow_pickle=False)
+
+
+def _read_npy(path: PathLike) -> Parts:
+    try:
+        values = np.load(io.BytesIO(contents(path)), allow_pickle=False)
+    except ValueError as error:
+        raise FileFormatError(f"{path}: it is no .npy file, or is truncated ({error}): write it again") from error
+    beside = Path(path).with_suffix(".json")
+    try:
+        about = json.loads(contents(beside))
+        return values, np.array(about["origin"], dtype=np.float64), np.array(about["spacing"], dtype=np.float64)
+    except (ValueError, KeyError, TypeError) as error:
+        if isinstance(error, FileFormatError):
+            raise
+        raise FileFormatError(f"{beside}: origin and spacing cannot be read ({error}): write them again") from error
+
+
+def _write_vti(field: GridField, path: Path) -> None:
+    if field.grid.dimension > 3:
+        raise FileFormatError(f"{path}: .vti has three axes, the field {field.grid.dimension}: save it as .npz")
+    path.write_bytes(write_vti(field.values, field.grid.origin, field.grid.spacing, NAME, CONVENTION))
+
+
+def _write_nrrd(field: GridField, path: Path) -> None:
+    import nrrd
+
+    dimension = field.grid.dimension
+    header = {
+        "space dimension": dimension,
+        "space directions": np.diag(field.grid.spacing),
+        "space origin": field.grid.origin,
+        "kinds": ["domain"] * dimension,
+        "encoding": "raw",
+        "content": NAME,
+        "convention": CONVENTION,
+    }
+    nrrd.write(str(path), field.values, header, index_order="F")
+
+
+def _read_nrrd(path: PathLike) -> Parts:
+    contents(path)
+    import nrrd
+
+    try:
+        values, header = nrrd.read(str(path), index_order="F")
+    except Exception as error:
+        raise FileFormatError(f"{path}: it is no NRRD file, or is truncated ({error}): write it again") from error
+    directions = np.atleast_2d(header.get("space directions", np.diag(header.get("spacings", np.ones(values.ndim)))))
+    spacing = np.diag(directions) if directions.shape == (values.ndim, values.ndim) else np.zeros(values.ndim)
+    if not np.array_equal(directions, np.diag(spacing)):
+        raise FileFormatError(f"{path}: its axes are not x, y, z: resample the image along them")
+    return values, np.asarray(header.get("space origin", np.zeros(values.ndim))), spacing
+
+
+def _openvdb(path: PathLike) -> ModuleType:
+    for name in ("openvdb", "pyopenvdb"):
+        try:
+            return importlib.import_module(name)
+        except ImportError:
+            continue
+    raise FileFormatError(
+        f"{path}: .vdb needs OpenVDB's Python module, which is not installed: conda install -c conda-forge openvdb, "
+        "or save as .vti"
+    )
+
+
+def _write_vdb(field: GridField, path: Path) -> None:
+    openvdb = _openvdb(path)
+    if field.grid.dimension != 3:
+        raise FileFormatError(f"{path}: .vdb has three axes, the field {field.grid.dimension}: save it as .npz")
+    # Nodes that equal the background are left out of a VDB tree: no node may.
+    volume = openvdb.FloatGrid(float(np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))))
+    volume.copyFromArray(field.values.astype(np.float32))
+    matrix = np.diag([*field.grid.spacing, 1.0])
+    matrix[3, :3] = field.grid.origin
+    volume.transform = openvdb.createLinearTransform(matrix.tolist())
+    volume.name = NAME
+    volume["convention"] = CONVENTION
+    openvdb.write(str(path), grids=[volume])
+
+
+def _read_vdb(path: PathLike) -> Parts:
+    openvdb = _openvdb(path)
+    contents(path)
+    try:
+        volume = openvdb.readAllGridMetadata(str(path))[0]
+        volume = openvdb.read(str(path), volume.name)
+        lower, upper = (np.array(corner) for corner in volume.evalActiveVoxelBoundingBox())
+        values = np.empty(tuple(upper - lower + 1), dtype=np.float32)
+        volume.copyToArray(values, ijk=tuple(int(i) for i in lower))
+        origin = np.array(volume.transform.indexToWorld(tuple(float(i) for i in lower)))
+        return values, origin, np.array(volume.transform.voxelSize())
+    except Exception as error:
+        raise FileFormatError(f"{path}: it cannot be read as a VDB volume ({error}): write it again") from error
+
+
+_FORMATS: dict[str, tuple[Callable[[GridField, Path], None], Callable[[PathLike], Parts]]] = {
+    ".npy": (_write_npy, _read_npy),
+    ".npz": (_write_npz, _read_npz),
+    ".nrrd": (_write_nrrd, _read_nrrd),
+    ".vdb": (_write_vdb, _read_vdb),
+    ".vti": (_write_vti, read_vti),
+}
+
+FIELD_FORMATS = frozenset(_FORMATS)

@@ -1,0 +1,125 @@
+"""Files as such: names, contents, and writing so that nothing is lost when it fails."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError
+
+PathLike = str | os.PathLike[str]
+
+
+def extension(path: PathLike) -> str:
+    """The end of a file's name that says its format, in lower case: ``".stl"``."""
+    return Path(path).suffix.lower()
+
+
+def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> FileFormatError:
+    """The error for a name that tells no format we know."""
+    ending = extension(path)
+    cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
+    return FileFormatError(f"{path}: {cause} for {purpose}: use one of {' '.join(sorted(known))}")
+
+
+def contents(path: PathLike) -> bytes:
+    """All bytes of a file.
+
+    Raises
+    ------
+    FileFormatError
+        If it is missing, is no file, may not be read, or is empty.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise FileFormatError(f"{path}: there is no such file: check the name") from None
+    except IsADirectoryError:
+        raise FileFormatError(f"{path}: this is a folder: name a file in it") from None
+    except OSError as error:
+        raise FileFormatError(f"{path}: cannot be read ({error.strerror}): check its permissions") from error
+    if not data:
+        raise FileFormatError(f"{path}: the file is empty: write or download it again")
+    return data
+
+
+def text(path: PathLike) -> str:
+    """A file as text; bytes that are no UTF-8, as in names of materials, become marks."""
+    return contents(path).decode("utf-8", errors="replace")
+
+
+def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> None:
+    """Find out before a long computation whether its result can be written.
+
+    Parameters
+    ----------
+    path : path
+        Where the result is to go.
+    known : collection of str
+        Extensions that will do, with the dot.
+    purpose : str
+        What is to be written, for the message.
+
+    Raises
+    ------
+    FileFormatError
+        If the extension is not among the known, or no file can be made there.
+    """
+    if extension(path) not in known:
+        raise unknown_extension(path, known, purpose)
+    if Path(path).is_dir():
+        raise FileFormatError(f"{path}: this is a folder: name a file in it")
+    with _writing(path):
+        trial = _unused_name(path)
+        trial.touch(exist_ok=False)
+        trial.unlink()
+
+
+@contextmanager
+def replacing(path: PathLike) -> Iterator[Path]:
+    """A temporary name to write to, renamed to `path` if all goes well and removed if not.
+
+    Raises
+    ------
+    FileFormatError
+        If the file cannot be written; one that was there before is then still there, unchanged.
+    """
+    temporary = _unused_name(path)
+    with _writing(path):
+        try:
+            yield temporary
+            os.replace(temporary, os.path.realpath(path))
+        finally:
+            with suppress(OSError):
+                temporary.unlink()
+
+
+def _unused_name(path: PathLike) -> Path:
+    real = Path(os.path.realpath(path))
+    return real.with_name(f".{real.stem}.{secrets.token_hex(4)}{real.suffix}")
+
+
+@contextmanager
+def _writing(path: PathLike) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FileFormatError(
+            f"{path}: cannot be written ({reason}): choose a folder that exists, is yours and has room"
+        ) from error
+
+
+def numbers(tokens: list[Any], path: PathLike, what: str, kind: type = float) -> NDArray[Any]:
+    """Words of a text file as numbers."""
+    try:
+        return np.array(tokens, dtype=np.float64 if kind is float else np.int64)
+    except (ValueError, OverflowError) as error:
+        raise FileFormatError(f"{path}: {what} are not all numbers ({error}): the file is damaged") from error

@@ -1,0 +1,28 @@
+"""GLB and glTF, by trimesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import FileFormatError
+from .files import PathLike, contents, extension
+
+
+def read_glb(path: PathLike) -> TriangleMesh:
+    """All triangles of a scene, each where its node puts it, one body after another."""
+    contents(path)
+    import trimesh
+
+    try:
+        scene = trimesh.load_scene(str(Path(path)), file_type=extension(path)[1:], process=False)
+        bodies = [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
+    except Exception as error:
+        raise FileFormatError(f"{path}: cannot be read as glTF ({error}): the file is damaged") from error
+    if not bodies:
+        raise FileFormatError(f"{path}: the scene holds no triangles: export the shape as a mesh")
+    starts = np.cumsum([0] + [len(body.vertices) for body in bodies])
+    faces = [np.asarray(body.faces) + start for body, start in zip(bodies, starts, strict=False)]
+    return TriangleMesh(np.concatenate([body.vertices for body in bodies]), np.concatenate(faces))

@@ -1,0 +1,106 @@
+"""Shapes from files and back: one table of formats for each direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from ..errors import GeometryError
+from .files import PathLike, extension, replacing, unknown_extension
+from .glb import read_glb
+from .obj import read_obj, write_obj, write_pc
+from .off import read_off, write_off
+from .ply import read_ply, write_ply
+from .stl import read_stl, write_stl
+from .vtk_xml import read_vtp, write_vtp
+from .xyz import read_xyz, write_xyz
+
+READERS: dict[str, Callable[[PathLike], Any]] = {
+    ".glb": read_glb,
+    ".gltf": read_glb,
+    ".obj": read_obj,
+    ".off": read_off,
+    ".pc": read_obj,
+    ".ply": read_ply,
+    ".stl": read_stl,
+    ".vtp": read_vtp,
+    ".xyz": read_xyz,
+}
+
+WRITERS: dict[str, Callable[[Any, PathLike], bytes]] = {
+    ".obj": write_obj,
+    ".off": write_off,
+    ".pc": write_pc,
+    ".ply": write_ply,
+    ".stl": write_stl,
+    ".vtp": write_vtp,
+    ".xyz": write_xyz,
+}
+
+SHAPE_FORMATS = frozenset(WRITERS)
+
+
+def read(path: PathLike) -> Any:
+    """Read a shape; the extension says the format.
+
+    STL, OBJ, PLY, OFF, VTP and GLB hold surfaces; PLY, XYZ, PC, OBJ, OFF and VTP without faces hold points. Vertices
+    and faces keep their number and order, whatever is wrong with them: nothing is merged, dropped, split or turned.
+    In STL, which knows no vertices, corners with the same coordinates to the last bit are one vertex.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+
+    Returns
+    -------
+    TriangleMesh, PolygonMesh or PointCloud
+        A triangle mesh if every face is a triangle, a polygon mesh if not, a point cloud if there is no face.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown kind, truncated or damaged.
+    GeometryError
+        If what it holds is no shape: no element, NaN or infinite coordinates, a vertex id that does not exist.
+
+    Examples
+    --------
+    >>> import tempfile, signedheat as sh
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).save(f"{folder}/one.ply")
+    ...     sh.read(f"{folder}/one.ply")
+    TriangleMesh(3 vertices, 1 faces)
+    """
+    reader = READERS.get(extension(path))
+    if reader is None:
+        raise unknown_extension(path, READERS, "a shape")
+    try:
+        return reader(path)
+    except GeometryError as error:
+        raise GeometryError(f"{path}: {error}") from error
+
+
+def save(shape: Any, path: PathLike) -> None:
+    """Write a shape; the extension says the format.
+
+    OBJ, OFF, PLY, VTP, XYZ and PC keep every bit of the coordinates; STL holds single precision. The file is written
+    under a temporary name and then renamed: one that was there before survives a failure.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh or PointCloud
+        What to write.
+    path : str or path
+        Where to.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown, cannot hold this kind of shape, or the file cannot be written.
+    """
+    writer = WRITERS.get(extension(path))
+    if writer is None:
+        raise unknown_extension(path, WRITERS, "a shape")
+    with replacing(path) as temporary:
+        temporary.write_bytes(writer(shape, path))

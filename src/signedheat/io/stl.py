@@ -1,0 +1,71 @@
+"""STL, binary and as text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.point_cloud import PointCloud
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import FileFormatError
+from .elements import refuse
+from .files import PathLike, contents, numbers
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_HEADER = 84  # bytes: 80 of comment, 4 that count the facets
+
+
+def read_stl(path: PathLike) -> TriangleMesh:
+    """All facets of an STL file, of all its solids; stored normals play no part.
+
+    Corners at the same coordinates, to the last bit, are one vertex: STL has no other way to say that facets meet.
+    """
+    data = contents(path)
+    announced = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else 0
+    is_text = data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:1000].lower()
+    if is_text and len(data) != _HEADER + 50 * announced:
+        corners = _text_corners(data, path)
+    elif len(data) < _HEADER + 50 * announced or len(data) < _HEADER:
+        raise FileFormatError(
+            f"{path}: {announced} facets need {_HEADER + 50 * announced} bytes, the file has {len(data)}: it is "
+            "truncated, or no STL file"
+        )
+    else:
+        corners = np.frombuffer(data, _FACET, announced, _HEADER)["corners"].astype(np.float64)
+    return _indexed(corners.reshape(-1, 3))
+
+
+def write_stl(shape: Any, path: PathLike) -> bytes:
+    """Binary STL, in single precision."""
+    if not isinstance(shape, TriangleMesh):
+        kinds = ".ply or .xyz" if isinstance(shape, PointCloud) else ".obj, .ply, .off or .vtp"
+        raise refuse(shape, path, "triangles", kinds)
+    facets = np.zeros(shape.n_faces, dtype=_FACET)
+    facets["corners"] = shape.vertices[shape.faces]
+    if not np.isfinite(facets["corners"]).all():
+        raise FileFormatError(f"{path}: coordinates are too large for the single precision of STL: save it as .ply")
+    lengths = np.maximum(2 * shape.face_areas, np.finfo(float).tiny)
+    facets["normal"] = 2 * shape.face_area_vectors / lengths[:, None]
+    return b"signedheat".ljust(80) + np.uint32(shape.n_faces).astype("<u4").tobytes() + facets.tobytes()
+
+
+def _text_corners(data: bytes, path: PathLike) -> NDArray[np.float64]:
+    words = data.lower().split()
+    if words.count(b"solid") and b"endsolid" not in words[-40:]:
+        raise FileFormatError(f"{path}: the last solid has no end: the file is truncated")
+    at = [k for k, word in enumerate(words) if word == b"vertex"]
+    if len(at) % 3 or (at and at[-1] + 3 >= len(words)):
+        raise FileFormatError(f"{path}: a facet has fewer than 3 vertices: the file is truncated or damaged")
+    return numbers([words[k + 1 : k + 4] for k in at], path, "vertices").reshape(-1, 3)
+
+
+def _indexed(corners: NDArray[np.float64]) -> TriangleMesh:
+    if not len(corners):
+        return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
+    bits = (corners + 0.0).view(np.dtype((np.void, 24))).ravel()  # adding zero makes −0 and 0 the same bits
+    _, first, vertex = np.unique(bits, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return TriangleMesh(corners[np.sort(first)], rank[vertex].reshape(-1, 3))

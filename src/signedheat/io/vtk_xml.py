@@ -1,0 +1,246 @@
+"""VTK's XML files: image data (``.vti``) and polygonal data (``.vtp``).
+
+Written with appended raw data, as VTK itself prefers; read in every encoding that VTK writes. The one library that
+does all this, VTK, is a download of 120 MB: too much for two formats.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import zlib
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.point_cloud import PointCloud
+from ..errors import FileFormatError
+from .elements import assemble, faces_of, points_of
+from .files import PathLike, contents, numbers
+
+_TYPES = {
+    "Int8": "i1",
+    "UInt8": "u1",
+    "Int16": "i2",
+    "UInt16": "u2",
+    "Int32": "i4",
+    "UInt32": "u4",
+    "Int64": "i8",
+    "UInt64": "u8",
+    "Float32": "f4",
+    "Float64": "f8",
+}
+_NAMES = {code: name for name, code in _TYPES.items()}
+
+
+def write_vti(
+    values: NDArray[Any], origin: NDArray[np.float64], spacing: NDArray[np.float64], name: str, convention: str
+) -> bytes:
+    """Image data of up to three axes; a missing axis has one node."""
+    missing = 3 - values.ndim
+    extent = " ".join(f"0 {n - 1}" for n in values.shape + (1,) * missing)
+    writer = _Writer()
+    array = writer.array(name, values.ravel(order="F"))
+    attributes = (
+        f'WholeExtent="{extent}" Origin="{_words([*origin, *[0.0] * missing])}" '
+        f'Spacing="{_words([*spacing, *[1.0] * missing])}" Direction="1 0 0 0 1 0 0 0 1"'
+    )
+    body = (
+        f"<!-- {convention} -->\n"
+        f'<ImageData {attributes}><Piece Extent="{extent}">'
+        f'<PointData Scalars="{name}">{array}</PointData></Piece></ImageData>'
+    )
+    return writer.file("ImageData", body)
+
+
+def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
+    """Values (first scalar array), origin and spacing of image data."""
+    root, arrays = _parse(path, "ImageData")
+    image, piece = root.find("ImageData"), root.find("ImageData/Piece")
+    extent = numbers(image.get("WholeExtent", "").split(), path, "extent", int)
+    if piece is None or len(extent) != 6 or piece.get("Extent", "").split() != image.get("WholeExtent", "").split():
+        raise FileFormatError(f"{path}: the image is not in one piece: write it anew as a single .vti file")
+    direction = image.get("Direction", "1 0 0 0 1 0 0 0 1")
+    if numbers(direction.split(), path, "direction").tolist() != np.eye(3).ravel().tolist():
+        raise FileFormatError(f"{path}: the axes of the image are turned ({direction}): resample it along x, y, z")
+    shape = extent[1::2] - extent[::2] + 1
+    dimension = 3 if shape[2] > 1 else 2 if shape[1] > 1 else 1
+    spacing = numbers(image.get("Spacing", "1 1 1").split(), path, "spacing")
+    origin = numbers(image.get("Origin", "0 0 0").split(), path, "origin")
+    if extent[::2].any():
+        origin = origin + spacing * extent[::2]
+    nodes = piece.find("PointData")
+    element = nodes.find("DataArray") if nodes is not None else None
+    if element is None:
+        raise FileFormatError(f"{path}: there are no values at the nodes: save them as point data")
+    values = arrays.of(element)
+    if values.size != shape.prod():
+        raise FileFormatError(f"{path}: {values.size} values for {shape.prod()} nodes: it is truncated or no scalar")
+    return values.reshape(shape[:dimension], order="F"), origin[:dimension], spacing[:dimension]
+
+
+def write_vtp(shape: Any, path: PathLike) -> bytes:
+    """Polygons, or points with their normals as point data."""
+    points, (corners, counts) = points_of(shape), faces_of(shape)
+    writer = _Writer()
+    xyz = writer.array("Points", points)
+    if isinstance(shape, PointCloud):
+        group, sizes = "Verts", f'NumberOfVerts="{len(points)}" NumberOfPolys="0"'
+        corners, counts = np.arange(len(points)), np.ones(len(points), dtype=np.int64)
+        columns = {"Normals": shape.normals, "area": shape.areas}
+        arrays = [writer.array(name, values) for name, values in columns.items() if values is not None]
+        data = "<PointData>" + "".join(arrays) + "</PointData>"
+    else:
+        group, sizes, data = "Polys", f'NumberOfVerts="0" NumberOfPolys="{len(counts)}"', ""
+    ends = np.cumsum(counts)
+    cells = f"<{group}>{writer.array('connectivity', corners)}{writer.array('offsets', ends)}</{group}>"
+    piece = (
+        f'<Piece NumberOfPoints="{len(points)}" {sizes} NumberOfLines="0" NumberOfStrips="0">'
+        f"{data}<Points>{xyz}</Points>{cells}</Piece>"
+    )
+    return writer.file("PolyData", f"<PolyData>{piece}</PolyData>")
+
+
+def read_vtp(path: PathLike) -> Any:
+    """The polygons of all pieces, or the points where there is no polygon."""
+    root, arrays = _parse(path, "PolyData")
+    points, corners, counts, normals, areas, n_points = [], [], [], [], [], 0
+    for piece in root.iterfind("PolyData/Piece"):
+        table = {
+            (group.tag, element.get("Name")): arrays.of(element)
+            for group in piece
+            for element in group.iter("DataArray")
+        }
+        if int(piece.get("NumberOfStrips", 0)):
+            raise FileFormatError(f"{path}: there are triangle strips: turn them into triangles before saving")
+        own = next((values for (tag, _), values in table.items() if tag == "Points"), np.empty(0)).reshape(-1, 3)
+        offsets = table.get(("Polys", "offsets"), np.empty(0)).astype(np.int64)
+        corners.append(table.get(("Polys", "connectivity"), np.empty(0)).astype(np.int64) + n_points)
+        counts.append(np.diff(offsets, prepend=0))
+        normals.append(table.get(("PointData", "Normals"), np.empty(0)).reshape(-1, 3))
+        areas.append(table.get(("PointData", "area"), np.empty(0)))
+        points.append(own.astype(np.float64))
+        n_points += len(own)
+    if not n_points:
+        raise FileFormatError(f"{path}: there are no points: the file holds no shape")
+    positions = np.concatenate(points)
+    if any(len(c) for c in counts):
+        return assemble(positions, np.concatenate(corners), np.concatenate(counts))
+    directions, sizes = np.concatenate(normals), np.concatenate(areas)
+    return PointCloud(positions, directions if len(directions) else None, sizes if len(sizes) else None)
+
+
+def _words(values: Any) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+class _Writer:
+    """Collects arrays for the appended section."""
+
+    def __init__(self) -> None:
+        self._blocks: list[bytes] = []
+        self._offset = 0
+
+    def array(self, name: str, values: NDArray[Any]) -> str:
+        """The element that refers to an array, which goes to the end of the file."""
+        values = np.ascontiguousarray(values)
+        code = values.dtype.str[1:]
+        data = values.astype("<" + code, copy=False).tobytes()
+        element = (
+            f'<DataArray type="{_NAMES[code]}" Name="{name}" NumberOfComponents="{values[0].size}" '
+            f'format="appended" offset="{self._offset}"/>'
+        )
+        self._blocks += [np.array(len(data), dtype="<u8").tobytes(), data]
+        self._offset += 8 + len(data)
+        return element
+
+    def file(self, kind: str, body: str) -> bytes:
+        """The whole file."""
+        about = f'type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
+        head = f'<?xml version="1.0"?>\n<VTKFile {about}>\n'
+        appended = '\n<AppendedData encoding="raw">_'
+        return b"".join([(head + body + appended).encode(), *self._blocks, b"</AppendedData></VTKFile>\n"])
+
+
+@dataclass(frozen=True)
+class _Arrays:
+    """Decodes the arrays of one file."""
+
+    path: PathLike
+    order: str
+    header: np.dtype[Any]
+    compressor: str | None
+    encoding: str
+    appended: bytes
+
+    def of(self, element: ElementTree.Element) -> NDArray[Any]:
+        """The numbers of a DataArray element."""
+        code = _TYPES.get(element.get("type", ""))
+        if code is None:
+            raise FileFormatError(f"{self.path}: arrays of type '{element.get('type')}' are not supported: use Float64")
+        form, inline = element.get("format"), (element.text or "").split()
+        if form == "ascii":
+            return numbers(inline, self.path, "values").astype(code)
+        try:
+            if form == "binary":
+                data = self._block("".join(inline).encode(), is_base64=True)
+            else:
+                data = self._block(self.appended[int(element.get("offset", 0)) :], self.encoding == "base64")
+            return np.frombuffer(data, self.order + code).astype(code, copy=False)
+        except (ValueError, IndexError, zlib.error, binascii.Error) as error:
+            raise FileFormatError(
+                f"{self.path}: an array cannot be decoded ({error}): the file is truncated"
+            ) from error
+
+    def _block(self, data: bytes, is_base64: bool) -> bytes:
+        """One block: sizes, then bytes, each part coded on its own if in base 64."""
+        width = self.header.itemsize
+
+        def take(start: int, size: int) -> tuple[bytes, int]:
+            if not is_base64:
+                part, end = data[start : start + size], start + size
+            else:
+                end = start + 4 * -(-size // 3)
+                part = base64.b64decode(data[start:end])[:size]
+            if len(part) < size:
+                raise ValueError(f"{len(part)} of {size} bytes are there")
+            return part, end
+
+        def sizes(count: int) -> tuple[list[int], int]:
+            part, end = take(0, count * width)
+            return np.frombuffer(part, self.header).tolist(), end
+
+        if self.compressor is None:
+            (size,), at = sizes(1)
+            return (take(0, width + size)[0])[width:] if is_base64 else take(at, size)[0]
+        if "ZLib" not in self.compressor:
+            raise FileFormatError(f"{self.path}: compressed by {self.compressor}: save it without compression")
+        n_blocks = sizes(1)[0][0]
+        packed, at = sizes(3 + n_blocks)
+        everything, _ = take(at, sum(packed[3:]))
+        ends = np.cumsum([0, *packed[3:]]).tolist()
+        return b"".join(zlib.decompress(everything[a:b]) for a, b in pairwise(ends))
+
+
+def _parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
+    data = contents(path)
+    mark = data.find(b"<AppendedData")
+    appended, encoding = b"", "raw"
+    if mark >= 0:
+        start = data.find(b"_", mark)
+        encoding = "base64" if b"base64" in data[mark:start] else "raw"
+        appended = data[start + 1 :]
+        data = data[:mark] + b"</VTKFile>"
+    try:
+        root = ElementTree.fromstring(data)
+    except ElementTree.ParseError as error:
+        raise FileFormatError(f"{path}: it is no XML ({error}): the file is truncated or damaged") from error
+    if root.tag != "VTKFile" or root.get("type") != kind:
+        raise FileFormatError(f"{path}: it holds {root.get('type', root.tag)}, not {kind}: check the extension")
+    order = "<" if root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
+    header = np.dtype(order + _TYPES[root.get("header_type", "UInt32")])
+    return root, _Arrays(path, order, header, root.get("compressor"), encoding, appended)
