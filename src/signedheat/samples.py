@@ -1,0 +1,167 @@
+"""Shapes to try things on: a few closed ones, ways to break them, and the broken duck of `signedheat demo`.
+
+Everything is generated, from fixed seeds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .domains.point_cloud import PointCloud
+from .domains.triangle_mesh import TriangleMesh
+
+
+def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:
+    """An icosahedron, each face split in four `subdivisions` times, its vertices on a sphere.
+
+    Examples
+    --------
+    >>> sphere(2)
+    TriangleMesh(162 vertices, 320 faces)
+    """
+    golden = (1 + 5**0.5) / 2
+    points = np.array([[s, t * golden, 0] for s in (-1, 1) for t in (-1, 1)], dtype=float)
+    points = np.concatenate([np.roll(points, k, axis=1) for k in range(3)])
+    triples = np.array([(i, j, k) for i in range(12) for j in range(i + 1, 12) for k in range(j + 1, 12)])
+    a, b, c = points[triples].transpose(1, 0, 2)
+    longest = np.max(
+        [np.linalg.norm(a - b, axis=1), np.linalg.norm(b - c, axis=1), np.linalg.norm(c - a, axis=1)], axis=0
+    )
+    outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0
+    faces = np.where(outward[:, None], triples, triples[:, ::-1])[longest < 2.1]
+    for _ in range(subdivisions):
+        edges = TriangleMesh(points, faces).edges
+        middle = len(points) + edges.of_faces
+        points = np.concatenate([points, points[edges.vertices].mean(axis=1)])
+        corner, ab, bc, ca = faces, *middle.T
+        faces = np.concatenate(
+            [
+                np.stack([corner[:, 0], ab, ca], axis=1),
+                np.stack([corner[:, 1], bc, ab], axis=1),
+                np.stack([corner[:, 2], ca, bc], axis=1),
+                np.stack([ab, bc, ca], axis=1),
+            ]
+        )
+    points *= radius / np.linalg.norm(points, axis=1, keepdims=True)
+    return TriangleMesh(points + np.asarray(center), faces)
+
+
+def torus(major: float = 1.0, minor: float = 0.4, n_around: int = 96, n_across: int = 48) -> TriangleMesh:
+    """A torus around the z axis.
+
+    Examples
+    --------
+    >>> torus(n_around=6, n_across=4)
+    TriangleMesh(24 vertices, 48 faces)
+    """
+    u, v = np.meshgrid(np.arange(n_around), np.arange(n_across), indexing="ij")
+    around, across = 2 * np.pi * u / n_around, 2 * np.pi * v / n_across
+    ring = major + minor * np.cos(across)
+    points = np.stack([ring * np.cos(around), ring * np.sin(around), minor * np.sin(across)], axis=-1)
+    index = u * n_across + v
+    right, up = np.roll(index, -1, axis=0), np.roll(index, -1, axis=1)
+    diagonal = np.roll(right, -1, axis=1)
+    faces = np.concatenate([np.stack([index, right, diagonal], axis=-1), np.stack([index, diagonal, up], axis=-1)])
+    return TriangleMesh(points.reshape(-1, 3), faces.reshape(-1, 3))
+
+
+def duck(n: int = 56) -> TriangleMesh:
+    """A rubber duck, closed, about 2 long: its beak is a body of its own, stuck into the head as modellers do.
+
+    Parameters
+    ----------
+    n : int
+        Cells along the length from which the body is contoured.
+    """
+    from .domains.grid import Grid
+    from .fields.grid_field import GridField
+
+    lower, upper = np.array([-1.15, -0.8, -0.75]), np.array([1.0, 0.8, 1.15])
+    spacing = 2.15 / n
+    grid = Grid(lower, spacing, np.ceil((upper - lower) / spacing).astype(int) + 1)
+    x = grid.points
+    lumps = [
+        ((0.0, 0.0, -0.2), (0.82, 0.6, 0.46)),  # body
+        ((-0.72, 0.0, 0.12), (0.3, 0.26, 0.24)),  # tail
+        ((0.38, 0.0, 0.62), (0.4, 0.38, 0.38)),  # head
+        ((-0.05, 0.5, -0.12), (0.42, 0.14, 0.22)),  # wings
+        ((-0.05, -0.5, -0.12), (0.42, 0.14, 0.22)),
+    ]
+    depth = [(np.linalg.norm((x - center) / np.array(axes), axis=-1) - 1) * min(axes) for center, axes in lumps]
+    softness = 0.05
+    blend = -softness * np.logaddexp.reduce([-d / softness for d in depth], axis=0)
+    body = GridField(grid, blend).contour(0.0)
+    beak = sphere(3)
+    beak = TriangleMesh(beak.vertices * (0.2, 0.15, 0.07) + (0.82, 0.0, 0.6), beak.faces)
+    return union(body, beak)
+
+
+def broken_duck() -> TriangleMesh:
+    """The duck as no one wants it: holes, noise, flipped and duplicate faces, and the beak's end inside the head."""
+    mesh = without_patches(duck(), n_patches=7, radius=0.26, seed=3)
+    mesh = with_noise(mesh, 0.006, seed=1)
+    return with_duplicate_faces(with_flipped_faces(mesh, 0.05, seed=2), 0.02, seed=5)
+
+
+def union(*meshes: TriangleMesh) -> TriangleMesh:
+    """All faces of some meshes; nothing is merged."""
+    starts = np.cumsum([0] + [mesh.n_vertices for mesh in meshes])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int = 0) -> TriangleMesh:
+    """Without the faces within `radius` of some vertices picked far from each other."""
+    picked = [int(np.random.default_rng(seed).integers(mesh.n_vertices))]
+    nearest = np.linalg.norm(mesh.vertices - mesh.vertices[picked[0]], axis=1)
+    while len(picked) < n_patches:
+        picked.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(mesh.vertices - mesh.vertices[picked[-1]], axis=1))
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    distance = np.min([np.linalg.norm(middles - mesh.vertices[k], axis=1) for k in picked], axis=0)
+    return TriangleMesh(mesh.vertices, mesh.faces[distance > radius])
+
+
+def without_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
+    """Without a random fraction of the faces."""
+    return TriangleMesh(mesh.vertices, mesh.faces[np.random.default_rng(seed).random(mesh.n_faces) >= fraction])
+
+
+def with_noise(mesh: TriangleMesh, amplitude: float, seed: int = 0) -> TriangleMesh:
+    """With vertices moved at random; `amplitude` is the standard deviation along each axis."""
+    moves = np.random.default_rng(seed).normal(scale=amplitude, size=mesh.vertices.shape)
+    return TriangleMesh(mesh.vertices + moves, mesh.faces)
+
+
+def with_flipped_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
+    """With a random fraction of the faces turned inside out."""
+    flipped = np.random.default_rng(seed).random(mesh.n_faces) < fraction
+    return TriangleMesh(mesh.vertices, np.where(flipped[:, None], mesh.faces[:, ::-1], mesh.faces))
+
+
+def with_duplicate_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
+    """With a random fraction of the faces there twice."""
+    doubled = np.random.default_rng(seed).random(mesh.n_faces) < fraction
+    return TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[doubled]]))
+
+
+def soup(mesh: TriangleMesh, jitter: float = 0.0, seed: int = 0) -> TriangleMesh:
+    """Every face on its own three vertices, each face moved at random by about `jitter`."""
+    corners = mesh.vertices[mesh.faces]
+    corners = corners + np.random.default_rng(seed).normal(scale=jitter or 0.0, size=(mesh.n_faces, 1, 3))
+    return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
+
+
+def oriented_points(mesh: TriangleMesh, n_points: int, seed: int = 0) -> PointCloud:
+    """Points at random places of the surface, evenly by area, with the normals of their faces."""
+    rng = np.random.default_rng(seed)
+    face = rng.choice(mesh.n_faces, size=n_points, p=mesh.face_areas / mesh.face_areas.sum())
+    weights = _barycentric(rng, n_points)
+    points = np.einsum("ij,ijk->ik", weights, mesh.vertices[mesh.faces[face]])
+    return PointCloud(points, mesh.face_area_vectors[face])
+
+
+def _barycentric(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
+    root, share = np.sqrt(rng.random(n)), rng.random(n)
+    return np.stack([1 - root, root * (1 - share), root * share], axis=1)
