@@ -18,6 +18,7 @@ from .errors import (
     UnreachedWarning,
 )
 from .fields.vertex_field import VertexField
+from .lowering import polygons as _polygons  # noqa: F401  registers the lowering
 from .lowering import surface as _surface  # noqa: F401  registers the lowering
 from .fields.grid_field import GridField
 from .solver import SignedHeatSolver

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from ..operators.virtual_refinement import VirtualRefinement, virtual_refinement
+from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
 
@@ -102,6 +104,21 @@ class PolygonMesh:
         center = self.polygon_centroids[self.corner_polygons]
         a, b = self.vertices[self.corners] - center, self.vertices[self.next_corners] - center
         return 0.5 * np.add.reduceat(np.cross(a, b), self.offsets[:-1], axis=0)
+
+    @cached_property
+    def refinement(self) -> VirtualRefinement:
+        """The polygons as triangles, most often by a virtual vertex in each."""
+        return virtual_refinement(self.vertices, self.corners, self.offsets)
+
+    @cached_property
+    def triangulation(self) -> TriangleMesh:
+        """The triangles that curves refer to; polygon after polygon, virtual vertices after the mesh's own."""
+        refinement = self.refinement
+        return TriangleMesh(np.concatenate([self.vertices, refinement.virtual_vertices]), refinement.faces)
+
+    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of `triangulation`, from values at the vertices of the mesh."""
+        return self.refinement.prolongation @ values
 
     def __repr__(self) -> str:
         return f"PolygonMesh({self.n_vertices} vertices, {self.n_polygons} polygons)"

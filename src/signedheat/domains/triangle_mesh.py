@@ -75,5 +75,14 @@ class TriangleMesh:
         tail, head = self.edges.vertices.T
         return np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
 
+    @property
+    def triangulation(self) -> TriangleMesh:
+        """The triangles that curves refer to: here the mesh itself."""
+        return self
+
+    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of `triangulation`, from values at the vertices of the domain: here the same."""
+        return values
+
     def __repr__(self) -> str:
         return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"

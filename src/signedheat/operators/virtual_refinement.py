@@ -1,0 +1,202 @@
+"""Polygons as triangles, by one virtual vertex in each (Bunge, Herholz, Kazhdan & Botsch 2020).
+
+The virtual vertex minimises the sum of the squared areas of the fan of triangles that it spans with the sides of its
+polygon. It is an affine combination of the corners, so that functions on the corners prolong to the fan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+_SLIVER = 1e-6  # a fan triangle smaller than this part of its polygon has turned over
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualRefinement:
+    """Triangles that cover polygons.
+
+    Attributes
+    ----------
+    faces : (m, 3) int
+        Vertex ids; virtual vertices follow the given ones. Polygon after polygon, side after side.
+    face_polygons : (m,) int
+        Polygon that each triangle covers a part of.
+    virtual_vertices : (q, 3) float
+        Positions.
+    prolongation : (n + q, n) sparse
+        P: the given vertices, then each virtual vertex as an affine combination of the corners of its polygon.
+    """
+
+    faces: NDArray[np.int64]
+    face_polygons: NDArray[np.int64]
+    virtual_vertices: NDArray[np.float64]
+    prolongation: sparse.csr_matrix
+
+
+def virtual_refinement(
+    vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
+) -> VirtualRefinement:
+    """Cover polygons with triangles.
+
+    Triangles stay as they are, and so do results on meshes of triangles alone. A polygon so far from convex that a
+    triangle of its fan turns over is cut along diagonals instead.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions.
+    corners, offsets : (c,) int, (p + 1,) int
+        Polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``; corners that repeat the one before are
+        skipped.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> fan = virtual_refinement(square, np.array([0, 1, 2, 3]), np.array([0, 4]))
+    >>> fan.faces.tolist()
+    [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    >>> fan.virtual_vertices
+    array([[0.5, 0.5, 0. ]])
+    >>> fan.prolongation[[4]].toarray()
+    array([[0.25, 0.25, 0.25, 0.25]])
+    """
+    corners, polygons = _without_repeats(corners, offsets)
+    counts = np.bincount(polygons, minlength=len(offsets) - 1)
+    begin = np.cumsum(counts) - counts
+    following = np.arange(1, len(corners) + 1)
+    following[(begin + counts - 1)[counts > 0]] = begin[counts > 0]
+
+    in_fan = counts[polygons] > 3
+    fans, fan_of = np.unique(polygons[in_fan], return_inverse=True)
+    tails, heads = corners[in_fan], corners[following[in_fan]]
+    centers, weights = virtual_vertices(vertices, tails, heads, fan_of, len(fans))
+
+    whole = area_vectors(vertices[tails], vertices[heads], centers[fan_of])
+    total = _sums(whole, fan_of, len(fans))
+    part = (whole * total[fan_of]).sum(axis=1)
+    turned = np.zeros(len(fans), dtype=bool)
+    turned[fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]]] = True
+    cuts = {k: cut_into_triangles(vertices[corners[polygons == fans[k]]]) for k in np.flatnonzero(turned)}
+    cuts = {k: triangles for k, triangles in cuts.items() if len(triangles)}
+    kept = np.ones(len(fans), dtype=bool)
+    kept[list(cuts)] = False
+
+    number = np.cumsum(kept) - 1
+    fan_of_kept = kept[fan_of]
+    faces = [
+        corners[begin[counts == 3][:, None] + np.arange(3)],
+        np.stack([tails, heads, len(vertices) + number[fan_of]], axis=1)[fan_of_kept],
+        *(corners[begin[fans[k]] + triangles] for k, triangles in cuts.items()),
+    ]
+    owners = [
+        np.flatnonzero(counts == 3),
+        fans[fan_of[fan_of_kept]],
+        *(np.full(len(triangles), fans[k]) for k, triangles in cuts.items()),
+    ]
+    order = np.argsort(np.concatenate(owners), kind="stable")
+    rows, n = number[fan_of[fan_of_kept]], len(vertices)
+    average = sparse.csr_matrix((weights[fan_of_kept], (rows, tails[fan_of_kept])), shape=(int(kept.sum()), n))
+    return VirtualRefinement(
+        np.concatenate(faces)[order],
+        np.concatenate(owners)[order],
+        centers[kept],
+        sparse.vstack([sparse.identity(n, format="csr"), average], format="csr"),
+    )
+
+
+def virtual_vertices(
+    vertices: NDArray[np.float64],
+    tails: NDArray[np.int64],
+    heads: NDArray[np.int64],
+    polygons: NDArray[np.int64],
+    n_polygons: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The points that minimise Σ |fan triangle|², and their affine weights of least norm.
+
+    Twice the area vector of the triangle of side ``a → b`` and apex x is ``a × b + (b − a) × x``, linear in x: three
+    equations for each polygon. Side k runs from vertex ``tails[k]`` to ``heads[k]`` of polygon ``polygons[k]``.
+    """
+    count = np.bincount(polygons, minlength=n_polygons)
+    mean = _sums(vertices[tails], polygons, n_polygons) / count[:, None]
+    a, b = vertices[tails] - mean[polygons], vertices[heads] - mean[polygons]
+    side = b - a
+    normal_matrix = _sums(
+        (side * side).sum(axis=1)[:, None, None] * np.eye(3) - side[:, :, None] * side[:, None, :], polygons, n_polygons
+    )
+    load = _sums(np.cross(side, np.cross(a, b)), polygons, n_polygons)
+    offset = _solve_symmetric(normal_matrix, load)
+    spread = _sums(a[:, :, None] * a[:, None, :], polygons, n_polygons)
+    slope = _solve_symmetric(spread, offset)
+    weights = 1.0 / count[polygons] + (a * slope[polygons]).sum(axis=1)
+    return mean + _sums(weights[:, None] * a, polygons, n_polygons), weights
+
+
+def area_vectors(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3) area vectors of triangles."""
+    return 0.5 * np.cross(b - a, c - a)
+
+
+def cut_into_triangles(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Cut a simple polygon along diagonals, the best-shaped ear first; (k − 2, 3) corners, or none if no ear is left.
+
+    Growth is cubic in the number of corners.
+
+    Examples
+    --------
+    >>> arrow = np.array([[0.0, 0, 0], [2, -1, 0], [1, 0, 0], [2, 1, 0]])
+    >>> cut_into_triangles(arrow).tolist()
+    [[0, 1, 2], [0, 2, 3]]
+    """
+    normal = np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)
+    first = np.linalg.svd(polygon - polygon.mean(axis=0))[2][0]
+    second = np.cross(normal, first)
+    length = np.linalg.norm(second)
+    if length == 0:
+        return np.empty((0, 3), dtype=np.int64)
+    plane = polygon @ first + 1j * (polygon @ second / length)
+    left = np.arange(len(polygon))
+    triangles = []
+    while len(left) > 3:
+        before, here, after = np.roll(left, 1), left, np.roll(left, -1)
+        a, b, c = plane[before], plane[here], plane[after]
+        area = (np.conj(b - a) * (c - a)).imag
+        quality = area / (np.abs(b - a) ** 2 + np.abs(c - b) ** 2 + np.abs(a - c) ** 2)
+        z = plane[left][:, None]
+        inside = np.ones((len(left), len(left)), dtype=bool)  # [point, ear]
+        for u, v in ((a, b), (b, c), (c, a)):
+            inside &= (np.conj(v - u) * (z - u)).imag >= 0
+        inside &= (left[:, None] != before) & (left[:, None] != here) & (left[:, None] != after)
+        quality = np.where(inside.any(axis=0), -1.0, quality)
+        ear = int(np.argmax(quality))
+        if quality[ear] <= 0:
+            return np.empty((0, 3), dtype=np.int64)
+        triangles.append([before[ear], here[ear], after[ear]])
+        left = np.delete(left, ear)
+    return np.sort(np.array([*triangles, left]), axis=1)
+
+
+def _without_repeats(
+    corners: NDArray[np.int64], offsets: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Corners that differ from the one before in their polygon, and their polygons."""
+    polygons = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    before = np.roll(corners, 1)
+    before[offsets[:-1]] = corners[offsets[1:] - 1]
+    differs = corners != before
+    return corners[differs], polygons[differs]
+
+
+def _sums(values: NDArray[np.float64], groups: NDArray[np.int64], n_groups: int) -> NDArray[np.float64]:
+    """Sums over the rows of each group."""
+    flat = values.reshape(len(values), -1)
+    columns = [np.bincount(groups, column, n_groups) for column in flat.T]
+    return np.stack(columns, axis=1).reshape(n_groups, *values.shape[1:])
+
+
+def _solve_symmetric(matrices: NDArray[np.float64], loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least-squares solutions of least norm; the plane of a flat polygon is all that its corners can tell."""
+    return np.einsum("nij,nj->ni", np.linalg.pinv(matrices, rcond=1e-10, hermitian=True), loads)
