@@ -74,7 +74,7 @@ def glue(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = No
         start=start,
         length=lengths / unit,
         fixed=fixed,
-        counts=np.array([triangles.n_faces, n_edges, triangles.n_vertices, 0]),
+        counts=np.array([triangles.n_faces, n_edges, triangles.n_vertices, 0, 0]),
         steps=np.empty((2 * n_edges + 64, 3), dtype=np.int64),
         weights=np.empty((2 * n_edges + 64, 4)),
         scratch=np.empty((4, 4), dtype=np.int64),
@@ -84,21 +84,19 @@ def glue(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = No
 
 def flip_all(gluing: Gluing) -> Gluing:
     """Flip to Delaunay; the same triangulation, with room for its longer history."""
-    from .intrinsic_kernels import make_delaunay
+    from .intrinsic_kernels import settle
 
     n_edges = int(gluing.counts[1])
-    queue, queued = np.arange(n_edges), np.ones(n_edges, dtype=bool)
-    head, waiting = 0, n_edges
-    while True:
-        head, waiting = make_delaunay(gluing, queue, queued, head, waiting)
-        if waiting == 0:
-            return gluing
-        gluing = gluing._replace(steps=_doubled(gluing.steps), weights=_doubled(gluing.weights))
+    gluing.counts[4] = n_edges
+    stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
+    while not settle(gluing, stack, stacked):
+        gluing = gluing._replace(steps=doubled(gluing.steps), weights=doubled(gluing.weights))
+    return gluing
 
 
 def lay_out(gluing: Gluing) -> LaidOutTriangles:
     """The triangulation as it is now. Edges keep their numbers."""
-    n_faces, n_edges, n_vertices, _ = gluing.counts.tolist()
+    n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     corners, edge = gluing.tail[: 3 * n_faces].reshape(-1, 3), gluing.edge[: 3 * n_faces]
     forward, heads = gluing.forward[: 3 * n_faces], np.roll(corners, -1, axis=1).ravel()
     first = np.zeros(n_edges, dtype=np.int64)
@@ -112,8 +110,8 @@ def lay_out(gluing: Gluing) -> LaidOutTriangles:
     return LaidOutTriangles.from_lengths(corners.copy(), lengths, n_vertices, table)
 
 
-def _doubled(array: NDArray) -> NDArray:
-    return np.concatenate([array, np.empty_like(array)])
+def doubled(array: NDArray) -> NDArray:
+    return np.concatenate([array, np.zeros_like(array)])
 
 
 def _power_of_two(value: float) -> float:

@@ -22,10 +22,10 @@ class Gluing(NamedTuple):
     `tail`, `edge`, `forward`, `front` and `ring` have one entry per halfedge: its tail vertex; its edge; whether it
     runs along the edge's own direction; which of the edge's two sides it is on (moved along, so that the two sides of
     a source keep their names); and the next halfedge of the same edge, cyclically: itself at a boundary.
-    `start`, `length` and `fixed` have one entry per edge: one of its halfedges; its length; whether it must not be
-    flipped. `counts` holds the number of faces, edges, vertices and steps. `steps` and `weights` are the history: kind,
-    two halfedges or faces; and four numbers that say how points move. `scratch` is room to work in,
-    and lengths are in multiples of `unit`.
+    `start`, `length` and `fixed` have one entry per edge: one of its halfedges; its length, in multiples of `unit`;
+    whether it must not be flipped. `counts` holds the number of faces, edges, vertices, steps and edges to be looked
+    at. `steps` and `weights` are the history: kind, two halfedges or faces; and four numbers that say how points move.
+    `scratch` is room to work in.
     """
 
     tail: NDArray[np.int64]
@@ -177,25 +177,132 @@ def flip(g, h):
 
 
 @njit(cache=True)
-def make_delaunay(g, queue, queued, head, waiting):
-    """Flip until every edge that is not fixed has the Delaunay property, or the history is full.
+def settle(g, stack, stacked):
+    """Flip until every edge that is not fixed has the Delaunay property; False if the history is full before.
 
-    `queue` is a ring buffer with room for every edge: those still to be looked at, `waiting` of them from `head` on;
-    `queued` says which they are. Returns the new head and how many are waiting.
+    `stack` holds the edges still to be looked at, `counts[4]` of them, and `stacked` says which they are.
     """
-    while waiting > 0 and g.counts[3] + 2 <= len(g.steps):
-        e = queue[head]
-        head = (head + 1) % len(queue)
-        waiting -= 1
-        queued[e] = False
+    while g.counts[4] > 0:
+        if g.counts[3] + 2 > len(g.steps):
+            return False
+        g.counts[4] -= 1
+        e = stack[g.counts[4]]
+        stacked[e] = False
         h = g.start[e]
         if g.fixed[e] or not is_interior(g, h) or not violates_delaunay(g, h) or not flip(g, h):
             continue
         t = g.ring[h]
         for side in (following(h), preceding(h), following(t), preceding(t)):
-            neighbor = g.edge[side]
-            if not queued[neighbor]:
-                queue[(head + waiting) % len(queue)] = neighbor
-                queued[neighbor] = True
-                waiting += 1
-    return head, waiting
+            look_at(g, stack, stacked, g.edge[side])
+    return True
+
+
+@njit(cache=True)
+def look_at(g, stack, stacked, e):
+    """Put an edge on the stack of those to be looked at."""
+    if not stacked[e]:
+        stack[g.counts[4]] = e
+        stacked[e] = True
+        g.counts[4] += 1
+
+
+@njit(cache=True)
+def new_edge(g, length, fixed):
+    """Add an edge."""
+    e = g.counts[1]
+    g.counts[1] = e + 1
+    g.length[e], g.fixed[e] = length, fixed
+    return e
+
+
+@njit(cache=True)
+def apex_position(g, h):
+    """(x, y) of the face's third corner, the halfedge along the x axis from the origin; y ≥ 0."""
+    base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
+    n, d = half_tangent(right, base, left)
+    return 0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base
+
+
+@njit(cache=True)
+def split_face(g, f, u, v, w):
+    """Put a vertex into a face at barycentric coordinates (u, v, w); return the vertex.
+
+    Face (a, b, c) becomes (a, b, x) and two new faces (b, c, x) and (c, a, x).
+    """
+    h, x, n = 3 * f, g.counts[2], g.counts[0]
+    a, b, c = g.tail[h], g.tail[h + 1], g.tail[h + 2]
+    base = g.length[g.edge[h]]
+    apex_x, apex_y = apex_position(g, h)
+    px, py = v * base + w * apex_x, w * apex_y
+    record(g, SPLIT_FACE, f, n, u, v, w, 1.0)
+    to_a, to_b = new_edge(g, np.hypot(px, py), False), new_edge(g, np.hypot(px - base, py), False)
+    to_c = new_edge(g, np.hypot(px - apex_x, py - apex_y), False)
+    g.counts[2], g.counts[0] = x + 1, n + 2
+    k, l = 3 * n, 3 * n + 3
+    move(g, (h + 1, h + 2), (k, l))
+    g.tail[k], g.tail[l] = b, c
+    pair(g, h + 2, x, l + 1, a, to_a)
+    pair(g, k + 2, x, h + 1, b, to_b)
+    pair(g, l + 2, x, k + 1, c, to_c)
+    return x
+
+
+@njit(cache=True)
+def split_edge(g, h, fraction):
+    """Put a vertex on an edge, `fraction` of the way along halfedge h, and split every face there; return the vertex.
+
+    Face (tail, head, apex) becomes (tail, x, apex) and a new face (x, head, apex). No face may have the edge twice.
+    The part at the edge's own tail keeps its number.
+    """
+    count = ring_size(g, h)
+    around, beside = np.empty(count, np.int64), np.empty(count, np.int64)
+    y = h
+    for k in range(count):
+        around[k] = y
+        y = g.ring[y]
+    e, x = g.edge[h], g.counts[2]
+    g.counts[2] = x + 1
+    along = fraction if g.forward[h] else 1.0 - fraction
+    whole = g.length[e]
+    other = new_edge(g, (1.0 - along) * whole, g.fixed[e])
+    for k in range(count):
+        y, n = around[k], g.counts[0]
+        g.counts[0] = n + 1
+        here = along if g.forward[y] else 1.0 - along
+        apex_x, apex_y = apex_position(g, y)
+        record(g, SPLIT_EDGE, y, n, 1.0 - here, here, 0.0, 1.0)
+        cut = new_edge(g, np.hypot(apex_x - here * whole, apex_y), False)
+        second, first, last = 3 * n, following(y), preceding(y)
+        head, apex = g.tail[first], g.tail[last]
+        move(g, (first,), (second + 1,))
+        g.tail[second], g.tail[second + 1] = x, head
+        g.forward[second], g.front[second] = g.forward[y], g.front[y]
+        pair(g, first, x, second + 2, apex, cut)
+        beside[k] = second
+    g.length[e] = along * whole
+    for k in range(count):
+        l = (k + 1) % count
+        near, far = (around[k], beside[k]) if g.forward[around[k]] else (beside[k], around[k])
+        next_near, next_far = (around[l], beside[l]) if g.forward[around[l]] else (beside[l], around[l])
+        g.edge[near], g.edge[far] = e, other
+        g.start[e], g.start[other] = near, far
+        g.ring[near], g.ring[far] = next_near, next_far
+    return x
+
+
+@njit(cache=True)
+def ring_size(g, h):
+    """Number of halfedges of an edge."""
+    count, y = 1, g.ring[h]
+    while y != h:
+        count += 1
+        y = g.ring[y]
+    return count
+
+
+@njit(cache=True)
+def pair(g, h, tail, t, head, e):
+    """Glue two halfedges into a new edge."""
+    g.tail[h], g.edge[h], g.forward[h], g.front[h], g.ring[h] = tail, e, True, True, t
+    g.tail[t], g.edge[t], g.forward[t], g.front[t], g.ring[t] = head, e, False, False, h
+    g.start[e] = h

@@ -1,0 +1,387 @@
+"""Compiled kernels of intrinsic Delaunay refinement: find thin triangles, put vertices where they heal them.
+
+Circumcentres go in (Chew 1993; on surfaces Sharp, Soliman & Crane 2019); where one would lie beyond a segment (an edge
+that must stay) or in a segment's diametral circle, the segment is split instead (Ruppert 1995).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .intrinsic_kernels import (
+    FLIP,
+    SPLIT_EDGE,
+    SPLIT_FACE,
+    apex_position,
+    following,
+    look_at,
+    preceding,
+    ring_size,
+    settle,
+    split_edge,
+    split_face,
+    tangent_at,
+)
+
+DONE, GROW, FULL = 0, 1, 2
+"""Why `refine` stopped: nothing left to do; out of room; as many vertices as allowed."""
+
+NARROW = np.pi / 3
+"""Where segments meet, or the surface closes up, at less than this, small angles have to stay."""
+
+INSIDE, BLOCKED, LOST = 0, 1, 2
+N_BINS = 256
+
+
+class Agenda(NamedTuple):
+    """What refinement still has to do, and what it remembers of segments.
+
+    `stack` and `stacked` are edges to be looked at for the Delaunay property. `bins` and `next_face` are linked lists
+    of faces to be looked at, by the binary logarithm of their circumradius; `listed` says which faces are in one.
+    `segment` numbers the input segment of each edge (−1: none), `segment_ends` and `segment_length` describe those, and
+    `on_segment` is the segment on which a new vertex was put. `narrow` marks input vertices at which two segments meet,
+    or the surface closes up, at less than 60°. `seen` counts the steps of the history whose faces have been listed;
+    `room` and `halfedges` are for the search around a new vertex.
+    """
+
+    stack: NDArray[np.int64]
+    stacked: NDArray[np.bool_]
+    bins: NDArray[np.int64]
+    next_face: NDArray[np.int64]
+    listed: NDArray[np.bool_]
+    segment: NDArray[np.int64]
+    segment_ends: NDArray[np.int64]
+    segment_length: NDArray[np.float64]
+    on_segment: NDArray[np.int64]
+    narrow: NDArray[np.bool_]
+    seen: NDArray[np.int64]
+    room: NDArray[np.float64]
+    halfedges: NDArray[np.int64]
+
+
+@njit(cache=True)
+def refine(g, agenda, angle, max_vertices):
+    """Insert vertices until no face that can be helped has an angle below `angle` (radians)."""
+    bound = np.tan(0.5 * angle) ** 2
+    while settle(g, agenda.stack, agenda.stacked):
+        for n in range(agenda.seen[0], g.counts[3]):
+            for f in changed_faces(g, n):
+                list_face(g, agenda, f, bound)
+        agenda.seen[0] = g.counts[3]
+        f = next_thin(g, agenda, bound)
+        if f < 0:
+            return DONE
+        if g.counts[2] >= max_vertices:
+            return FULL
+        if not improve(g, agenda, f, bound):
+            list_face(g, agenda, f, bound)
+            return GROW
+    return GROW
+
+
+@njit(cache=True)
+def changed_faces(g, n):
+    """The faces that step n of the history changed or made, some perhaps twice."""
+    kind, first, second = g.steps[n]
+    if kind == FLIP:
+        return first // 3, second // 3, second // 3
+    if kind == SPLIT_EDGE:
+        return first // 3, second, second
+    if kind == SPLIT_FACE:
+        return first, second, second + 1
+    return first, first, first
+
+
+@njit(cache=True)
+def is_thin(g, f, bound):
+    """Whether the smallest angle of a face, opposite to its shortest side, is below the bound; and the side."""
+    h = 3 * f
+    for k in range(1, 3):
+        if g.length[g.edge[3 * f + k]] < g.length[g.edge[h]]:
+            h = 3 * f + k
+    n, d = tangent_at(g, preceding(h))
+    return n < bound * d, h
+
+
+@njit(cache=True)
+def list_face(g, agenda, f, bound):
+    """Put a thin face on the lists."""
+    thin, h = is_thin(g, f, bound)
+    if agenda.listed[f] or not thin:
+        return
+    n, d = tangent_at(g, preceding(h))
+    radius = g.length[g.edge[h]] * (n + d) / np.sqrt(n * d) if n > 0.0 and d > 0.0 else np.inf
+    place = min(max(N_BINS // 2 + int(2.0 * np.log2(min(max(radius, 1e-30), 1e30))), 0), N_BINS - 1)
+    agenda.next_face[f] = agenda.bins[place]
+    agenda.bins[place] = f
+    agenda.listed[f] = True
+
+
+@njit(cache=True)
+def list_all(g, agenda, angle):
+    """Put every thin face on the lists."""
+    for f in range(g.counts[0]):
+        list_face(g, agenda, f, np.tan(0.5 * angle) ** 2)
+
+
+@njit(cache=True)
+def next_thin(g, agenda, bound):
+    """The thin face of (nearly) the largest circumradius, or −1."""
+    for place in range(N_BINS - 1, -1, -1):
+        while agenda.bins[place] >= 0:
+            f = agenda.bins[place]
+            agenda.bins[place] = agenda.next_face[f]
+            agenda.listed[f] = False
+            if is_thin(g, f, bound)[0]:
+                return f
+    return -1
+
+
+@njit(cache=True)
+def improve(g, agenda, f, bound):
+    """Insert one vertex for the sake of a thin face, if that can help; False if there is no room for it."""
+    h = is_thin(g, f, bound)[1]
+    if is_hopeless(g, agenda, h):
+        return True
+    outcome, place, x, y = find_circumcenter(g, f)
+    if outcome == LOST:
+        return True
+    segment = place if outcome == BLOCKED else encroached(g, agenda, place, x, y)
+    if segment >= 0:
+        return split_segment(g, agenda, segment, f, bound)
+    if not has_room(g, agenda, 2):
+        return False
+    insert(g, agenda, place, x, y)
+    return True
+
+
+@njit(cache=True)
+def is_hopeless(g, agenda, h):
+    """Whether the small angle opposite to h is there for good: given with the surface, or with the segments."""
+    corner = preceding(h)
+    if agenda.narrow[g.tail[corner]] and sector(g, corner) < NARROW:
+        return True
+    a, b = agenda.on_segment[g.tail[h]], agenda.on_segment[g.tail[following(h)]]
+    if a < 0 or b < 0 or a == b:
+        return False
+    for k in range(2):
+        for l in range(2):
+            shared = agenda.segment_ends[a, k]
+            if shared == agenda.segment_ends[b, l] and agenda.narrow[shared]:
+                return True
+    return False
+
+
+@njit(cache=True)
+def sector(g, corner):
+    """Angle around the tail of a halfedge from segment to segment, or all around, as far as it matters (up to π)."""
+    n, d = tangent_at(g, corner)
+    total = 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
+    for side in range(2):
+        c, h = corner, (corner if side == 0 else preceding(corner))
+        while not g.fixed[g.edge[h]] and total < np.pi:
+            t = g.ring[h]
+            at_tail = (h == c) == (g.forward[t] == g.forward[h])  # is the vertex the tail of t?
+            c, h = (t, preceding(t)) if at_tail else (following(t), following(t))
+            if c == corner:
+                return total
+            n, d = tangent_at(g, c)
+            total += 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
+    return total
+
+
+@njit(cache=True)
+def unfold(g, h, side, tx, ty, hx, hy):
+    """Lay out the face on the other side of h, whose ends lie at t and h: its apex, and on which side its inside lies.
+
+    `side` is 1 where the face of h is laid out counter-clockwise, −1 where clockwise.
+    """
+    t = g.ring[h]
+    if g.forward[t] == g.forward[h]:
+        side = -side
+    else:
+        tx, ty, hx, hy = hx, hy, tx, ty
+    x, y = apex_position(g, t)
+    length = g.length[g.edge[t]]
+    ux, uy = (hx - tx) / length, (hy - ty) / length
+    return tx + x * ux - side * y * uy, ty + x * uy + side * y * ux, side
+
+
+@njit(cache=True)
+def cross(ax, ay, bx, by, cx, cy):
+    """Twice the signed area of abc."""
+    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+
+
+@njit(cache=True)
+def find_circumcenter(g, f):
+    """Walk straight from a face's barycentre to its circumcentre.
+
+    Returns INSIDE with a face and the centre in its frame (first halfedge along x), BLOCKED with a segment's halfedge,
+    or LOST where the face is flat.
+    """
+    x, y = np.zeros(3), np.zeros(3)
+    x[1] = g.length[g.edge[3 * f]]
+    x[2], y[2] = apex_position(g, 3 * f)
+    if not y[2] > 0.0:
+        return LOST, f, 0.0, 0.0
+    cx, cy = 0.5 * x[1], 0.5 * (x[2] * (x[2] - x[1]) / y[2] + y[2])
+    sx, sy = x.sum() / 3.0, y.sum() / 3.0
+    side, entry = 1, -1
+    for _ in range(100000):
+        leaving, worst = -1, 0.0
+        area = cross(x[0], y[0], x[1], y[1], x[2], y[2])
+        for k in range(3):
+            l = (k + 1) % 3
+            beyond = -cross(x[k], y[k], x[l], y[l], cx, cy) / area
+            left, right = cross(sx, sy, cx, cy, x[k], y[k]), cross(sx, sy, cx, cy, x[l], y[l])
+            if k != entry and beyond > worst and left * right <= 0.0:
+                leaving, worst = k, beyond
+        if leaving < 0:
+            break
+        h = 3 * f + leaving
+        if g.fixed[g.edge[h]]:
+            return BLOCKED, h, 0.0, 0.0
+        l = (leaving + 1) % 3
+        t = g.ring[h]
+        kt = t % 3
+        ax, ay, turned = unfold(g, h, side, x[leaving], y[leaving], x[l], y[l])
+        if turned == side:
+            x[leaving], y[leaving], x[l], y[l] = x[l], y[l], x[leaving], y[leaving]
+        tx, ty, hx, hy = x[leaving], y[leaving], x[l], y[l]
+        x[kt], y[kt], x[(kt + 1) % 3], y[(kt + 1) % 3], x[(kt + 2) % 3], y[(kt + 2) % 3] = tx, ty, hx, hy, ax, ay
+        f, side, entry = t // 3, turned, kt
+    base = g.length[g.edge[3 * f]]
+    ux, uy = (x[1] - x[0]) / base, (y[1] - y[0]) / base
+    px, py = (cx - x[0]) * ux + (cy - y[0]) * uy, side * ((cy - y[0]) * ux - (cx - x[0]) * uy)
+    return INSIDE, f, px, py
+
+
+@njit(cache=True)
+def encroached(g, agenda, f, px, py):
+    """A segment in whose diametral circle p lies and which p would see, or −1; p in the frame of face f."""
+    ends, halfedges = agenda.room, agenda.halfedges
+    x, y = np.zeros(3), np.zeros(3)
+    x[1] = g.length[g.edge[3 * f]]
+    x[2], y[2] = apex_position(g, 3 * f)
+    count = 0
+    for k in range(3):
+        l = (k + 1) % 3
+        halfedges[count] = 3 * f + k
+        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = x[k], y[k], x[l], y[l], 1.0
+        count += 1
+    while count > 0:
+        count -= 1
+        h, (tx, ty, hx, hy, side) = halfedges[count], ends[count]
+        dot = (tx - px) * (hx - px) + (ty - py) * (hy - py)
+        if g.fixed[g.edge[h]]:
+            if dot < 0.0:
+                return h
+            continue
+        t = g.ring[h]
+        n, d = tangent_at(g, preceding(t))
+        if dot * 2.0 * np.sqrt(n * d) + (d - n) * abs(cross(px, py, tx, ty, hx, hy)) >= 0.0 or count + 2 > len(ends):
+            continue
+        ax, ay, turned = unfold(g, h, side, tx, ty, hx, hy)
+        if turned == side:
+            tx, ty, hx, hy = hx, hy, tx, ty
+        halfedges[count], halfedges[count + 1] = following(t), preceding(t)
+        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = hx, hy, ax, ay, turned
+        count += 1
+        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = ax, ay, tx, ty, turned
+        count += 1
+    return -1
+
+
+@njit(cache=True)
+def has_room(g, agenda, ring):
+    """Whether a split of an edge with `ring` faces fits into the arrays (one of a face takes less)."""
+    faces, edges, vertices, steps = g.counts[0], g.counts[1], g.counts[2], g.counts[3]
+    return (
+        3 * (faces + ring + 2) <= len(g.tail)
+        and edges + ring + 4 <= len(g.length)
+        and vertices + 1 <= len(agenda.on_segment)
+        and steps + ring + 2 <= len(g.steps)
+    )
+
+
+@njit(cache=True)
+def look_around(g, agenda, step):
+    """Put the edges of all faces that the steps from `step` on have changed on the stack."""
+    for n in range(step, g.counts[3]):
+        for f in changed_faces(g, n):
+            for k in range(3):
+                look_at(g, agenda.stack, agenda.stacked, g.edge[3 * f + k])
+
+
+@njit(cache=True)
+def insert(g, agenda, f, px, py):
+    """Put a vertex at p (in the frame of face f), or on the face's edge that it all but lies on."""
+    step = g.counts[3]
+    x, y = np.zeros(3), np.zeros(3)
+    x[1] = g.length[g.edge[3 * f]]
+    x[2], y[2] = apex_position(g, 3 * f)
+    area = x[1] * y[2]
+    nearest = np.inf
+    for k in range(3):
+        nearest = min(nearest, np.hypot(px - x[k], py - y[k]))
+    weights = np.empty(3)
+    on_edge, fraction = -1, 0.0
+    for k in range(3):
+        l = (k + 1) % 3
+        length = g.length[g.edge[3 * f + k]]
+        above = cross(x[k], y[k], x[l], y[l], px, py)
+        weights[(k + 2) % 3] = max(above / area, 0.0)
+        t = g.ring[3 * f + k]
+        if above / length < min(0.01 * length, 0.25 * nearest) and t // 3 != f and not g.fixed[g.edge[3 * f + k]]:
+            on_edge = k
+            fraction = ((px - x[k]) * (x[l] - x[k]) + (py - y[k]) * (y[l] - y[k])) / length**2
+    if on_edge >= 0 and 0.0 < fraction < 1.0:
+        split_edge(g, 3 * f + on_edge, fraction)
+    else:
+        weights /= weights.sum()
+        split_face(g, f, weights[0], weights[1], weights[2])
+    new = g.counts[2] - 1
+    agenda.on_segment[new] = -1
+    agenda.narrow[new] = False
+    look_around(g, agenda, step)
+
+
+@njit(cache=True)
+def split_segment(g, agenda, h, f, bound):
+    """Split a segment that stands in the way of healing face f; False if there is no room for it.
+
+    In the middle; but near an end where segments meet in a small angle at a power of two from it, so that the parts of
+    both segments come out equal and stop splitting each other. Parts a billionth of their segment are left alone.
+    """
+    e = g.edge[h]
+    segment, length, step = agenda.segment[e], g.length[e], g.counts[3]
+    if length < 1e-9 * agenda.segment_length[segment]:
+        return True
+    ring = ring_size(g, h)
+    if not has_room(g, agenda, ring):
+        return False
+    y = g.ring[h]
+    while y != h and y // 3 != h // 3:
+        y = g.ring[y]
+    if y != h:  # the face is folded on to itself along the segment
+        split_face(g, h // 3, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
+        agenda.on_segment[g.counts[2] - 1] = -1
+    else:
+        fraction = 0.5
+        at_tail, at_head = agenda.narrow[g.tail[h]], agenda.narrow[g.tail[following(h)]]
+        if at_tail != at_head:
+            shell = 2.0 ** np.round(np.log2(0.5 * length)) / length
+            fraction = shell if at_tail else 1.0 - shell
+        new = split_edge(g, h, fraction)
+        agenda.on_segment[new] = segment
+        for k in range(g.counts[1] - 1 - ring, g.counts[1]):
+            agenda.segment[k] = segment if g.fixed[k] else -1
+    agenda.narrow[g.counts[2] - 1] = False
+    look_around(g, agenda, step)
+    list_face(g, agenda, f, bound)
+    return True
