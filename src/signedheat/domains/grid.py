@@ -61,6 +61,55 @@ class Grid:
         object.__setattr__(self, "spacing", frozen(np.broadcast_to(steps, corner.shape).copy()))
         object.__setattr__(self, "shape", tuple(int(n) for n in counts))
 
+    @classmethod
+    def around(
+        cls,
+        bounds: ArrayLike,
+        resolution: int = 128,
+        padding: float | None = None,
+        spacing: ArrayLike | None = None,
+    ) -> Grid:
+        """A grid that holds a box, with room around it.
+
+        Parameters
+        ----------
+        bounds : (2, d) float
+            Lower and upper corner, as the `bounds` of any shape.
+        resolution : int
+            Nodes along the longest side, all axes with the same spacing.
+        padding : float, optional
+            Room on every side; 15 % of the longest side by default.
+        spacing : (d,) float or float, optional
+            Distance between nodes; the resolution then plays no part.
+
+        Raises
+        ------
+        GeometryError
+            If the box has no extent and there is no padding, or resolution, padding or spacing make no sense.
+
+        Examples
+        --------
+        >>> Grid.around([[0, 0, 0], [2, 1, 1]], resolution=11, padding=0.5)
+        Grid(origin=[-0.5, -0.5, -0.5], spacing=[0.3, 0.3, 0.3], shape=(11, 8, 8))
+        """
+        lower, upper = np.asarray(bounds, dtype=np.float64)
+        longest = float((upper - lower).max())
+        room = 0.15 * longest if padding is None else float(padding)
+        if not (np.isfinite(room) and room >= 0):
+            raise GeometryError(f"padding must be finite and not negative, not {padding}")
+        if longest + 2 * room <= 0:
+            raise GeometryError("the shape is a single place: give a padding, or a grid of your own")
+        lower, upper = lower - room, upper + room
+        if spacing is None:
+            if resolution < 2:
+                raise GeometryError(f"resolution must be at least 2, not {resolution}")
+            spacing = (longest + 2 * room) / (resolution - 1)
+        steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), lower.shape)
+        if not (np.isfinite(steps).all() and (steps > 0).all()):
+            raise GeometryError(f"grid spacing must be positive and finite, not {np.asarray(spacing).tolist()}")
+        intervals = np.maximum(1, np.ceil((upper - lower) / steps * (1 - 1e-9)))
+        return cls(lower, steps, intervals.astype(np.int64) + 1)
+
     @property
     def dimension(self) -> int:
         """Number of axes."""

@@ -69,6 +69,11 @@ class PointCloud:
         """Number of points."""
         return len(self.points)
 
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, d) lower and upper corner of the box around the points."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
     def __repr__(self) -> str:
         return f"PointCloud({self.n_points} points, {'with' if self.normals is not None else 'without'} normals)"
 

@@ -81,6 +81,12 @@ class PolygonMesh:
         return np.split(self.corners, self.offsets[1:-1])
 
     @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) lower and upper corner of the box around the polygons; vertices of no polygon do not count."""
+        corners = self.vertices[self.corners]
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    @cached_property
     def corner_polygons(self) -> NDArray[np.int64]:
         """Polygon of each entry of `corners`."""
         return np.repeat(np.arange(self.n_polygons), np.diff(self.offsets))

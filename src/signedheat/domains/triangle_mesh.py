@@ -54,6 +54,12 @@ class TriangleMesh:
         return len(self.faces)
 
     @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) lower and upper corner of the box around the faces; vertices of no face do not count."""
+        corners = self.vertices[self.faces.ravel()]
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    @cached_property
     def edges(self) -> EdgeTable:
         """The edges, numbered by first appearance in the faces (corner 0–1, 1–2, 2–0, face after face)."""
         return face_edges(self.faces)
