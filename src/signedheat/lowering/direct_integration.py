@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,7 +14,6 @@ from scipy import sparse
 from ..discretization import Levels, SourceTerm
 from ..linear import Factor, factorize, upper_triangle, whole
 
-_SPRING = 1e7  # of the constraints, times the largest diagonal entry of C
 _MAX_ROUNDS = 12
 _BATCH = 32  # right-hand sides solved at a time
 
@@ -28,10 +28,17 @@ class DirectIntegration:
         Upper triangle of C, as `upper_triangle` makes it; a constant on each connected part is its kernel.
     prolongation : (m, n) sparse, optional
         Where sources speak of m vertices of which only n are unknowns, the others being averages of them.
+    factorize : callable
+        Makes what solves a system from its upper triangle; anything with a ``solve`` will do.
+    spring : float
+        Stiffness of the springs behind exact constraints, times the largest diagonal entry of C. Stiffer springs need
+        fewer rounds, and solvers that bear them.
     """
 
     stiffness: sparse.csr_matrix
     prolongation: sparse.csr_matrix | None = None
+    factorize: Callable[[sparse.csr_matrix], Factor] = factorize
+    spring: float = 1e7
     _last: list[Any] = field(default_factory=list, repr=False)
 
     @cached_property
@@ -42,7 +49,7 @@ class DirectIntegration:
     @cached_property
     def factor(self) -> Factor:
         """Factor of C, with one vertex of each part grounded."""
-        return factorize(_grounded(self.stiffness, self._first_vertices))
+        return self.factorize(_grounded(self.stiffness, self._first_vertices))
 
     def solve(self, divergence: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² with nothing imposed."""
@@ -97,7 +104,7 @@ class DirectIntegration:
         the springs cost in accuracy.
         """
         stiffness = whole(self.stiffness)
-        spring = _SPRING * self.stiffness.diagonal().max()
+        spring = self.spring * self.stiffness.diagonal().max()
         factor = self._pulled_factor(rows, np.full(rows.shape[0], spring))
         values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
         gap, worst = levels, np.inf
@@ -119,7 +126,7 @@ class DirectIntegration:
             return self._last[1]
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
         unreached = np.isin(self.parts[self._first_vertices], self._part_of(rows), invert=True)
-        factor = factorize(_grounded(matrix, self._first_vertices[unreached]))
+        factor = self.factorize(_grounded(matrix, self._first_vertices[unreached]))
         self._last[:] = key, factor
         return factor
 
