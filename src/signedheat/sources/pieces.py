@@ -13,8 +13,8 @@ from scipy.sparse import csr_matrix
 from ..errors import SourceError
 from ..operators.laid_out_triangles import LaidOutTriangles
 from .curves import Curve, SurfacePoints
-from .places import EDGE, VERTEX, Places, barycentric_in, distinct, has, locate
-from .tracing import trace
+from .places import EDGE, VERTEX, Places, barycentric_in, distinct, locate, shared_faces, star
+from .tracing import join
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +102,8 @@ def _(source: Curve, triangles: LaidOutTriangles, positions: Any = None, number:
     name = f"curve {number}"
     places = locate(triangles, source.faces, source.barycentric, f"{name}: point")
     start = np.arange(source.n_segments)
-    end = (start + 1) % source.n_points
+    places, start, end, segment = join(triangles, places, start, (start + 1) % source.n_points, name)
     faces = shared_faces(triangles, places[start], places[end])
-    segment = start
-    if (faces < 0).any():
-        places, start, end, segment = join(triangles, places, start, end, faces, name)
-        faces = shared_faces(triangles, places[start], places[end])
     first, who = distinct(places)
     ends = np.stack([who[start], who[end]], axis=1)
     at_start = barycentric_in(triangles, faces, places[start])
@@ -135,66 +131,6 @@ def _(source: Curve, triangles: LaidOutTriangles, positions: Any = None, number:
             raise SourceError(f"{name} has normals in space, but this surface has no positions: leave the normals out")
         vectors = np.abs(steps) * given_directions(triangles, positions, faces, edges, source.normals[segment], name)
     return Pieces(places[first], ends, faces, edges, vectors, source.oriented)
-
-
-def join(
-    triangles: LaidOutTriangles,
-    places: Places,
-    start: NDArray[np.int64],
-    end: NDArray[np.int64],
-    faces: NDArray[np.int64],
-    name: str,
-) -> tuple[Places, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Put shortest lines between ends that share no face: all points, starts, ends, and the segment each belongs to."""
-    apart = np.flatnonzero(faces < 0)
-    more_faces, more_weights, counts = trace(triangles, places[start[apart]], places[end[apart]], name, apart)
-    added = np.zeros(len(start), dtype=np.int64)
-    added[apart] = counts
-    segment = np.repeat(np.arange(len(start)), added + 1)
-    offset = np.arange(len(segment)) - np.repeat(np.cumsum(added + 1) - added - 1, added + 1)
-    chain = len(places) + np.repeat(np.cumsum(added) - added, added + 1) + offset
-    starts = np.where(offset == 0, start[segment], chain - 1)
-    ends = np.where(offset == added[segment], end[segment], chain)
-    middle = locate(triangles, more_faces, more_weights, name)
-    both = (places, middle)
-    joined = Places(*(np.concatenate([getattr(p, f) for p in both]) for f in Places.__dataclass_fields__))
-    return joined, starts, ends, segment
-
-
-def shared_faces(triangles: LaidOutTriangles, start: Places, end: Places) -> NDArray[np.int64]:
-    """(k,) a face that has both ends, or −1; the face through which an end was given goes first."""
-    shared = np.where(has(triangles, end.faces, start), end.faces, -1)
-    shared = np.where(has(triangles, start.faces, end), start.faces, shared)
-    left = np.flatnonzero((shared < 0) & (start.kinds < 2))
-    if len(left):
-        which, faces = star(triangles, start[left])
-        fits = has(triangles, faces, end[left[which]])
-        found = np.full(len(left), triangles.n_faces)
-        np.minimum.at(found, which[fits], faces[fits])
-        shared[left] = np.where(found < triangles.n_faces, found, -1)
-    return shared
-
-
-def star(triangles: LaidOutTriangles, places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """All faces at places on edges and vertices: index of the place, and face."""
-    which, faces = [], []
-    for kind, table, count in (
-        (VERTEX, triangles.corner_vertices, triangles.n_vertices),
-        (EDGE, triangles.edges.of_faces, triangles.n_edges),
-    ):
-        members = np.flatnonzero(places.kinds == kind)
-        if not len(members):
-            continue
-        members = members[np.argsort(places.elements[members], kind="stable")]
-        number = np.bincount(places.elements[members], minlength=count)
-        begin = np.cumsum(number) - number
-        face, corner = np.nonzero((number > 0)[table])
-        element = table[face, corner]
-        repeats = number[element]
-        offset = np.arange(repeats.sum()) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-        which.append(members[np.repeat(begin[element], repeats) + offset])
-        faces.append(np.repeat(face, repeats))
-    return np.concatenate(which), np.concatenate(faces)
 
 
 def given_directions(

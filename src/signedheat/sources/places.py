@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,6 +85,43 @@ def locate(
     return Places(faces, inside, kinds, elements, along)
 
 
+def places_at(triangles: LaidOutTriangles, vertices: NDArray[np.int64], name: str = "point") -> Places:
+    """Vertices as places, each through its first face.
+
+    Raises
+    ------
+    SourceError
+        If a vertex does not exist, or no face has it.
+    """
+    vertices = np.asarray(vertices, dtype=np.int64)
+    outside = np.flatnonzero((vertices < 0) | (vertices >= triangles.n_vertices))
+    if len(outside):
+        raise SourceError(
+            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to "
+            f"{triangles.n_vertices - 1}: was it made for another mesh?"
+        )
+    corners = first_corners(triangles.corner_vertices, vertices, triangles.n_vertices)
+    alone = np.flatnonzero(corners < 0)
+    if len(alone):
+        raise SourceError(
+            f"{name} {alone[0]} is vertex {vertices[alone[0]]}, which no face has: choose a vertex of the surface"
+        )
+    weights = np.zeros((len(vertices), 3))
+    weights[np.arange(len(vertices)), corners % 3] = 1.0
+    kinds = np.full(len(vertices), VERTEX)
+    return Places(corners // 3, weights, kinds, vertices, np.zeros(len(vertices)))
+
+
+def first_corners(faces: NDArray[np.int64], vertices: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
+    """Place in ``faces.ravel()`` at which each vertex appears first; −1 where it does not."""
+    wanted = np.zeros(n_vertices, dtype=bool)
+    wanted[vertices] = True
+    corners = np.flatnonzero(wanted[faces])[::-1]
+    first = np.full(n_vertices, -1)
+    first[faces.ravel()[corners]] = corners
+    return first[vertices]
+
+
 def has(triangles: LaidOutTriangles, faces: NDArray[np.int64], places: Places) -> NDArray[np.bool_]:
     """(n,) whether face k has place k."""
     return np.choose(
@@ -116,6 +154,43 @@ def barycentric_in(triangles: LaidOutTriangles, faces: NDArray[np.int64], places
     return weights
 
 
+def shared_faces(triangles: LaidOutTriangles, start: Places, end: Places) -> NDArray[np.int64]:
+    """(k,) a face that has both ends, or −1; the face through which an end was given goes first."""
+    shared = np.where(has(triangles, end.faces, start), end.faces, -1)
+    shared = np.where(has(triangles, start.faces, end), start.faces, shared)
+    left = np.flatnonzero((shared < 0) & (start.kinds != FACE))
+    if len(left):
+        which, faces = star(triangles, start[left])
+        fits = has(triangles, faces, end[left[which]])
+        found = np.full(len(left), triangles.n_faces)
+        np.minimum.at(found, which[fits], faces[fits])
+        shared[left] = np.where(found < triangles.n_faces, found, -1)
+    return shared
+
+
+def star(triangles: LaidOutTriangles, places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """All faces that have each place, as pairs: index of the place, and face."""
+    inside = np.flatnonzero(places.kinds == FACE)
+    which, faces = [inside], [places.elements[inside]]
+    for kind, table, count in (
+        (VERTEX, triangles.corner_vertices, triangles.n_vertices),
+        (EDGE, triangles.edges.of_faces, triangles.n_edges),
+    ):
+        members = np.flatnonzero(places.kinds == kind)
+        if not len(members):
+            continue
+        members = members[np.argsort(places.elements[members], kind="stable")]
+        number = np.bincount(places.elements[members], minlength=count)
+        begin = np.cumsum(number) - number
+        face, corner = np.nonzero((number > 0)[table])
+        element = table[face, corner]
+        repeats = number[element]
+        offset = np.arange(repeats.sum()) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+        which.append(members[np.repeat(begin[element], repeats) + offset])
+        faces.append(np.repeat(face, repeats))
+    return np.concatenate(which), np.concatenate(faces)
+
+
 def distinct(places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Points that coincide counted once, in order of first appearance: index of the first of each, and who is who."""
     inner = np.where((places.kinds == FACE)[:, None], places.barycentric, 0.0)
@@ -132,3 +207,8 @@ def distinct(places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     rank = np.empty_like(first)
     rank[np.argsort(first)] = np.arange(len(first))
     return np.sort(first), rank[group]
+
+
+def chained(parts: Sequence[Places]) -> Places:
+    """Places one after another."""
+    return Places(*(np.concatenate([getattr(p, f) for p in parts]) for f in Places.__dataclass_fields__))

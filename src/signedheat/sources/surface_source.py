@@ -15,7 +15,7 @@ from ..errors import SourceError
 from ..operators.laid_out_triangles import LaidOutTriangles
 from .free_ends import free_end_arcs
 from .pieces import Pieces, pieces, rows_of
-from .places import VERTEX, Places, distinct
+from .places import VERTEX, chained, distinct
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,8 +200,7 @@ def line_elements(part: Pieces, spacing: float) -> NDArray[np.float64]:
 
 def connected(parts: Sequence[Pieces]) -> NDArray[np.int64]:
     """(s,) connected component of every node, over all sources, in order of first appearance."""
-    nodes = Places(*(np.concatenate([getattr(p.nodes, f) for p in parts]) for f in Places.__dataclass_fields__))
-    first, who = distinct(nodes)
+    first, who = distinct(chained([p.nodes for p in parts]))
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
     ends = who[np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])]
     graph = csr_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(first), len(first)))

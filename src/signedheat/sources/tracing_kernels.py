@@ -1,0 +1,306 @@
+"""Compiled kernels that find shortest lines across laid-out triangles.
+
+Side ``3 f + k`` of face f runs from corner k to corner k + 1. A *sleeve* is a sequence of faces, each left through a
+side and the next one entered through another side of the same edge.
+"""
+
+from __future__ import annotations
+
+from heapq import heappop, heappush
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def group(members, n):
+    """Positions of 0 … n−1 in `members`: where each one's begin, and the positions themselves."""
+    begin = np.zeros(n + 1, np.int64)
+    for m in members:
+        begin[m + 1] += 1
+    for k in range(n):
+        begin[k + 1] += begin[k]
+    cursor = begin[:-1].copy()
+    positions = np.empty(len(members), np.int64)
+    for position, m in enumerate(members):
+        positions[cursor[m]] = position
+        cursor[m] += 1
+    return begin, positions
+
+
+@njit(cache=True)
+def middle(corners, h):
+    """Midpoint of a side, in the layout of its face."""
+    return 0.5 * (corners[h // 3, h % 3] + corners[h // 3, (h % 3 + 1) % 3])
+
+
+@njit(cache=True)
+def find_sleeve(corners, edge_of, around, starts, start_points, ends, end_points, cost, leave, enter):
+    """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
+
+    Returns the sides through which all faces but the last are left, and those through which all but the first are
+    entered; none if there is no way. `cost`, `leave` and `enter` are room to work in, given back as they were.
+    """
+    heap = [(0.0, np.int64(0))]
+    heap.pop()
+    touched = [np.int64(0)]
+    touched.pop()
+    begin, sides = around
+    for s in range(len(starts)):
+        for k in range(3):
+            h = 3 * starts[s] + k
+            d = abs(middle(corners, h) - start_points[s])
+            e = edge_of[h]
+            if d < cost[e]:
+                cost[e], leave[e], enter[e] = d, h, -1
+                touched.append(e)
+                heappush(heap, (d, e))
+    best, last = np.inf, np.int64(-1)
+    while len(heap) > 0:
+        d, e = heappop(heap)
+        if d >= best:
+            break
+        if d > cost[e]:
+            continue
+        for h in sides[begin[e] : begin[e + 1]]:
+            if h == leave[e]:
+                continue
+            here = middle(corners, h)
+            for s in range(len(ends)):
+                if ends[s] == h // 3 and d + abs(here - end_points[s]) < best:
+                    best, last = d + abs(here - end_points[s]), h
+            for turn in range(1, 3):
+                out = h - h % 3 + (h + turn) % 3
+                there = d + abs(middle(corners, out) - here)
+                to = edge_of[out]
+                if there < cost[to]:
+                    cost[to], leave[to], enter[to] = there, out, h
+                    touched.append(to)
+                    heappush(heap, (there, to))
+    left, entered = [np.int64(0)], [np.int64(0)]
+    left.pop()
+    entered.pop()
+    while last >= 0:
+        entered.append(last)
+        left.append(leave[edge_of[last]])
+        last = enter[edge_of[last]]
+    for e in touched:
+        cost[e] = np.inf
+    return left[::-1], entered[::-1]
+
+
+@njit(cache=True)
+def unfold(corners, forward, left, entered):
+    """Lay out a sleeve in the plane of its first face: tails and heads of the sides left, and the last face.
+
+    Also whether each face, the last one included, lies there turned over.
+    """
+    n = len(left)
+    tails, heads = np.empty(n, np.complex128), np.empty(n, np.complex128)
+    over = np.zeros(n + 1, np.bool_)
+    placed = corners[left[0] // 3].copy()
+    for i in range(n):
+        k = left[i] % 3
+        tails[i], heads[i] = placed[k], placed[(k + 1) % 3]
+        face, side = entered[i] // 3, entered[i] % 3
+        same = forward[left[i]] == forward[entered[i]]
+        a, b = (tails[i], heads[i]) if same else (heads[i], tails[i])
+        over[i + 1] = over[i] != same
+        base = corners[face, (side + 1) % 3] - corners[face, side]
+        apex = corners[face, (side + 2) % 3] - corners[face, side]
+        ratio = apex / base if abs(base) > 0 else 0j
+        if over[i + 1]:
+            ratio = np.conj(ratio)
+        placed[side], placed[(side + 1) % 3], placed[(side + 2) % 3] = a, b, a + ratio * (b - a)
+    return tails, heads, over, placed
+
+
+@njit(cache=True)
+def turns(a, b):
+    """Positive where b is counter-clockwise of a."""
+    return a.real * b.imag - a.imag * b.real
+
+
+@njit(cache=True)
+def pull(tails, heads, over, start, end):
+    """Pull a string tight inside an unfolded sleeve: the portals at which it bends, and whether to their left.
+
+    The simple funnel algorithm. Also the length.
+    """
+    n = len(tails)
+    bends, to_left = [np.int64(0)], [False]
+    bends.pop()
+    to_left.pop()
+    apex = left = right = start
+    at_left = at_right = -1
+    total = 0.0
+    i = 0
+    while i <= n:
+        if i == n:
+            l = r = end
+        elif over[i]:
+            l, r = tails[i], heads[i]
+        else:
+            l, r = heads[i], tails[i]
+        if turns(right - apex, r - apex) >= 0:
+            if apex == right or turns(left - apex, r - apex) < 0:
+                if i < n:
+                    right, at_right = r, i
+            else:
+                bends.append(at_left)
+                to_left.append(True)
+                total += abs(left - apex)
+                apex = right = left
+                i = at_right = at_left
+                i += 1
+                continue
+        if turns(left - apex, l - apex) <= 0:
+            if apex == left or turns(right - apex, l - apex) > 0:
+                if i < n:
+                    left, at_left = l, i
+            else:
+                bends.append(at_right)
+                to_left.append(False)
+                total += abs(right - apex)
+                apex = left = right
+                i = at_left = at_right
+                i += 1
+                continue
+        i += 1
+    return bends, to_left, total + abs(end - apex)
+
+
+@njit(cache=True)
+def other_way(edge_of, forward, around, left, entered, tails, heads, bend, point):
+    """The sleeve that passes the vertex of a bend on its other side; empty where no faces lead there."""
+    begin, sides = around
+    first = last = bend
+    while first > 0 and (tails[first - 1] == point or heads[first - 1] == point):
+        first -= 1
+    while last + 1 < len(left) and (tails[last + 1] == point or heads[last + 1] == point):
+        last += 1
+    goal = entered[last] // 3
+    new_left, new_entered = left[:first], entered[:first]
+    h, at_tail = left[first], tails[first] == point
+    for _ in range(len(sides)):
+        # the other side of this face at the vertex
+        h = h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
+        at_tail = not at_tail
+        e = edge_of[h]
+        if begin[e + 1] - begin[e] != 2:
+            break
+        across = sides[begin[e]] if sides[begin[e]] != h else sides[begin[e] + 1]
+        new_left.append(h)
+        new_entered.append(across)
+        if forward[h] != forward[across]:
+            at_tail = not at_tail
+        h = across
+        if h // 3 == goal:
+            return new_left + left[last + 1 :], new_entered + entered[last + 1 :]
+        if h // 3 == left[first] // 3:
+            break
+    return left[:0], entered[:0]
+
+
+@njit(cache=True)
+def point_in(faces, points, face):
+    """The point of a face in its layout, from a list."""
+    for s in range(len(faces)):
+        if faces[s] == face:
+            return points[s]
+    return points[0]
+
+
+@njit(cache=True)
+def straighten(corners, edge_of, forward, around, left, entered, starts, start_points, ends, end_points):
+    """The shortest line in a sleeve, and in those that can be had from it by passing vertices on their other side.
+
+    Returns the sides crossed and how far along each.
+    """
+    tails, heads, over, placed = unfold(corners, forward, left, entered)
+    begin = point_in(starts, start_points, left[0] // 3)
+    end = locate_end(corners, entered, placed, over, ends, end_points)
+    bends, to_left, length = pull(tails, heads, over, begin, end)
+    k = 0
+    while k < len(bends):
+        i = bends[k]
+        point = heads[i] if to_left[k] != over[i] else tails[i]
+        try_left, try_entered = other_way(edge_of, forward, around, left, entered, tails, heads, i, point)
+        k += 1
+        if len(try_left) == 0:
+            continue
+        t, h, o, p = unfold(corners, forward, try_left, try_entered)
+        b = point_in(starts, start_points, try_left[0] // 3)
+        f = locate_end(corners, try_entered, p, o, ends, end_points)
+        try_bends, try_to_left, shorter = pull(t, h, o, b, f)
+        if shorter < length * (1 - 1e-12):
+            left, entered, tails, heads, over, begin, end = try_left, try_entered, t, h, o, b, f
+            bends, to_left, length = try_bends, try_to_left, shorter
+            k = 0
+    fractions = np.empty(len(left))
+    here, k = begin, 0
+    for i in range(len(left)):
+        if k < len(bends) and bends[k] == i:
+            fractions[i] = 1.0 if to_left[k] != over[i] else 0.0
+            here = heads[i] if to_left[k] != over[i] else tails[i]
+            k += 1
+            continue
+        if k == len(bends):
+            there = end
+        else:
+            j = bends[k]
+            there = heads[j] if to_left[k] != over[j] else tails[j]
+        along, span = there - here, heads[i] - tails[i]
+        across = turns(along, span)
+        if across != 0:
+            fractions[i] = turns(along, here - tails[i]) / across
+        else:
+            fractions[i] = (np.conj(span) * (here - tails[i])).real / max(abs(span) ** 2, 1e-300)
+        fractions[i] = min(max(fractions[i], 0.0), 1.0)
+    return left, fractions
+
+
+@njit(cache=True)
+def locate_end(corners, entered, placed, over, ends, end_points):
+    """The end of a line in the plane of its sleeve's first face."""
+    face = entered[-1] // 3
+    point = point_in(ends, end_points, face)
+    q = corners[face]
+    base = q[1] - q[0]
+    ratio = (point - q[0]) / base if abs(base) > 0 else 0j
+    if over[-1]:
+        ratio = np.conj(ratio)
+    return placed[0] + ratio * (placed[1] - placed[0])
+
+
+@njit(cache=True)
+def shortest_lines(corners, edge_of, forward, n_edges, starts, start_points, start_at, ends, end_points, end_at):
+    """Shortest lines for many pairs of places: sides crossed, fractions along them, and their number for each pair.
+
+    Faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` says where it lies in
+    the layout of each; likewise for ends. The number is −1 where there is no way.
+    """
+    around = group(edge_of, n_edges)
+    cost = np.full(n_edges, np.inf)
+    leave, enter = np.empty(n_edges, np.int64), np.empty(n_edges, np.int64)
+    counts = np.empty(len(start_at) - 1, np.int64)
+    sides, fractions = [np.int64(0)], [0.0]
+    sides.pop()
+    fractions.pop()
+    for job in range(len(counts)):
+        s = slice(start_at[job], start_at[job + 1])
+        e = slice(end_at[job], end_at[job + 1])
+        left, entered = find_sleeve(
+            corners, edge_of, around, starts[s], start_points[s], ends[e], end_points[e], cost, leave, enter
+        )
+        if len(left) == 0:
+            counts[job] = -1
+            continue
+        crossed, where = straighten(
+            corners, edge_of, forward, around, left, entered, starts[s], start_points[s], ends[e], end_points[e]
+        )
+        counts[job] = len(crossed)
+        for k in range(len(crossed)):
+            sides.append(crossed[k])
+            fractions.append(where[k])
+    return np.array(sides), np.array(fractions), counts
