@@ -18,11 +18,12 @@ PER_FACE = ("tail", "edge", "forward", "front", "ring")
 PER_EDGE = ("start", "length", "fixed")
 
 
-def refine_all(gluing: Gluing, angle: float, max_vertices: int) -> tuple[Gluing, bool]:
+def refine_all(gluing: Gluing, angle: float, needle: float, max_vertices: int) -> tuple[Gluing, bool]:
     """Refine a Delaunay triangulation until every face that can be helped has no angle below `angle`.
 
     Fixed, boundary and nonmanifold edges may be split but stay. Small angles remain where fixed edges meet, or the
-    surface closes up, at less than 60°, and where the limit on the number of vertices is reached first.
+    surface closes up, at less than 60°; where vertices all but coincide; and where the limit on the number of vertices
+    is reached first.
 
     Parameters
     ----------
@@ -30,6 +31,9 @@ def refine_all(gluing: Gluing, angle: float, max_vertices: int) -> tuple[Gluing,
         Delaunay, as `flip_all` returns it; changed.
     angle : float
         Radians.
+    needle : float
+        Radians. Faces with a smaller angle are left alone, unless another of their angles exceeds 150°: two vertices
+        all but coincide there, and grading the faces towards them would take many more, for no gain in accuracy.
     max_vertices : int
         Stop when there are as many.
 
@@ -40,7 +44,7 @@ def refine_all(gluing: Gluing, angle: float, max_vertices: int) -> tuple[Gluing,
     bool
         Whether it was finished before the limit.
     """
-    from .refinement_kernels import FULL, GROW, N_BINS, Agenda, list_all, refine
+    from .refinement_kernels import FULL, GROW, N_BINS, Agenda, Goal, list_all, refine
 
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
@@ -65,9 +69,10 @@ def refine_all(gluing: Gluing, angle: float, max_vertices: int) -> tuple[Gluing,
         room=np.empty((4096, 5)),
         halfedges=np.empty(4096, dtype=np.int64),
     )
-    list_all(gluing, agenda, angle)
+    goal = Goal(np.tan(angle / 2) ** 2, np.tan(needle / 2) ** 2, max_vertices)
+    list_all(gluing, agenda, goal)
     while True:
-        status = refine(gluing, agenda, angle, max_vertices)
+        status = refine(gluing, agenda, goal)
         if status != GROW:
             return gluing, status != FULL
         gluing = gluing._replace(**{k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")})

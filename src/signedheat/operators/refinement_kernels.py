@@ -63,22 +63,29 @@ class Agenda(NamedTuple):
     halfedges: NDArray[np.int64]
 
 
+class Goal(NamedTuple):
+    """When refinement is done: squared tangents of half the angles, and the largest number of vertices."""
+
+    angle: float
+    needle: float
+    max_vertices: int
+
+
 @njit(cache=True)
-def refine(g, agenda, angle, max_vertices):
-    """Insert vertices until no face that can be helped has an angle below `angle` (radians)."""
-    bound = np.tan(0.5 * angle) ** 2
+def refine(g, agenda, goal):
+    """Insert vertices until no face that can be helped has a smaller angle than the goal."""
     while settle(g, agenda.stack, agenda.stacked):
         for n in range(agenda.seen[0], g.counts[3]):
             for f in changed_faces(g, n):
-                list_face(g, agenda, f, bound)
+                list_face(g, agenda, f, goal)
         agenda.seen[0] = g.counts[3]
-        f = next_thin(g, agenda, bound)
+        f = next_thin(g, agenda, goal)
         if f < 0:
             return DONE
-        if g.counts[2] >= max_vertices:
+        if g.counts[2] >= goal.max_vertices:
             return FULL
-        if not improve(g, agenda, f, bound):
-            list_face(g, agenda, f, bound)
+        if not improve(g, agenda, f, goal):
+            list_face(g, agenda, f, goal)
             return GROW
     return GROW
 
@@ -97,20 +104,20 @@ def changed_faces(g, n):
 
 
 @njit(cache=True)
-def is_thin(g, f, bound):
-    """Whether the smallest angle of a face, opposite to its shortest side, is below the bound; and the side."""
+def is_thin(g, f, goal):
+    """Whether the smallest angle of a face, opposite to its shortest side, is below the goal; and the side."""
     h = 3 * f
     for k in range(1, 3):
         if g.length[g.edge[3 * f + k]] < g.length[g.edge[h]]:
             h = 3 * f + k
     n, d = tangent_at(g, preceding(h))
-    return n < bound * d, h
+    return n < goal.angle * d, h
 
 
 @njit(cache=True)
-def list_face(g, agenda, f, bound):
+def list_face(g, agenda, f, goal):
     """Put a thin face on the lists."""
-    thin, h = is_thin(g, f, bound)
+    thin, h = is_thin(g, f, goal)
     if agenda.listed[f] or not thin:
         return
     n, d = tangent_at(g, preceding(h))
@@ -122,37 +129,37 @@ def list_face(g, agenda, f, bound):
 
 
 @njit(cache=True)
-def list_all(g, agenda, angle):
+def list_all(g, agenda, goal):
     """Put every thin face on the lists."""
     for f in range(g.counts[0]):
-        list_face(g, agenda, f, np.tan(0.5 * angle) ** 2)
+        list_face(g, agenda, f, goal)
 
 
 @njit(cache=True)
-def next_thin(g, agenda, bound):
+def next_thin(g, agenda, goal):
     """The thin face of (nearly) the largest circumradius, or −1."""
     for place in range(N_BINS - 1, -1, -1):
         while agenda.bins[place] >= 0:
             f = agenda.bins[place]
             agenda.bins[place] = agenda.next_face[f]
             agenda.listed[f] = False
-            if is_thin(g, f, bound)[0]:
+            if is_thin(g, f, goal)[0]:
                 return f
     return -1
 
 
 @njit(cache=True)
-def improve(g, agenda, f, bound):
+def improve(g, agenda, f, goal):
     """Insert one vertex for the sake of a thin face, if that can help; False if there is no room for it."""
-    h = is_thin(g, f, bound)[1]
-    if is_hopeless(g, agenda, h):
+    h = is_thin(g, f, goal)[1]
+    if is_hopeless(g, agenda, h) or is_needle(g, h, goal):
         return True
     outcome, place, x, y = find_circumcenter(g, f)
     if outcome == LOST:
         return True
     segment = place if outcome == BLOCKED else encroached(g, agenda, place, x, y)
     if segment >= 0:
-        return split_segment(g, agenda, segment, f, bound)
+        return split_segment(g, agenda, segment, f, goal)
     if not has_room(g, agenda, 2):
         return False
     insert(g, agenda, place, x, y)
@@ -174,6 +181,15 @@ def is_hopeless(g, agenda, h):
             if shared == agenda.segment_ends[b, l] and agenda.narrow[shared]:
                 return True
     return False
+
+
+@njit(cache=True)
+def is_needle(g, h, goal):
+    """Whether the ends of h all but coincide, and no angle of the face exceeds 150°: thin, but harmless."""
+    n, d = tangent_at(g, preceding(h))
+    n1, d1 = tangent_at(g, h)
+    n2, d2 = tangent_at(g, following(h))
+    return n < goal.needle * d and n1 < 13.9 * d1 and n2 < 13.9 * d2
 
 
 @njit(cache=True)
@@ -352,7 +368,7 @@ def insert(g, agenda, f, px, py):
 
 
 @njit(cache=True)
-def split_segment(g, agenda, h, f, bound):
+def split_segment(g, agenda, h, f, goal):
     """Split a segment that stands in the way of healing face f; False if there is no room for it.
 
     In the middle; but near an end where segments meet in a small angle at a power of two from it, so that the parts of
@@ -383,5 +399,5 @@ def split_segment(g, agenda, h, f, bound):
             agenda.segment[k] = segment if g.fixed[k] else -1
     agenda.narrow[g.counts[2] - 1] = False
     look_around(g, agenda, step)
-    list_face(g, agenda, f, bound)
+    list_face(g, agenda, f, goal)
     return True
