@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -118,7 +119,7 @@ class Grid:
     @property
     def n_nodes(self) -> int:
         """Number of nodes."""
-        return int(np.prod(self.shape, dtype=np.int64))
+        return math.prod(self.shape)
 
     @property
     def upper(self) -> NDArray[np.float64]:

@@ -118,8 +118,8 @@ def inspect(shape: TriangleMesh | PolygonMesh | PointCloud) -> SurfaceReport | C
             has_normals=shape.normals is not None,
             has_areas=shape.areas is not None,
             duplicate_points=_n_repeated(shape.points),
-            lower=_tuple(shape.points.min(axis=0)),
-            upper=_tuple(shape.points.max(axis=0)),
+            lower=_tuple(shape.bounds[0]),
+            upper=_tuple(shape.bounds[1]),
         )
     return _inspect_surface(shape)
 
@@ -149,7 +149,6 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
     repeats[1:] = (tail[by_face][1:] == tail[by_face][:-1]) & (face[by_face][1:] == face[by_face][:-1])
     degenerate = areas <= _roundoff(polygons)
     degenerate[face[by_face][repeats]] = True
-    bounds = polygons.vertices[referenced]
     return SurfaceReport(
         n_vertices=n_vertices,
         n_faces=polygons.n_polygons,
@@ -166,8 +165,8 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
         duplicate_vertices=_n_repeated(polygons.vertices),
         unreferenced_vertices=n_vertices - len(referenced),
         area=float(areas.sum()),
-        lower=_tuple(bounds.min(axis=0)),
-        upper=_tuple(bounds.max(axis=0)),
+        lower=_tuple(mesh.bounds[0]),
+        upper=_tuple(mesh.bounds[1]),
     )
 
 

@@ -1,0 +1,85 @@
+"""From options to a field: what `volume`, `offset` and `demo` have in common."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from ..domains.grid import Grid
+from ..errors import SignedHeatError
+from ..fields.grid_field import GridField
+from ..solver import SignedHeatSolver
+from .options import Parser
+from .progress import ProgressBar
+
+RESOLUTION = 128
+
+
+@contextmanager
+def naming(path: Any) -> Iterator[None]:
+    """Put the name of the input in front of errors that concern it."""
+    try:
+        yield
+    except SignedHeatError as error:
+        if str(error).startswith(str(path)):
+            raise
+        raise type(error)(f"{path}: {error}") from error
+
+
+def check_grid_options(parser: Parser, arguments: Namespace) -> None:
+    """Refuse options that contradict each other."""
+    own = arguments.origin is not None or arguments.grid_shape is not None
+    spacing = arguments.spacing
+    if spacing is not None and len(spacing) not in (1, 3):
+        parser.error(f"argument --spacing: one number or three, not {len(spacing)}")
+    if own and (arguments.origin is None or arguments.grid_shape is None or spacing is None):
+        parser.error("a grid of your own needs all of --origin, --spacing and --shape")
+    if own and (arguments.resolution is not None or arguments.padding is not None):
+        parser.error("--resolution and --padding do not go with --origin and --shape")
+    if spacing is not None and arguments.resolution is not None:
+        parser.error("--resolution does not go with --spacing: give one of them")
+
+
+def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
+    """The grid that the options ask for, with room for offsets up to `reach` unless they say otherwise."""
+    if arguments.origin is not None:
+        spacing = arguments.spacing if len(arguments.spacing) == 3 else arguments.spacing[0]
+        return Grid(arguments.origin, spacing, arguments.grid_shape)
+    spacing = None
+    if arguments.spacing is not None:
+        spacing = arguments.spacing if len(arguments.spacing) == 3 else arguments.spacing[0]
+    options = {"resolution": arguments.resolution or RESOLUTION, "spacing": spacing}
+    if arguments.padding is not None or reach == 0:
+        return Grid.around(shape.bounds, padding=arguments.padding, **options)
+    longest = float(np.ptp(shape.bounds, axis=0).max())
+    return Grid.around(shape.bounds, padding=0.15 * longest + 1.05 * reach, **options)
+
+
+def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
+    """The field, sharpened unless the options say otherwise."""
+    from .. import sharpen
+
+    with ProgressBar(arguments.quiet or arguments.json) as progress:
+        share = 0.8 if not arguments.plain else 1.0
+        solver = SignedHeatSolver(grid, arguments.diffusion, lambda done, step: progress(share * done, step))
+        field = solver.distance(shape, arguments.constraint)
+        if arguments.plain:
+            return field
+        progress(share, "sharpen")
+        return sharpen(field)
+
+
+def describe(field: GridField) -> dict[str, Any]:
+    """A field in numbers, for ``--json``."""
+    return {
+        "origin": field.grid.origin.tolist(),
+        "spacing": field.grid.spacing.tolist(),
+        "shape": list(field.grid.shape),
+        "minimum": float(np.min(field.values)),
+        "maximum": float(np.max(field.values)),
+        "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
+    }

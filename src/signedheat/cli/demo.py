@@ -1,0 +1,85 @@
+"""``signedheat demo``: the whole way, on a broken duck that needs no file."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
+
+from ..constraints import ZeroSet
+from ..domains.grid import Grid
+from ..domains.inspection import inspect
+from ..errors import FileFormatError
+from ..io import ensure_writable, save, save_field
+from ..io.files import PathLike, replacing
+from ..samples import broken_duck
+from ..viewing import draw_shape, draw_slices, new_figure
+from .computing import compute, describe
+from .options import Summary, add_command, whole_number
+
+DISTANCE = 0.15
+
+
+def add_to(commands: Any) -> None:
+    """Register the command."""
+    parser = add_command(
+        commands,
+        "demo",
+        run=run,
+        help="try it on a broken duck that comes along",
+        description="Make a broken shape, its distance field, an offset surface and a picture.",
+    )
+    parser.add_argument("-o", "--output", default="demo", metavar="FOLDER", help="where to (demo)")
+    parser.add_argument(
+        "--resolution", type=whole_number(8), default=128, metavar="N", help="nodes along the longest side"
+    )
+
+
+def run(arguments: Namespace) -> Summary:
+    """Make everything in one folder."""
+    folder = Path(arguments.output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileFormatError(f"{folder}: cannot be made a folder ({error.strerror}): name another") from error
+    files = {name: folder / name for name in ("duck.stl", "distance.vti", "offset.stl", "picture.png")}
+    for path in files.values():
+        ensure_writable(path, {path.suffix}, "a file")
+    shape = broken_duck()
+    save(shape, files["duck.stl"])
+    grid = Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)
+    options = Namespace(**vars(arguments), plain=False, constraint=ZeroSet(), diffusion=1.0)
+    field = compute(shape, grid, options)
+    surface = field.offset(DISTANCE)
+    save_field(field, files["distance.vti"])
+    save(surface, files["offset.stl"])
+    draw_story(shape, field, surface, files["picture.png"])
+    broken, whole = inspect(shape), inspect(surface)
+    text = "\n".join(
+        [
+            f"{files['duck.stl']}: the input: {broken.open_edges} open edges, {broken.nonmanifold_edges} nonmanifold, "
+            f"{broken.inconsistent_edges} inconsistent",
+            f"{files['distance.vti']}: its signed distance at {' × '.join(map(str, grid.shape))} nodes",
+            f"{files['offset.stl']}: the surface {DISTANCE:g} outside: {whole.open_edges} open edges, "
+            f"{whole.nonmanifold_edges} nonmanifold, {whole.inconsistent_edges} inconsistent",
+            f"{files['picture.png']}: a picture of them",
+        ]
+    )
+    summary = {"files": [str(path) for path in files.values()], "distance": DISTANCE, "field": describe(field)}
+    return summary, text
+
+
+def draw_story(shape: Any, field: Any, surface: Any, path: PathLike) -> None:
+    """The broken shape, a slice of its distance, the closed offset surface."""
+    figure = new_figure(13.5, 4.6)
+    before = figure.add_subplot(1, 3, 1, projection="3d")
+    draw_shape(shape, before)
+    before.set_title("in: holes, noise, flipped and\nduplicate faces", fontsize=11)
+    middle = figure.add_subplot(1, 3, 2)
+    draw_slices(field, [middle], shape, [DISTANCE], across=(1,))
+    middle.set_title("its signed distance", fontsize=11)
+    after = figure.add_subplot(1, 3, 3, projection="3d")
+    draw_shape(surface, after)
+    after.set_title(f"out: the closed surface at +{DISTANCE:g}", fontsize=11)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=110)

@@ -1,0 +1,115 @@
+"""Options that several commands share, and how they become grids and constraints."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+import sys
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from ..constraints import Constraint, EachComponent, Free, Soft, ZeroSet
+
+Summary = tuple[dict[str, Any], str]
+"""What a command did: for ``--json``, and as text for people."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, and takes negative numbers, 1e-3 style included, for numbers."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._negative_number_matcher = re.compile(r"^-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2."""
+        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
+        raise SystemExit(2)
+
+
+def add_command(commands: Any, name: str, run: Callable[..., Summary], help: str, description: str) -> Parser:
+    """A command with the options that all have."""
+    parser = commands.add_parser(name, help=help, description=description)
+    parser.set_defaults(run=run)
+    parser.add_argument("--json", action="store_true", help="print a summary as JSON")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    return parser
+
+
+def add_grid_options(parser: Parser) -> None:
+    """Where the grid is, how fine, and how the distance is computed."""
+    grid = parser.add_argument_group("grid (by default around the shape)")
+    grid.add_argument("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side (128)")
+    grid.add_argument(
+        "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each of x y z"
+    )
+    grid.add_argument("--padding", type=not_negative, metavar="P", help="room around the shape, in its units")
+    grid.add_argument(
+        "--origin", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="first node of a grid of your own"
+    )
+    grid.add_argument(
+        "--shape", type=whole_number(2), nargs=3, metavar=("NX", "NY", "NZ"), dest="grid_shape", help="its nodes"
+    )
+    method = parser.add_argument_group("method")
+    method.add_argument("--plain", action="store_true", help="the paper's field, not sharpened")
+    method.add_argument(
+        "--constraint",
+        type=constraint,
+        default=ZeroSet(),
+        metavar="C",
+        help="free, zero-set (default), hard, each-component, or soft:WEIGHT",
+    )
+    method.add_argument(
+        "--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"
+    )
+    parser.add_argument("--preview", metavar="PNG", help="draw three slices of the result")
+
+
+def constraint(word: str) -> Constraint:
+    """A constraint from its name on the command line."""
+    name, _, weight = word.partition(":")
+    known = {"free": Free(), "zero-set": ZeroSet(), "hard": ZeroSet(hard=True), "each-component": EachComponent()}
+    if name == "soft":
+        return Soft(positive(weight))
+    if word not in known:
+        raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(known)}, soft:WEIGHT")
+    return known[word]
+
+
+def finite(word: str) -> float:
+    """A number."""
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"'{word}' is no finite number")
+    return value
+
+
+def positive(word: str) -> float:
+    """A number above zero."""
+    value = finite(word)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{word} is not positive")
+    return value
+
+
+def not_negative(word: str) -> float:
+    """A number from zero on."""
+    value = finite(word)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{word} is negative")
+    return value
+
+
+def whole_number(least: int) -> Callable[[str], int]:
+    """A whole number from `least` on."""
+
+    def parse(word: str) -> int:
+        if not re.fullmatch(r"[-+]?\d+", word) or int(word) < least:
+            raise argparse.ArgumentTypeError(f"'{word}' is no whole number from {least} on")
+        return int(word)
+
+    return parse

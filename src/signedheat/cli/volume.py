@@ -1,0 +1,45 @@
+"""``signedheat volume``: a broken shape in, its signed distance on a grid out."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import Any
+
+from ..io import FIELD_FORMATS, ensure_writable, read, save_field
+from ..viewing import PICTURE_FORMATS, save_slices
+from .computing import check_grid_options, compute, describe, grid_for, naming
+from .options import Parser, Summary, add_command, add_grid_options
+
+
+def add_to(commands: Any) -> None:
+    """Register the command."""
+    parser = add_command(
+        commands,
+        "volume",
+        run=lambda arguments: run(parser, arguments),
+        help="signed distance on a grid",
+        description="Signed distance to a shape, broken or not, at the nodes of a grid.",
+    )
+    parser.add_argument(
+        "shape", metavar="SHAPE", help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc"
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="field: .npz .vti .nrrd .npy .vdb")
+    add_grid_options(parser)
+
+
+def run(parser: Parser, arguments: Namespace) -> Summary:
+    """Read, check that the result can be written, compute, write."""
+    check_grid_options(parser, arguments)
+    ensure_writable(arguments.output, FIELD_FORMATS, "a field")
+    if arguments.preview:
+        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+    shape = read(arguments.shape)
+    with naming(arguments.shape):
+        field = compute(shape, grid_for(shape, arguments), arguments)
+    save_field(field, arguments.output)
+    if arguments.preview:
+        save_slices(field, arguments.preview, shape)
+    summary = {"input": arguments.shape, "output": arguments.output, **describe(field)}
+    nodes = " × ".join(map(str, field.grid.shape))
+    text = f"{arguments.output}: {nodes} nodes, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
+    return summary, text
