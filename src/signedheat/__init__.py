@@ -17,10 +17,11 @@ from .errors import (
     SourceError,
     UnreachedWarning,
 )
+from .fields.grid_field import GridField
 from .fields.vertex_field import VertexField
+from .io import load_field, read, save
 from .lowering import polygons as _polygons  # noqa: F401  registers the lowering
 from .lowering import surface as _surface  # noqa: F401  registers the lowering
-from .fields.grid_field import GridField
 from .solver import SignedHeatSolver
 from .sources.curves import Curve, SurfacePoints
 
@@ -51,4 +52,7 @@ __all__ = [
     "UnreachedWarning",
     "VertexField",
     "ZeroSet",
+    "load_field",
+    "read",
+    "save",
 ]

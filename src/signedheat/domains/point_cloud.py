@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from .exchange import Exchangeable
 from .validation import finite_rows, frozen
 
 
 @dataclass(frozen=True, eq=False)
-class PointCloud:
+class PointCloud(Exchangeable):
     """Points in space of any dimension, with or without normals and areas.
 
     Parameters

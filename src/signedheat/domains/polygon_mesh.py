@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..operators.virtual_refinement import VirtualRefinement, virtual_refinement
+from .exchange import Exchangeable
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
 
 @dataclass(frozen=True, eq=False)
-class PolygonMesh:
+class PolygonMesh(Exchangeable):
     """Polygons in space.
 
     Parameters

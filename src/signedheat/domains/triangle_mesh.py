@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..operators.edges import EdgeTable, face_edges
+from .exchange import Exchangeable
 from .validation import element_ids, finite_rows
 
 
 @dataclass(frozen=True, eq=False)
-class TriangleMesh:
+class TriangleMesh(Exchangeable):
     """Triangles in space: manifold or not, orientable or not, closed or not.
 
     Parameters

@@ -1,0 +1,110 @@
+"""Shapes from and to the objects of other packages, each of which is imported only where it is used.
+
+Vertices and faces keep their number and order, both ways.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError
+from .elements import faces_of, points_of
+
+_SIDES = {"triangle": 3, "quad": 4}
+
+
+def from_trimesh(kind: type, thing: Any) -> Any:
+    """From a `trimesh.Trimesh` or `trimesh.PointCloud`."""
+    faces = getattr(thing, "faces", np.empty((0, 3), dtype=np.int64))
+    corners = np.asarray(faces, dtype=np.int64)
+    return _build(kind, np.asarray(thing.vertices), corners.ravel(), np.full(len(corners), 3))
+
+
+def to_trimesh(shape: Any) -> Any:
+    """As a `trimesh.Trimesh` (not processed: nothing is merged) or `trimesh.PointCloud`."""
+    import trimesh
+
+    if isinstance(shape, PointCloud):
+        return trimesh.PointCloud(np.array(shape.points))
+    if isinstance(shape, PolygonMesh):
+        raise GeometryError("trimesh holds triangles only, and this is a PolygonMesh: use to_pyvista or to_meshio")
+    return trimesh.Trimesh(np.array(shape.vertices), np.array(shape.faces), process=False)
+
+
+def from_pyvista(kind: type, thing: Any) -> Any:
+    """From a `pyvista.PolyData`; points with point data ``Normals`` have normals."""
+    if getattr(thing, "n_strips", 0):
+        raise GeometryError("the mesh holds triangle strips: call its triangulate() first")
+    faces = np.asarray(thing.faces, dtype=np.int64)
+    starts, at = [], 0
+    while at < len(faces):
+        starts.append(at)
+        at += 1 + int(faces[at])
+    counts = faces[np.array(starts, dtype=np.int64)]
+    normals = thing.point_data.get("Normals") if kind is PointCloud else None
+    return _build(kind, np.asarray(thing.points), np.delete(faces, starts), counts, normals)
+
+
+def to_pyvista(shape: Any) -> Any:
+    """As a `pyvista.PolyData`; normals of points are point data ``Normals``."""
+    import pyvista
+
+    points, (corners, counts) = np.array(points_of(shape)), faces_of(shape)
+    if isinstance(shape, PointCloud):
+        cloud = pyvista.PolyData(points)
+        if shape.normals is not None:
+            cloud.point_data["Normals"] = np.array(shape.normals)
+        return cloud
+    return pyvista.PolyData(points, np.insert(corners, np.cumsum(counts) - counts, counts))
+
+
+def from_meshio(kind: type, thing: Any) -> Any:
+    """From a `meshio.Mesh`: its triangles, quadrilaterals and polygons, block after block."""
+    blocks = [block.data for block in thing.cells if block.type in _SIDES or block.type.startswith("polygon")]
+    corners = [np.asarray(face, dtype=np.int64) for block in blocks for face in block]
+    counts = np.array([len(face) for face in corners], dtype=np.int64)
+    flat = np.concatenate(corners) if corners else np.empty(0, dtype=np.int64)
+    data = thing.point_data
+    normals = np.stack([data[name] for name in ("nx", "ny", "nz")], axis=1) if "nx" in data else data.get("Normals")
+    return _build(kind, thing.points, flat, counts, normals if kind is PointCloud else None)
+
+
+def to_meshio(shape: Any) -> Any:
+    """As a `meshio.Mesh`; normals of points are point data ``nx``, ``ny``, ``nz``."""
+    import meshio
+
+    if isinstance(shape, PointCloud):
+        normals = {} if shape.normals is None else dict(zip(("nx", "ny", "nz"), shape.normals.T.copy(), strict=True))
+        return meshio.Mesh(np.array(shape.points), [("vertex", np.arange(shape.n_points)[:, None])], point_data=normals)
+    corners, counts = faces_of(shape)
+    starts = np.cumsum(counts) - counts
+    change = np.flatnonzero(np.diff(counts, prepend=-1))  # blocks hold faces of one kind, and keep the order
+    cells = []
+    for first, last in zip(change, [*change[1:], len(counts)], strict=True):
+        sides = int(counts[first])
+        name = next((name for name, n in _SIDES.items() if n == sides), "polygon")
+        cells.append((name, corners[starts[first] : starts[first] + sides * (last - first)].reshape(-1, sides)))
+    return meshio.Mesh(np.array(points_of(shape)), cells)
+
+
+def _build(
+    kind: type,
+    points: NDArray[Any],
+    corners: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    normals: NDArray[Any] | None = None,
+) -> Any:
+    if kind is PointCloud:
+        return PointCloud(points, normals)
+    if kind is PolygonMesh:
+        return PolygonMesh(points, np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else [])
+    wrong = np.flatnonzero(counts != 3)
+    if len(wrong):
+        raise GeometryError(f"face {wrong[0]} has {counts[wrong[0]]} corners, not 3: use PolygonMesh instead")
+    return TriangleMesh(points, corners.reshape(-1, 3))
