@@ -20,6 +20,7 @@ from .errors import (
 from .fields.grid_field import GridField
 from .fields.vertex_field import VertexField
 from .io import load_field, read, save
+from .lowering import point_clouds as _point_clouds  # noqa: F401  registers the lowering
 from .lowering import polygons as _polygons  # noqa: F401  registers the lowering
 from .lowering import surface as _surface  # noqa: F401  registers the lowering
 from .solver import SignedHeatSolver

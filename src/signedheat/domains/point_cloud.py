@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from ..operators.local_triangulations import LocalTriangulations, local_triangulations
 from .exchange import Exchangeable
+from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
 
@@ -24,12 +27,22 @@ class PointCloud(Exchangeable):
         Directions pointing out of the shape; normalised here. A zero normal is an error.
     areas : (n,) float, optional
         Surface area that each point stands for. Estimated from neighbours where needed and absent.
+    n_neighbors : int
+        Size of the neighbourhoods in which tangent planes are estimated and triangles made, where distance is measured
+        on the cloud.
 
     Raises
     ------
     GeometryError
-        If there are no points, a value is NaN or infinite, a normal is zero, an area is not positive, or
-        lengths differ.
+        If there are no points, a value is NaN or infinite, a normal is zero, an area is not positive, lengths
+        differ, or neighbourhoods are smaller than 3.
+
+    Notes
+    -----
+    As a domain, a cloud needs no normals, and normals need not agree: triangles on the points are oriented alike, each
+    connected part to the side to which most of its normals point, or else outward. Left of a curve is told from that
+    side, unless the curve brings its own normals. Points that coincide count once; points that fit into no triangle,
+    such as outliers, get no distance.
 
     Examples
     --------
@@ -41,8 +54,15 @@ class PointCloud(Exchangeable):
     points: NDArray[np.float64]
     normals: NDArray[np.float64] | None
     areas: NDArray[np.float64] | None
+    n_neighbors: int
 
-    def __init__(self, points: ArrayLike, normals: ArrayLike | None = None, areas: ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        points: ArrayLike,
+        normals: ArrayLike | None = None,
+        areas: ArrayLike | None = None,
+        n_neighbors: int = 30,
+    ) -> None:
         positions = finite_rows(points, "points")
         if len(positions) == 0:
             raise GeometryError("there are no points: the point cloud is empty")
@@ -61,9 +81,12 @@ class PointCloud(Exchangeable):
             if sizes.ndim != 1 or not (np.isfinite(sizes) & (sizes > 0)).all():
                 raise GeometryError("areas must be one positive, finite number per point")
             sizes = frozen(sizes)
+        if n_neighbors < 3:
+            raise GeometryError(f"neighbourhoods need at least 3 points, not {n_neighbors}")
         object.__setattr__(self, "points", positions)
         object.__setattr__(self, "normals", directions)
         object.__setattr__(self, "areas", sizes)
+        object.__setattr__(self, "n_neighbors", int(n_neighbors))
 
     @property
     def n_points(self) -> int:
@@ -74,6 +97,53 @@ class PointCloud(Exchangeable):
     def bounds(self) -> NDArray[np.float64]:
         """(2, d) lower and upper corner of the box around the points."""
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
+    @cached_property
+    def representatives(self) -> NDArray[np.int64]:
+        """(n,) first point at the same place as each point."""
+        order = np.lexsort(self.points.T[::-1])
+        first = np.ones(self.n_points, dtype=bool)
+        first[1:] = (self.points[order[1:]] != self.points[order[:-1]]).any(axis=1)
+        owner = np.empty(self.n_points, dtype=np.int64)
+        owner[order] = order[first][np.cumsum(first) - 1]  # lexsort is stable: the first of each is its least id
+        return frozen(owner)
+
+    @cached_property
+    def _distinct(self) -> tuple[NDArray[np.int64], LocalTriangulations]:
+        """Ids of the distinct points, and triangles on them."""
+        if self.points.shape[1] != 3:
+            raise GeometryError(
+                f"distance is measured on point clouds in space: points need 3 coordinates, not {self.points.shape[1]}"
+            )
+        ids = np.unique(self.representatives)
+        points, normals = self.points[ids], None if self.normals is None else self.normals[ids]
+        if len(ids) < 3:
+            raise GeometryError(f"the point cloud has {len(ids)} distinct points, and a surface needs at least 3")
+        found = local_triangulations(points, normals, self.n_neighbors)
+        if len(found.faces) == 0:
+            raise GeometryError(
+                "no triangles could be made of the point cloud: its points lie along a line or too far apart; "
+                "add points, or raise n_neighbors"
+            )
+        return ids, found
+
+    @cached_property
+    def triangulation(self) -> TriangleMesh:
+        """The triangles that curves refer to; of points that coincide, the first is their vertex."""
+        ids, found = self._distinct
+        return TriangleMesh(self.points, ids[found.faces])
+
+    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of `triangulation`, which are the points."""
+        return values
+
+    @cached_property
+    def surface_normals(self) -> NDArray[np.float64]:
+        """(n, 3) unit normals, given or estimated, on the side from which `triangulation` is oriented."""
+        ids, found = self._distinct
+        normals = np.empty_like(self.points)
+        normals[ids] = found.normals
+        return frozen(normals[self.representatives])
 
     def __repr__(self) -> str:
         return f"PointCloud({self.n_points} points, {'with' if self.normals is not None else 'without'} normals)"

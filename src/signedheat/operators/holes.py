@@ -1,0 +1,130 @@
+"""Small holes in a mesh of triangles, filled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .edges import face_edges
+
+MOST_SIDES = 12
+
+
+def hole_fillings(
+    points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Triangles that fill holes of at most `MOST_SIDES` sides.
+
+    A boundary loop is a hole if it encloses what lies on its far side: an outer boundary, however short, stays. Ears of
+    least circumradius are cut off first; none makes an edge that exists.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float
+        Positions; unit normals on the side from which faces run counter-clockwise.
+    faces : (m, 3) int
+        At most two faces to an edge, oriented alike except across a few edges.
+
+    Examples
+    --------
+    >>> points = np.array([[0.0, 0, 0], [3, 0, 0], [0, 3, 0], [1, 1, 0], [1.5, 1, 0], [1, 1.5, 0]])
+    >>> ring = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]])
+    >>> hole_fillings(points, np.tile([0.0, 0, 1], (6, 1)), ring).tolist()
+    [[5, 3, 4]]
+    """
+    edges = face_edges(faces)
+    face, side = np.nonzero(edges.face_counts[edges.of_faces] == 1)
+    tails, heads = faces[face, side], faces[face, (side + 1) % 3]
+    following = next_around_gap(points, normals, tails, heads)
+    linked = np.flatnonzero(following >= 0)
+    n = len(tails)
+    graph = sparse.csr_matrix((np.ones(len(linked)), (linked, following[linked])), shape=(n, n))
+    loops = sparse.csgraph.connected_components(graph, directed=False)[1]
+    short = np.bincount(loops, minlength=1)[loops] <= MOST_SIDES if n else np.empty(0, dtype=bool)
+    known = {(min(i, j), max(i, j)) for i, j in edges.vertices[_touching(edges.vertices, tails[short])].tolist()}
+    fillings: list[tuple[int, int, int]] = []
+    for first in np.unique(loops[short], return_index=True)[1]:
+        loop = _loop_from(int(np.flatnonzero(short)[first]), following)
+        if loop:
+            fillings += _ears(points, normals, tails[loop[::-1]].tolist(), known)
+    return np.array(fillings, dtype=np.int64).reshape(-1, 3)
+
+
+def next_around_gap(
+    points: NDArray[np.float64], normals: NDArray[np.float64], tails: NDArray[np.int64], heads: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """(b,) boundary edge that follows each one across the gap beside it, or −1.
+
+    Where several leave a vertex, it is the first counter-clockwise from the way back: faces lie to the left.
+    """
+    leaving = np.argsort(tails, kind="stable")
+    begin = np.searchsorted(tails[leaving], heads)
+    count = np.searchsorted(tails[leaving], heads, side="right") - begin
+    arriving = np.repeat(np.arange(len(heads)), count)
+    inside = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    onward = leaving[np.repeat(begin, count) + inside]
+    at = heads[arriving]
+    back, forth = points[tails[arriving]] - points[at], points[heads[onward]] - points[at]
+    sine = (np.cross(back, forth) * normals[at]).sum(axis=1)
+    flat = [d - (d * normals[at]).sum(axis=1)[:, None] * normals[at] for d in (back, forth)]
+    turn = np.mod(np.arctan2(sine, (flat[0] * flat[1]).sum(axis=1)), 2 * np.pi)
+    order = np.lexsort((turn, arriving))
+    following = np.full(len(tails), -1, dtype=np.int64)
+    following[arriving[order[::-1]]] = onward[order[::-1]]  # the first in order is written last
+    return following
+
+
+def _touching(edges: NDArray[np.int64], vertices: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(e,) edges both of whose ends are among the vertices."""
+    marked = np.zeros(int(edges.max(initial=0)) + 1, dtype=bool)
+    marked[vertices] = True
+    return marked[edges].all(axis=1)
+
+
+def _loop_from(start: int, following: NDArray[np.int64]) -> list[int]:
+    """Boundary edges from one round to itself again, or nothing if they lead elsewhere."""
+    loop = [start]
+    while len(loop) <= MOST_SIDES:
+        onward = int(following[loop[-1]])
+        if onward == start:
+            return loop
+        if onward < 0:
+            break
+        loop.append(onward)
+    return []
+
+
+def _ears(
+    points: NDArray[np.float64], normals: NDArray[np.float64], loop: list[int], known: set[tuple[int, int]]
+) -> list[tuple[int, int, int]]:
+    """Triangles that fill a loop of vertices, counter-clockwise round the hole; none if it is no hole.
+
+    Edges that they make are added to those known.
+    """
+    if len(set(loop)) < max(len(loop), 3):
+        return []
+    corners = points[loop]
+    normal = normals[loop].sum(axis=0)
+    fan = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
+    if fan @ normal <= 0:
+        return []
+    triangles, made = [], set()
+    while len(loop) > 3:
+        here = points[loop]
+        before, after = np.roll(here, 1, axis=0), np.roll(here, -1, axis=0)
+        u, v, w = here - before, after - here, before - after
+        twice_area = np.cross(u, v) @ normal / np.linalg.norm(normal)
+        product = np.prod([np.linalg.norm(d, axis=1) for d in (u, v, w)], axis=0)
+        for ear in np.argsort(np.where(twice_area > 0, product / np.maximum(twice_area, 1e-300), np.inf)):
+            i, j, k = loop[ear - 1], loop[ear], loop[(ear + 1) % len(loop)]
+            diagonal = (min(i, k), max(i, k))
+            if twice_area[ear] > 0 and diagonal not in known and diagonal not in made:
+                break
+        else:
+            return []
+        triangles.append((i, j, k))
+        made.add(diagonal)
+        del loop[ear]
+    known |= made
+    return [*triangles, (loop[0], loop[1], loop[2])]

@@ -1,0 +1,107 @@
+"""Loops of the local triangulations of point clouds, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+MAX_SIDES = 64
+
+
+@njit(cache=True, parallel=True)
+def voronoi_fans(
+    x: NDArray[np.float64], y: NDArray[np.float64], reach: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Delaunay neighbours of the origin among the points of each row, counter-clockwise.
+
+    The Voronoi cell of the origin starts as a square and is cut by the bisectors of its neighbours, nearest first. Two
+    neighbours whose sides of the cell meet span a Delaunay triangle with the origin, and the corner between them is its
+    circumcentre: no circumradius exceeds the square's.
+
+    Parameters
+    ----------
+    x, y : (n, k) float
+        Neighbours of each point in its own tangent plane, relative to the point, nearest first.
+    reach : (n,) float
+        Half the side of the square.
+
+    Returns
+    -------
+    neighbours : (n, MAX_SIDES) int
+        Column of the neighbour beyond each side of the cell; −1 on sides that are left of the square.
+    counts : (n,) int
+        Number of sides.
+    """
+    n, k = x.shape
+    neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)
+    counts = np.zeros(n, dtype=np.int64)
+    for i in prange(n):
+        corner = np.empty((MAX_SIDES, 2))  # corner c is where side c starts
+        beyond = np.full(MAX_SIDES, -1, dtype=np.int64)
+        new_corner = np.empty((MAX_SIDES, 2))
+        new_beyond = np.empty(MAX_SIDES, dtype=np.int64)
+        r = reach[i]
+        corner[0, 0], corner[1, 0], corner[2, 0], corner[3, 0] = r, r, -r, -r
+        corner[0, 1], corner[1, 1], corner[2, 1], corner[3, 1] = -r, r, r, -r
+        m, farthest = 4, 2 * r * r
+        for j in range(k):
+            px, py = x[i, j], y[i, j]
+            square = px * px + py * py
+            if square > 4 * farthest or square < 1e-24 * r * r:
+                continue
+            half = 0.5 * square
+            slack = 1e-9 * half  # a bisector that only touches a corner does not cut
+            cut = False
+            for c in range(m):
+                cut = cut or corner[c, 0] * px + corner[c, 1] * py > half + slack
+            if not cut or m + 1 >= MAX_SIDES:
+                continue
+            new = 0
+            for c in range(m):
+                d = (c + 1) % m
+                here = corner[c, 0] * px + corner[c, 1] * py - half
+                there = corner[d, 0] * px + corner[d, 1] * py - half
+                if here <= slack:
+                    new_corner[new], new_beyond[new] = corner[c], beyond[c]
+                    new += 1
+                if (here <= slack) != (there <= slack):
+                    s = min(max(here / (here - there), 0.0), 1.0)
+                    new_corner[new] = corner[c] + s * (corner[d] - corner[c])
+                    new_beyond[new] = j if here <= slack else beyond[c]
+                    new += 1
+            m, farthest = new, 0.0
+            for c in range(m):
+                corner[c], beyond[c] = new_corner[c], new_beyond[c]
+                farthest = max(farthest, corner[c, 0] ** 2 + corner[c, 1] ** 2)
+        counts[i] = m
+        neighbours[i, :m] = beyond[:m]
+    return neighbours, counts
+
+
+@njit(cache=True)
+def accept_one_per_side(edges: NDArray[np.int64], sides: NDArray[np.int64], n_edges: int) -> NDArray[np.bool_]:
+    """(m,) triangles that find all three of their edges free on their side, in the order given."""
+    taken = np.zeros((n_edges, 2), dtype=np.bool_)
+    accepted = np.zeros(len(edges), dtype=np.bool_)
+    for f in range(len(edges)):
+        free = True
+        for k in range(3):
+            free = free and not taken[edges[f, k], sides[f, k]]
+        if free:
+            accepted[f] = True
+            for k in range(3):
+                taken[edges[f, k], sides[f, k]] = True
+    return accepted
+
+
+@njit(cache=True)
+def signs_from_parents(
+    order: NDArray[np.int64], parents: NDArray[np.int64], relative: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """(n,) sign of each node: that of its parent, which comes earlier in the order, times its own relative to it."""
+    signs = np.ones(len(parents), dtype=np.int64)
+    for node in order:
+        if parents[node] >= 0:
+            signs[node] = signs[parents[node]] * relative[node]
+    return signs
