@@ -9,7 +9,7 @@ from ..operators.laid_out_triangles import LaidOutTriangles
 
 
 def free_end_arcs(
-    triangles: LaidOutTriangles, edges: NDArray[np.int64], vertices: NDArray[np.int64]
+    triangles: LaidOutTriangles, edges: NDArray[np.int64], vertices: NDArray[np.int64], least: float
 ) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
     """Vectors that point away from free ends, over the half plane of directions behind each.
 
@@ -22,14 +22,17 @@ def free_end_arcs(
         The surface.
     edges, vertices : (k,) int
         Last edge of each end, and the vertex at which it ends.
+    least : float
+        An end weighs as much as its last edge is long, and at least this much: a curve that was cut into short edges
+        needs its ends as much as any other. (The published code knows no least weight.)
 
     Returns
     -------
     faces : (j,) int
         Faces behind the ends.
     vectors : (j,) complex
-        ``∫ e^{iθ} dθ`` over the part of the corner that lies behind, in the face's layout, times the length of the last
-        edge over the angle of the whole arc.
+        ``∫ e^{iθ} dθ`` over the part of the corner that lies behind, in the face's layout, times the weight of the
+        end over the angle of the whole arc.
     """
     faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
     marked = np.zeros(triangles.n_vertices, dtype=bool)
@@ -61,7 +64,7 @@ def free_end_arcs(
         arc = -1j * (leaving / np.abs(leaving)) * (np.exp(1j * end) - np.exp(1j * start))
         length = np.abs(np.concatenate([leaving[right == last], arriving[left == last]]))[0]
         faces.append(face[behind])
-        vectors.append(arc[behind] * length / (end - start)[behind].sum())
+        vectors.append(arc[behind] * max(length, least) / (end - start)[behind].sum())
     return np.concatenate(faces), np.concatenate(vectors)
 
 

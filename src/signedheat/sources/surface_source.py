@@ -92,7 +92,7 @@ def surface_source(
         if not part.fits:
             raise SourceError(f"source {number} is unoriented and leaves the edges: embed it in the triangles first")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
-    vectors += unoriented_vectors(triangles, parts)
+    vectors += unoriented_vectors(triangles, parts, spacing)
     vectors += spacing * point_vectors(triangles, [p for p in parts if len(p.ends) == 0])
 
     sizes = [len(p.nodes) for p in parts]
@@ -121,7 +121,7 @@ def oriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> ND
     return sums
 
 
-def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> NDArray[np.complex128]:
+def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces], spacing: float) -> NDArray[np.complex128]:
     """App. A.2: each side of a curve along edges points away from it, and round its free ends.
 
     A face beside edge ij gets i(p_j − p_i), ij in its own order, on its other two edges; on ij itself the sides cancel.
@@ -145,7 +145,7 @@ def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> 
             touched[part.nodes.elements[at_vertex]] += 2
     ends_free = touched[triangles.edges.vertices[edges]] == 1
     which, end = np.nonzero(ends_free)
-    faces, arcs = free_end_arcs(triangles, edges[which], triangles.edges.vertices[edges[which], end])
+    faces, arcs = free_end_arcs(triangles, edges[which], triangles.edges.vertices[edges[which], end], spacing)
     return sums + from_faces(triangles, faces, arcs)
 
 
