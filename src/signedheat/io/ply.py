@@ -217,7 +217,8 @@ def _text_reader(body: bytes, path: PathLike) -> Any:
                 if any(len(row) < end for row, end in zip(rows, ends, strict=True)):
                     raise IndexError
                 flat = [word for row, k, end in zip(rows, starts, ends, strict=True) for word in row[k + 1 : end]]
-                table[name] = numbers(flat, path, f"'{name}'", int), counts
+                entry = float if kind[1].startswith("f") else int
+                table[name] = numbers(flat, path, f"'{name}'", entry), counts
                 starts = ends
         except IndexError:
             raise _truncated(path, element) from None

@@ -1,0 +1,137 @@
+"""Fields on grids, to files and back, exact to the last bit."""
+
+import json
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat.io import load_field, save_field
+
+FORMATS = ["npz", "npy", "nrrd", "vti"]
+
+
+def field(dimension=3):
+    shape = (3, 4, 5)[:dimension]
+    grid = sh.Grid((0.1 + 0.2, -1e7 / 3, 1e-9)[:dimension], (0.1, 1 / 3, np.pi)[:dimension], shape)
+    return sh.GridField(grid, np.random.default_rng(1).normal(size=shape))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("ending", FORMATS)
+def test_round_trip_is_exact(tmp_path, ending, dimension):
+    phi = field(dimension)
+    phi.save(tmp_path / f"phi.{ending}")
+    back = sh.load_field(tmp_path / f"phi.{ending}")
+    np.testing.assert_array_equal(back.values, phi.values)
+    np.testing.assert_array_equal(back.grid.origin, phi.grid.origin)
+    np.testing.assert_array_equal(back.grid.spacing, phi.grid.spacing)
+    assert back.grid.shape == phi.grid.shape
+
+
+def test_npz_needs_no_pickle_and_says_what_it_holds(tmp_path):
+    field().save(tmp_path / "phi.npz")
+    with np.load(tmp_path / "phi.npz", allow_pickle=False) as file:
+        assert set(file) == {"values", "origin", "spacing", "convention"}
+        assert "negative inside" in str(file["convention"])
+
+
+def test_npy_has_its_transform_beside_it(tmp_path):
+    field().save(tmp_path / "phi.npy")
+    about = json.loads((tmp_path / "phi.json").read_text())
+    assert about["spacing"] == field().grid.spacing.tolist()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["phi.json", "phi.npy"]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_vtk_reads_our_vti_with_the_same_axes(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    phi = field()
+    phi.save(tmp_path / "phi.vti")
+    image = pyvista.read(tmp_path / "phi.vti")
+    values = np.asarray(image.point_data["signed_distance"])
+    nodes = phi.grid.points.reshape(-1, 3)
+    order = [image.FindPoint(*node) for node in nodes]
+    np.testing.assert_array_equal(values[order], phi.values.ravel())
+    np.testing.assert_allclose(np.asarray(image.points)[order], nodes, rtol=1e-14, atol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("mode", ["Ascii", "Binary", "Appended"])
+@pytest.mark.parametrize("compressor", ["None", "ZLib"])
+def test_we_read_vti_of_vtk(tmp_path, mode, compressor):
+    pyvista = pytest.importorskip("pyvista")
+    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
+
+    phi = field()
+    image = pyvista.ImageData(dimensions=phi.grid.shape, spacing=phi.grid.spacing, origin=phi.grid.origin)
+    image.point_data["values"] = phi.values.ravel(order="F")
+    writer = vtkXMLImageDataWriter()
+    writer.SetInputData(image)
+    writer.SetFileName(str(tmp_path / "a.vti"))
+    getattr(writer, f"SetDataModeTo{mode}")()
+    getattr(writer, f"SetCompressorTypeTo{compressor}")()
+    writer.Write()
+    back = load_field(tmp_path / "a.vti")
+    np.testing.assert_array_equal(back.values, phi.values)
+    np.testing.assert_allclose(back.grid.spacing, phi.grid.spacing, rtol=1e-5)
+
+
+def test_nrrd_is_read_by_its_own_library_with_the_same_axes(tmp_path):
+    nrrd = pytest.importorskip("nrrd")
+    phi = field()
+    phi.save(tmp_path / "phi.nrrd")
+    values, header = nrrd.read(str(tmp_path / "phi.nrrd"), index_order="F")
+    np.testing.assert_array_equal(values, phi.values)
+    np.testing.assert_array_equal(np.diag(header["space directions"]), phi.grid.spacing)
+
+
+def test_nrrd_along_turned_axes_is_refused(tmp_path):
+    nrrd = pytest.importorskip("nrrd")
+    turned = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1.0]])
+    header = {"space dimension": 3, "space directions": turned, "space origin": np.zeros(3)}
+    nrrd.write(str(tmp_path / "turned.nrrd"), field().values, header, index_order="F")
+    with pytest.raises(sh.FileFormatError, match="its axes are not x, y, z"):
+        load_field(tmp_path / "turned.nrrd")
+
+
+def test_vdb_without_its_module_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("importlib.import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
+    with pytest.raises(sh.FileFormatError, match="needs OpenVDB's Python module"):
+        save_field(field(), tmp_path / "phi.vdb")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_truncated_fields_are_refused_by_name(tmp_path, ending):
+    phi = field()
+    phi.save(tmp_path / f"phi.{ending}")
+    data = (tmp_path / f"phi.{ending}").read_bytes()
+    for length in (0, 10, len(data) // 2, len(data) - 60):
+        (tmp_path / f"phi.{ending}").write_bytes(data[:length])
+        with pytest.raises(sh.FileFormatError, match=f"phi.{ending}"):
+            load_field(tmp_path / f"phi.{ending}")
+
+
+def test_files_that_hold_no_field_are_refused(tmp_path):
+    np.savez(tmp_path / "other.npz", a=1)
+    np.savez(tmp_path / "pickled.npz", values=np.array([{}]), origin=[0], spacing=[1])
+    np.save(tmp_path / "alone.npy", np.zeros((2, 2)))
+    np.savez(tmp_path / "spacing.npz", values=np.zeros((2, 2)), origin=[0, 0], spacing=[1, -1])
+    np.savez(tmp_path / "words.npz", values=np.array([["a", "b"]] * 2), origin=[0, 0], spacing=[1, 1])
+    for name in ("other.npz", "pickled.npz", "spacing.npz", "words.npz", "missing.vti", "field.stl"):
+        with pytest.raises(sh.FileFormatError, match=name):
+            load_field(tmp_path / name)
+    with pytest.raises(sh.FileFormatError, match=r"alone\.json"):
+        load_field(tmp_path / "alone.npy")
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_a_failed_write_leaves_the_old_file(tmp_path, ending, monkeypatch):
+    path = tmp_path / f"phi.{ending}"
+    path.write_text("precious")
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+    with pytest.raises(sh.FileFormatError, match="No space left"):
+        field().save(path)
+    assert path.read_text() == "precious"
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
