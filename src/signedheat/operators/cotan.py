@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .assembly import assemble
 from .laid_out_triangles import LaidOutTriangles
 
 
@@ -22,19 +23,9 @@ def cotan_matrix(triangles: LaidOutTriangles) -> sparse.csr_matrix:
            [ 0. ,  0.5,  0. ],
            [ 0. ,  0. ,  0.5]])
     """
-    i = triangles.corner_vertices.ravel()
-    j = np.roll(triangles.corner_vertices, -1, axis=1).ravel()
-    half = 0.5 * np.roll(triangles.corner_cotangents, 1, axis=1).ravel()  # the corner facing edge k is k + 2
-    n = triangles.n_vertices
-    diagonal = np.bincount(i, half, n) + np.bincount(j, half, n)
-    every = np.arange(n)
-    same = i == j
-    diagonal -= 2.0 * np.bincount(i[same], half[same], n)
-    rows = np.concatenate([every, np.minimum(i, j)[~same]])
-    columns = np.concatenate([every, np.maximum(i, j)[~same]])
-    matrix = sparse.coo_matrix((np.concatenate([diagonal, -half[~same]]), (rows, columns)), shape=(n, n)).tocsr()
-    matrix.sum_duplicates()
-    return matrix
+    half = 0.5 * np.roll(triangles.corner_cotangents, 1, axis=1)  # the corner facing edge k is k + 2
+    diagonal = half + np.roll(half, 1, axis=1)
+    return assemble(triangles.corner_vertices, diagonal, -half, triangles.n_vertices)
 
 
 def divergence(triangles: LaidOutTriangles, directions: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from .assembly import assemble
 from .laid_out_triangles import LaidOutTriangles
 
 
@@ -24,30 +25,27 @@ def vector_heat_matrix(triangles: LaidOutTriangles, time: float) -> sparse.csr_m
     edge, z, cot = triangles.edges.of_faces, triangles.edge_directions, triangles.corner_cotangents
     following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1
     diagonal = triangles.face_areas[:, None] / 3.0 + 2.0 * time * (cot + following)
-    rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
     factor = -2.0 * time * following
     if triangles.is_consistently_oriented:
-        values = (factor * np.conj(z) * np.roll(z, -1, axis=1)).ravel()
-        below = rows > columns
-        rows, columns = np.where(below, columns, rows), np.where(below, rows, columns)
-        values = np.where(below, np.conj(values), values)
-        same = rows == columns
-        values[same] = 2.0 * values[same].real
-        n = triangles.n_edges
-        ij = np.concatenate([rows, edge.ravel()]), np.concatenate([columns, edge.ravel()])
-        matrix = sparse.coo_matrix((np.concatenate([values, diagonal.ravel()]), ij), shape=(n, n)).tocsr()
-    else:
-        second = np.where(triangles.reflected, -1j, 1j) * z
-        frame = np.stack([_components(z), _components(second)], axis=-1)  # columns: the axes of the edge's frame
-        blocks = factor[..., None, None] * np.einsum("fkab,fkac->fkbc", frame, np.roll(frame, -1, axis=1))
-        bits = np.arange(2)
-        i = np.broadcast_to(2 * rows[:, None, None] + bits[:, None], (len(rows), 2, 2)).ravel()
-        j = np.broadcast_to(2 * columns[:, None, None] + bits, (len(rows), 2, 2)).ravel()
-        k = (2 * edge.ravel()[:, None] + bits).ravel()
-        n = 2 * triangles.n_edges
-        ij = np.concatenate([i, j, k]), np.concatenate([j, i, k])
-        values = np.concatenate([blocks.ravel(), blocks.ravel(), np.repeat(diagonal.ravel(), 2)])
-        matrix = sparse.triu(sparse.coo_matrix((values, ij), shape=(n, n)), format="csr")
+        return assemble(edge, diagonal, factor * np.conj(z) * np.roll(z, -1, axis=1), triangles.n_edges)
+    return _real_form(triangles, diagonal, factor)
+
+
+def _real_form(triangles: LaidOutTriangles, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
+    """Blocks ``B_feᵀ B_fg``, where the columns of B_fe are the axes of the edge's frame in the face."""
+    edge, z = triangles.edges.of_faces, triangles.edge_directions
+    rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
+    second = np.where(triangles.reflected, -1j, 1j) * z
+    frame = np.stack([_components(z), _components(second)], axis=-1)
+    blocks = factor[..., None, None] * np.einsum("fkab,fkac->fkbc", frame, np.roll(frame, -1, axis=1))
+    bits = np.arange(2)
+    i = np.broadcast_to(2 * rows[:, None, None] + bits[:, None], (len(rows), 2, 2)).ravel()
+    j = np.broadcast_to(2 * columns[:, None, None] + bits, (len(rows), 2, 2)).ravel()
+    k = (2 * edge.ravel()[:, None] + bits).ravel()
+    n = 2 * triangles.n_edges
+    ij = np.concatenate([i, j, k]), np.concatenate([j, i, k])
+    values = np.concatenate([blocks.ravel(), blocks.ravel(), np.repeat(diagonal.ravel(), 2)])
+    matrix = sparse.triu(sparse.coo_matrix((values, ij), shape=(n, n)), format="csr")
     matrix.sum_duplicates()
     return matrix
 

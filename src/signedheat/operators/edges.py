@@ -31,9 +31,23 @@ class EdgeTable:
         """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
         return np.bincount(self.of_faces.ravel(), minlength=len(self.vertices))
 
+    def elimination_order(self, vertex_order: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Order that suits unknowns at edges, from a fill-reducing order of the vertices.
+
+        An edge goes with its end that is eliminated first. Edges from two parts that a set of vertices separates never
+        share a face, so the edges within that set separate them just as well: the order dissects edges as it does
+        vertices, for a fraction of the cost of finding one anew.
+        """
+        rank = np.empty(len(vertex_order), dtype=np.int64)
+        rank[vertex_order] = np.arange(len(vertex_order))
+        a, b = rank[self.vertices].T
+        return np.argsort((np.minimum(a, b) + 1) * len(rank) - np.maximum(a, b), kind="stable")
+
 
 def face_edges(faces: NDArray[np.int64]) -> EdgeTable:
     """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face).
+
+    Grows with the number of faces; a vertex that all faces share does no harm.
 
     Examples
     --------
@@ -43,17 +57,7 @@ def face_edges(faces: NDArray[np.int64]) -> EdgeTable:
     >>> table.of_faces.tolist()
     [[0, 1, 2], [1, 3, 4]]
     """
-    tail = faces.ravel()
-    head = np.roll(faces, -1, axis=1).ravel()
-    key = np.minimum(tail, head) * (int(faces.max()) + 1) + np.maximum(tail, head)
-    order = np.argsort(key, kind="stable")
-    starts = np.ones(len(key), dtype=bool)
-    starts[1:] = key[order[1:]] != key[order[:-1]]
-    first = order[starts]  # the stable sort puts the first halfedge of every edge in front
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    edge = np.empty(len(key), dtype=np.int64)
-    edge[order] = rank[np.cumsum(starts) - 1]
-    first = np.sort(first)
-    vertices = np.stack([tail[first], head[first]], axis=1)
-    return EdgeTable(vertices, edge.reshape(-1, 3), (vertices[edge, 0] == tail).reshape(-1, 3))
+    from .assembly_kernels import find_edges
+
+    faces = np.ascontiguousarray(faces, dtype=np.int64)
+    return EdgeTable(*find_edges(faces, np.bincount(faces.ravel())))

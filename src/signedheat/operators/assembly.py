@@ -1,0 +1,38 @@
+"""Sums of 3 × 3 matrices, one per triangle, as sorted sparse matrices."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+
+def assemble(
+    unknowns: NDArray[np.int64], diagonal: NDArray[np.float64], coupling: NDArray[Any], n: int
+) -> sparse.csr_matrix:
+    """Upper triangle of a Hermitian matrix, its whole diagonal stored.
+
+    Parameters
+    ----------
+    unknowns : (m, 3) int
+        The three unknowns of each triangle.
+    diagonal : (m, 3) float
+        Entries that go to the diagonal.
+    coupling : (m, 3) float or complex
+        Entry in the row of unknown k and the column of unknown k + 1.
+    n : int
+        Number of unknowns.
+
+    Examples
+    --------
+    >>> assemble(np.array([[0, 2, 1]]), np.ones((1, 3)), np.array([[1j, 2.0, 3.0]]), 3).toarray()
+    array([[1.+0.j, 3.+0.j, 0.+1.j],
+           [0.+0.j, 1.+0.j, 2.+0.j],
+           [0.+0.j, 0.+0.j, 1.+0.j]])
+    """
+    from .assembly_kernels import add_up
+
+    starts, columns, values = add_up(unknowns, diagonal, coupling, n)
+    return sparse.csr_matrix((values, columns, starts), shape=(n, n))

@@ -1,0 +1,92 @@
+"""Loops over triangles, compiled at first use."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def find_edges(faces, degrees):
+    """Edges are kept in one list per vertex, that of the end with fewer faces, so that no list gets long."""
+    first = np.full(len(degrees), -1)
+    following = np.empty(faces.size, dtype=np.int64)
+    vertices = np.empty((faces.size, 2), dtype=np.int64)
+    of_faces = np.empty(faces.shape, dtype=np.int64)
+    forward = np.empty(faces.shape, dtype=np.bool_)
+    count = 0
+    for f in range(len(faces)):
+        for k in range(3):
+            tail, head = faces[f, k], faces[f, (k + 1) % 3]
+            keeper, other = tail, head
+            if degrees[head] < degrees[tail] or (degrees[head] == degrees[tail] and head < tail):
+                keeper, other = head, tail
+            edge = first[keeper]
+            while edge >= 0 and vertices[edge, 0] + vertices[edge, 1] - keeper != other:
+                edge = following[edge]
+            if edge < 0:
+                edge = count
+                vertices[edge] = tail, head
+                following[edge] = first[keeper]
+                first[keeper] = edge
+                count += 1
+            of_faces[f, k] = edge
+            forward[f, k] = vertices[edge, 0] == tail
+    return vertices[:count].copy(), of_faces, forward
+
+
+@njit(cache=True)
+def add_up(unknowns, diagonal, coupling, n):
+    starts = np.zeros(n + 1, dtype=np.int64)
+    for f in range(len(unknowns)):
+        for k in range(3):
+            i, j = unknowns[f, k], unknowns[f, (k + 1) % 3]
+            starts[min(i, j) + 1] += i != j
+    for i in range(n):
+        starts[i + 1] += starts[i] + 1
+    columns = np.empty(starts[n], dtype=np.int32)
+    values = np.zeros(starts[n], dtype=coupling.dtype)
+    ends = starts[:-1].copy()
+    for i in range(n):
+        columns[ends[i]] = i
+        ends[i] += 1
+    for f in range(len(unknowns)):
+        for k in range(3):
+            i, j, value = unknowns[f, k], unknowns[f, (k + 1) % 3], coupling[f, k]
+            values[starts[i]] += diagonal[f, k]
+            if i == j:
+                values[starts[i]] += 2.0 * value.real
+                continue
+            if j < i:
+                i, j, value = j, i, np.conj(value)
+            columns[ends[i]] = j
+            values[ends[i]] = value
+            ends[i] += 1
+    return _merge(starts, columns, values)
+
+
+@njit(cache=True)
+def _merge(starts, columns, values):
+    """Sort every row by column and add up what falls together, in place."""
+    n, total = len(starts) - 1, 0
+    merged = np.zeros(n + 1, dtype=np.int32)
+    for i in range(n):
+        begin, end = starts[i], starts[i + 1]
+        if end - begin > 64:
+            order = np.argsort(columns[begin:end], kind="mergesort")
+            columns[begin:end] = columns[begin:end][order]
+            values[begin:end] = values[begin:end][order]
+        else:
+            for p in range(begin + 1, end):
+                column, value, q = columns[p], values[p], p
+                while q > begin and columns[q - 1] > column:
+                    columns[q], values[q] = columns[q - 1], values[q - 1]
+                    q -= 1
+                columns[q], values[q] = column, value
+        last = total
+        for p in range(begin, end):
+            if total > last and columns[p] == columns[total - 1]:
+                values[total - 1] += values[p]
+            else:
+                columns[total], values[total] = columns[p], values[p]
+                total += 1
+        merged[i + 1] = total
+    return merged, columns[:total].copy(), values[:total].copy()
