@@ -20,10 +20,11 @@ from .errors import (
 from .fields.grid_field import GridField
 from .fields.vertex_field import VertexField
 from .io import load_field, read, save
+from .lowering import grid as _grid  # noqa: F401  registers the lowering
 from .lowering import point_clouds as _point_clouds  # noqa: F401  registers the lowering
 from .lowering import polygons as _polygons  # noqa: F401  registers the lowering
 from .lowering import surface as _surface  # noqa: F401  registers the lowering
-from .solver import SignedHeatSolver
+from .solver import SignedHeatSolver, signed_distance
 from .sources.curves import Curve, SurfacePoints
 
 __version__ = "0.1.0"
@@ -56,4 +57,5 @@ __all__ = [
     "load_field",
     "read",
     "save",
+    "signed_distance",
 ]

@@ -106,6 +106,67 @@ def as_list(sources: Any) -> list[Any]:
     return listed
 
 
+def signed_distance(
+    source: Any,
+    domain: Any = None,
+    *,
+    resolution: int = 128,
+    padding: float | None = None,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> Any:
+    """Signed distance to a shape, however broken, in one call.
+
+    Parameters
+    ----------
+    source : TriangleMesh, PolygonMesh or PointCloud with normals, or a sequence of them
+        The shape; any source of `SignedHeatSolver.distance` where a domain is given.
+    domain : Grid, TetMesh, TriangleMesh, …, optional
+        Where to measure; by default a grid of cubic cells around the shape.
+    resolution : int
+        Number of nodes along the longest side of that grid.
+    padding : float, optional
+        Room around the shape, in its units; by default a fifth of its longest side.
+    constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
+        What to impose on φ at the source; `ZeroSet` by default.
+    diffusion : float
+        τ in ``t = τ h²``. Larger values complete broken shapes more roundly.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``.
+
+    Returns
+    -------
+    GridField, TetField or VertexField
+        φ > 0 on the side that the normals point to: negative inside a shape whose normals point outwards.
+
+    Raises
+    ------
+    GeometryError
+        If resolution or padding make no grid.
+    SourceError
+        If the shape cannot be a source, for instance points without normals.
+    MemoryLimitError
+        If the grid cannot fit in memory; nothing has been allocated then.
+
+    Examples
+    --------
+    >>> from signedheat import TriangleMesh
+    >>> octahedron = TriangleMesh(
+    ...     [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]],
+    ...     [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
+    ... )
+    >>> sdf = signed_distance(octahedron, resolution=24)
+    >>> sdf([[0, 0, 0], [1.2, 0, 0]]).round(1)
+    array([-0.6,  0.2])
+    """
+    if domain is None:
+        from .sources.area_elements import grid_around
+
+        domain = grid_around(as_list(source), resolution, padding)
+    return SignedHeatSolver(domain, diffusion, progress).distance(source, constraint)
+
+
 class Stopwatch:
     """Times named steps, logs them, and reports progress."""
 

@@ -1,0 +1,130 @@
+"""Kernel: simplices bisected and merged per cell of a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+
+def merge_in_cells(
+    corners: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    components: NDArray[np.int64],
+    order: NDArray[np.int64],
+    shape: NDArray[np.int64],
+    size: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Samples of the simplices `corners` (m, c, d), in cells, that lie on a grid of `shape` nodes.
+
+    Every simplex is bisected across its longest edge until that is at most `size` cells, which halves its measure each
+    time; parts whose box misses the grid are dropped at once, however large. Simplices come in an `order` that brings
+    those of one component together.
+
+    Returns
+    -------
+    positions (s, d), vectors (s, d), weights (s,), components (s,)
+        Sorted by component, then in order of first touch. Samples of no weight are left out.
+    """
+    slots = np.zeros(int(np.prod(shape - 1)), dtype=np.int32)  # untouched pages cost no memory
+    dimension = corners.shape[2]
+    sums, labels = _merge(
+        np.ascontiguousarray(corners), np.ascontiguousarray(vectors), weights, components, order, shape, size, slots
+    )
+    kept = sums[:, -1] > 0
+    sums, labels = sums[kept], labels[kept]
+    weight = sums[:, -1]
+    return sums[:, :dimension] / weight[:, None], sums[:, dimension:-1].copy(), weight.copy(), labels
+
+
+@njit(cache=True, nogil=True)
+def _merge(corners, vectors, weights, components, order, shape, size, slots):
+    """Sums of weight · position, vector and weight per (component, cell)."""
+    n_corners, dimension = corners.shape[1], corners.shape[2]
+    deepest = 256
+    stack = np.empty((deepest, n_corners, dimension))
+    levels = np.empty(deepest, dtype=np.int64)
+    capacity = 1024
+    sums = np.zeros((capacity, 2 * dimension + 1))
+    labels = np.empty(capacity, dtype=np.int64)
+    count = 0
+    first = 0  # slots of the component at hand start here
+    current = np.int64(-1)
+    centre = np.empty(dimension)
+    limit = size * size
+    for face in order:
+        if weights[face] == 0.0:
+            continue
+        if components[face] != current:
+            current = components[face]
+            first = count
+        stack[0] = corners[face]
+        levels[0] = 0
+        top = 1
+        while top > 0:
+            top -= 1
+            missed = False
+            for d in range(dimension):
+                low = high = stack[top, 0, d]
+                for c in range(1, n_corners):
+                    low = min(low, stack[top, c, d])
+                    high = max(high, stack[top, c, d])
+                if high < 0.0 or low > shape[d] - 1:
+                    missed = True
+            if missed:
+                continue
+            longest = -1.0
+            tail, head = 0, 0
+            for c in range(n_corners):
+                for e in range(c):
+                    square = 0.0
+                    for d in range(dimension):
+                        square += (stack[top, c, d] - stack[top, e, d]) ** 2
+                    if square > longest:
+                        longest, tail, head = square, e, c
+            if longest > limit and top + 2 < deepest:
+                level = levels[top] + 1
+                for c in range(n_corners):
+                    for d in range(dimension):
+                        stack[top + 1, c, d] = stack[top, c, d]
+                for d in range(dimension):
+                    middle = 0.5 * (stack[top, tail, d] + stack[top, head, d])
+                    stack[top, tail, d] = middle
+                    stack[top + 1, head, d] = middle
+                levels[top] = levels[top + 1] = level
+                top += 2
+                continue
+            cell = np.int64(0)
+            for d in range(dimension):
+                mean = 0.0
+                for c in range(n_corners):
+                    mean += stack[top, c, d]
+                mean /= n_corners
+                centre[d] = mean
+                if mean < 0.0 or mean > shape[d] - 1:
+                    missed = True
+                cell = cell * (shape[d] - 1) + min(max(np.int64(mean), 0), shape[d] - 2)
+            if missed:
+                continue
+            slot = slots[cell] - 1
+            if slot < first:
+                if count == capacity:
+                    capacity *= 2
+                    grown = np.zeros((capacity, 2 * dimension + 1))
+                    grown[:count] = sums
+                    sums = grown
+                    more = np.empty(capacity, dtype=np.int64)
+                    more[:count] = labels
+                    labels = more
+                slot = count
+                labels[slot] = current
+                count += 1
+                slots[cell] = count
+            share = 0.5 ** levels[top]
+            weight = weights[face] * share
+            for d in range(dimension):
+                sums[slot, d] += weight * centre[d]
+                sums[slot, dimension + d] += vectors[face, d] * share
+            sums[slot, 2 * dimension] += weight
+    return sums[:count], labels[:count]
