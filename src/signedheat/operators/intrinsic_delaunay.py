@@ -75,7 +75,7 @@ def glue(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = No
         length=lengths / unit,
         fixed=fixed,
         counts=np.array([triangles.n_faces, n_edges, triangles.n_vertices, 0, 0]),
-        steps=np.empty((2 * n_edges + 64, 3), dtype=np.int64),
+        steps=np.empty((2 * n_edges + 64, 4), dtype=np.int64),
         weights=np.empty((2 * n_edges + 64, 4)),
         scratch=np.empty((4, 4), dtype=np.int64),
         unit=unit,

@@ -24,7 +24,8 @@ class Gluing(NamedTuple):
     a source keep their names); and the next halfedge of the same edge, cyclically: itself at a boundary.
     `start`, `length` and `fixed` have one entry per edge: one of its halfedges; its length, in multiples of `unit`;
     whether it must not be flipped. `counts` holds the number of faces, edges, vertices, steps and edges to be looked
-    at. `steps` and `weights` are the history: kind, two halfedges or faces; and four numbers that say how points move.
+    at. `steps` and `weights` are the history: kind, two halfedges or faces, the
+    new vertex; and four numbers that say how points move.
     `scratch` is room to work in.
     """
 
@@ -118,10 +119,10 @@ def move(g, old, new):
 
 
 @njit(cache=True)
-def record(g, kind, first, second, a, b, c, d):
+def record(g, kind, first, second, vertex, a, b, c, d):
     """Write one step into the history."""
     n = g.counts[3]
-    g.steps[n, 0], g.steps[n, 1], g.steps[n, 2] = kind, first, second
+    g.steps[n, 0], g.steps[n, 1], g.steps[n, 2], g.steps[n, 3] = kind, first, second, vertex
     g.weights[n, 0], g.weights[n, 1], g.weights[n, 2], g.weights[n, 3] = a, b, c, d
     g.counts[3] = n + 1
 
@@ -134,7 +135,35 @@ def turn_over(g, face):
     g.tail[h + 1], g.tail[h + 2] = g.tail[h + 2], g.tail[h + 1]
     for k in range(3):
         g.forward[h + k] = not g.forward[h + k]
-    record(g, TURN, face, -1, 0.0, 0.0, 0.0, 0.0)
+    record(g, TURN, face, -1, -1, 0.0, 0.0, 0.0, 0.0)
+
+
+@njit(cache=True)
+def diamond(g, h):
+    """Two faces laid out side by side: ``h: i → j`` with apex a, its twin with apex b.
+
+    Returns the signed areas of jab and iab, the areas of the twin's face and of h's face, and the length of ab. They
+    say how the four corners depend on each other: area_jab·i + area_iab·j = area_twin·a + area_h·b.
+    """
+    t = g.ring[h]
+    mirrored = g.forward[h] == g.forward[t]
+    at_i, at_j = (t, following(t)) if mirrored else (following(t), t)
+    ai, ja = g.length[g.edge[preceding(h)]], g.length[g.edge[following(h)]]
+    ib, bj = g.length[g.edge[preceding(t)]], g.length[g.edge[following(t)]]
+    if not mirrored:
+        ib, bj = bj, ib
+    n1, d1 = tangent_at(g, h)
+    n2, d2 = tangent_at(g, at_i)
+    m1, e1 = tangent_at(g, following(h))
+    m2, e2 = tangent_at(g, at_j)
+    norm, norm_j = (n1 + d1) * (n2 + d2), (m1 + e1) * (m2 + e2)
+    if not (norm > 0.0 and norm_j > 0.0):
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    sine, cosine = np.sqrt(n1 * d2) + np.sqrt(n2 * d1), np.sqrt(d1 * d2) - np.sqrt(n1 * n2)
+    sine_j, cosine_j = np.sqrt(m1 * e2) + np.sqrt(m2 * e1), np.sqrt(e1 * e2) - np.sqrt(m1 * m2)
+    length = np.sqrt((ai - ib) ** 2 + 4.0 * ai * ib * sine * sine / norm)
+    area_iab, area_jab = ai * ib * sine * cosine / norm, ja * bj * sine_j * cosine_j / norm_j
+    return area_jab, area_iab, 0.25 * np.sqrt(n2 * d2), 0.25 * np.sqrt(n1 * d1), length
 
 
 @njit(cache=True)
@@ -149,24 +178,10 @@ def flip(g, h):
         turn_over(g, t // 3)
         t = g.ring[h]
     h1, h2, t1, t2 = following(h), preceding(h), following(t), preceding(t)
-    ja, ai, ib, bj = g.length[g.edge[h1]], g.length[g.edge[h2]], g.length[g.edge[t1]], g.length[g.edge[t2]]
-    n1, d1 = tangent_at(g, h)
-    n2, d2 = tangent_at(g, t1)
-    sine, cosine, norm = np.sqrt(n1 * d2) + np.sqrt(n2 * d1), np.sqrt(d1 * d2) - np.sqrt(n1 * n2), (n1 + d1) * (n2 + d2)
-    m1, e1 = tangent_at(g, h1)
-    m2, e2 = tangent_at(g, t)
-    sine_j, cosine_j, norm_j = (
-        np.sqrt(m1 * e2) + np.sqrt(m2 * e1),
-        np.sqrt(e1 * e2) - np.sqrt(m1 * m2),
-        (m1 + e1) * (m2 + e2),
-    )
-    if not (norm > 0.0 and norm_j > 0.0):
-        return False
-    area_iab, area_jab = ai * ib * sine * cosine / norm, ja * bj * sine_j * cosine_j / norm_j
-    length = np.sqrt((ai - ib) ** 2 + 4.0 * ai * ib * sine * sine / norm)
+    area_jab, area_iab, area_g, area_f, length = diamond(g, h)
     if not (length > 0.0 and area_iab > 0.0 and area_jab > 0.0):
         return False
-    record(g, FLIP, h, t, area_jab, area_iab, 0.25 * np.sqrt(n2 * d2), 0.25 * np.sqrt(n1 * d1))
+    record(g, FLIP, h, t, -1, area_jab, area_iab, area_g, area_f)
     i, j, a, b = g.tail[h], g.tail[t], g.tail[h2], g.tail[t2]
     move(g, (h1, h2, t1, t2), (t2, h1, h2, t1))
     g.tail[h], g.tail[h1], g.tail[h2] = b, a, i
@@ -234,7 +249,7 @@ def split_face(g, f, u, v, w):
     base = g.length[g.edge[h]]
     apex_x, apex_y = apex_position(g, h)
     px, py = v * base + w * apex_x, w * apex_y
-    record(g, SPLIT_FACE, f, n, u, v, w, 1.0)
+    record(g, SPLIT_FACE, f, n, x, u, v, w, 1.0)
     to_a, to_b = new_edge(g, np.hypot(px, py), False), new_edge(g, np.hypot(px - base, py), False)
     to_c = new_edge(g, np.hypot(px - apex_x, py - apex_y), False)
     g.counts[2], g.counts[0] = x + 1, n + 2
@@ -270,7 +285,7 @@ def split_edge(g, h, fraction):
         g.counts[0] = n + 1
         here = along if g.forward[y] else 1.0 - along
         apex_x, apex_y = apex_position(g, y)
-        record(g, SPLIT_EDGE, y, n, 1.0 - here, here, 0.0, 1.0)
+        record(g, SPLIT_EDGE, y, n, x, 1.0 - here, here, 0.0, 1.0)
         cut = new_edge(g, np.hypot(apex_x - here * whole, apex_y), False)
         second, first, last = 3 * n, following(y), preceding(y)
         head, apex = g.tail[first], g.tail[last]

@@ -93,7 +93,7 @@ def refine(g, agenda, goal):
 @njit(cache=True)
 def changed_faces(g, n):
     """The faces that step n of the history changed or made, some perhaps twice."""
-    kind, first, second = g.steps[n]
+    kind, first, second = g.steps[n, 0], g.steps[n, 1], g.steps[n, 2]
     if kind == FLIP:
         return first // 3, second // 3, second // 3
     if kind == SPLIT_EDGE:
