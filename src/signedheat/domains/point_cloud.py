@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..operators.local_triangulations import LocalTriangulations, local_triangulations
 from .exchange import Exchangeable
+from .surface import Surface
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
 
 @dataclass(frozen=True, eq=False)
-class PointCloud(Exchangeable):
+class PointCloud(Exchangeable, Surface):
     """Points in space of any dimension, with or without normals and areas.
 
     Parameters
@@ -144,6 +145,10 @@ class PointCloud(Exchangeable):
         normals = np.empty_like(self.points)
         normals[ids] = found.normals
         return frozen(normals[self.representatives])
+
+    def _triangulation_vertices(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
+        known = (vertices >= 0) & (vertices < self.n_points)
+        return np.where(known, self.representatives[np.where(known, vertices, 0)], vertices)
 
     def __repr__(self) -> str:
         return f"PointCloud({self.n_points} points, {'with' if self.normals is not None else 'without'} normals)"

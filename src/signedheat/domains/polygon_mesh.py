@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..operators.virtual_refinement import VirtualRefinement, virtual_refinement
 from .exchange import Exchangeable
+from .surface import Surface
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
 
 @dataclass(frozen=True, eq=False)
-class PolygonMesh(Exchangeable):
+class PolygonMesh(Exchangeable, Surface):
     """Polygons in space.
 
     Parameters
@@ -126,6 +127,9 @@ class PolygonMesh(Exchangeable):
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the vertices of `triangulation`, from values at the vertices of the mesh."""
         return self.refinement.prolongation @ values
+
+    def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        return face_mask[self.refinement.face_polygons] if face_mask.shape == (self.n_polygons,) else face_mask
 
     def __repr__(self) -> str:
         return f"PolygonMesh({self.n_vertices} vertices, {self.n_polygons} polygons)"

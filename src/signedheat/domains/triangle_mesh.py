@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..operators.edges import EdgeTable, face_edges
 from .exchange import Exchangeable
+from .surface import Surface
 from .validation import element_ids, finite_rows
 
 
 @dataclass(frozen=True, eq=False)
-class TriangleMesh(Exchangeable):
+class TriangleMesh(Exchangeable, Surface):
     """Triangles in space: manifold or not, orientable or not, closed or not.
 
     Parameters

@@ -57,7 +57,7 @@ class BoxTree:
 def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
     """(n,) position of (n, 3) points along a space-filling curve, 21 bits per axis."""
     lower = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - lower).max()), np.finfo(float).tiny)
+    extent = max(float((points.max(axis=0) - lower).max()), 1e-290)
     cells = ((points - lower) * ((2**21 - 1) / extent)).astype(np.uint64)
     codes = np.zeros(len(points), dtype=np.uint64)
     for axis in range(3):

@@ -86,39 +86,42 @@ def locate(
 
 
 def places_at(triangles: LaidOutTriangles, vertices: NDArray[np.int64], name: str = "point") -> Places:
-    """Vertices as places, each through its first face.
+    """Vertices as places, each through its first face."""
+    corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices, name)
+    kinds = np.full(len(vertices), VERTEX)
+    return Places(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
+
+
+def corners_at(
+    faces: NDArray[np.int64], vertices: NDArray[np.int64], n_vertices: int, name: str = "point"
+) -> NDArray[np.int64]:
+    """(k,) the first corner ``3 face + k`` at each vertex.
 
     Raises
     ------
     SourceError
         If a vertex does not exist, or no face has it.
     """
-    vertices = np.asarray(vertices, dtype=np.int64)
-    outside = np.flatnonzero((vertices < 0) | (vertices >= triangles.n_vertices))
+    if not np.issubdtype(vertices.dtype, np.integer):
+        if len(vertices) == 0:
+            return np.empty(0, dtype=np.int64)
+        raise SourceError(f"{name}s are told by integer vertex ids, not {vertices.dtype}")
+    outside = np.flatnonzero((vertices < 0) | (vertices >= n_vertices))
     if len(outside):
         raise SourceError(
-            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to "
-            f"{triangles.n_vertices - 1}: was it made for another mesh?"
+            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to {n_vertices - 1}: "
+            "was it made for another mesh?"
         )
-    corners = first_corners(triangles.corner_vertices, vertices, triangles.n_vertices)
-    alone = np.flatnonzero(corners < 0)
-    if len(alone):
-        raise SourceError(
-            f"{name} {alone[0]} is vertex {vertices[alone[0]]}, which no face has: choose a vertex of the surface"
-        )
-    weights = np.zeros((len(vertices), 3))
-    weights[np.arange(len(vertices)), corners % 3] = 1.0
-    kinds = np.full(len(vertices), VERTEX)
-    return Places(corners // 3, weights, kinds, vertices, np.zeros(len(vertices)))
-
-
-def first_corners(faces: NDArray[np.int64], vertices: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
-    """Place in ``faces.ravel()`` at which each vertex appears first; −1 where it does not."""
     wanted = np.zeros(n_vertices, dtype=bool)
     wanted[vertices] = True
     corners = np.flatnonzero(wanted[faces])[::-1]
     first = np.full(n_vertices, -1)
     first[faces.ravel()[corners]] = corners
+    alone = np.flatnonzero(first[vertices] < 0)
+    if len(alone):
+        raise SourceError(
+            f"{name} {alone[0]} is vertex {vertices[alone[0]]}, which no face has: choose a vertex of the surface"
+        )
     return first[vertices]
 
 

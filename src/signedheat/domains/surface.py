@@ -1,0 +1,201 @@
+"""Curves and points on surfaces: what all surface domains have in common."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..sources.curves import Curve, SurfacePoints
+
+if TYPE_CHECKING:
+    from .triangle_mesh import TriangleMesh
+
+
+class Surface:
+    """A domain on which curves and points can be placed.
+
+    Face ids of curves and points refer to `triangulation`, vertex ids to the domain.
+    """
+
+    triangulation: TriangleMesh
+    on_triangulation: Any
+
+    def path(self, vertices: ArrayLike, closed: bool = False, oriented: bool = True) -> Curve:
+        """Curve through vertices, in order; φ > 0 to its left.
+
+        Parameters
+        ----------
+        vertices : (n,) int
+            Vertex ids. Consecutive ones that no face has in common are joined by a shortest line across faces.
+        closed : bool
+            Whether the last is joined to the first.
+        oriented : bool
+            Whether the curve has two sides.
+
+        Raises
+        ------
+        SourceError
+            If there are fewer than two vertices, or one does not exist or has no face.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).path([0, 1])
+        Curve(2 points, open, oriented)
+        """
+        faces, weights = self._at_vertices(vertices, "point of the path")
+        return Curve(faces, weights, closed=closed, oriented=oriented)
+
+    def points_at(self, vertices: ArrayLike) -> SurfacePoints:
+        """Vertices as isolated points, from which φ grows in all directions.
+
+        Parameters
+        ----------
+        vertices : int or (n,) int
+            Vertex ids.
+
+        Raises
+        ------
+        SourceError
+            If there is no vertex, or one does not exist or has no face.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).points_at(2)
+        SurfacePoints(1 points)
+        """
+        return SurfacePoints(*self._at_vertices(vertices, "point"))
+
+    def polyline(
+        self, points: ArrayLike, closed: bool = False, oriented: bool = True, max_distance: float | None = None
+    ) -> Curve:
+        """Polyline in space, brought onto the surface: closest points, joined by shortest lines across faces.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            In order.
+        closed : bool
+            Whether the last is joined to the first.
+        oriented : bool
+            Whether the curve has two sides.
+        max_distance : float, optional
+            How far from the surface a point may be; 5 % of the diagonal of its bounding box by default.
+
+        Returns
+        -------
+        Curve
+            One segment per face crossed.
+
+        Raises
+        ------
+        SourceError
+            If a point is too far away, or no way along the surface leads from one point to the next.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> mesh.polyline([[0.8, 0.2, 0.01], [0.2, 0.8, 0.01]]).barycentric.round(3).tolist()
+        [[0.2, 0.6, 0.2], [0.5, 0.0, 0.5], [0.2, 0.2, 0.6]]
+        """
+        from ..sources.projection import projected_curve
+
+        return projected_curve(self.triangulation, points, closed, oriented, max_distance)
+
+    def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
+        """Where a function, linear between vertices, takes a value; φ grows with the function.
+
+        Parameters
+        ----------
+        values : (n_vertices,) float
+            The function; faces with a NaN corner are left out.
+        level : float
+            The value.
+
+        Returns
+        -------
+        list of Curve
+            One for each connected line, closed where it closes; larger values lie to its left.
+
+        Raises
+        ------
+        SourceError
+            If there is not one value per vertex.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).level_set([0.0, 1.0, 1.0], 0.5)
+        [Curve(2 points, open, oriented)]
+        """
+        from ..sources.level_sets import level_set
+
+        values = np.asarray(values, dtype=np.float64)
+        return level_set(self.triangulation, self.on_triangulation(values), float(level))
+
+    def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
+        """Border of a region of faces; the region lies to the left, so φ > 0 in it.
+
+        Parameters
+        ----------
+        face_mask : (n_faces,) bool
+            Which faces make up the region.
+
+        Returns
+        -------
+        list of Curve
+            Edges between the region and other faces; edges at the boundary of the surface are no border.
+
+        Raises
+        ------
+        SourceError
+            If there is not one boolean per face.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> mesh.region_boundary([True, False])
+        [Curve(2 points, open, oriented)]
+        """
+        from ..sources.level_sets import region_boundary
+
+        return region_boundary(self.triangulation, self._triangle_mask(np.asarray(face_mask)))
+
+    def boundary_curves(self) -> list[Curve]:
+        """The boundary of the surface, which lies to the left of it.
+
+        Returns
+        -------
+        list of Curve
+            Closed loops; parts of loops where they touch one another.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).boundary_curves()
+        [Curve(3 points, closed, oriented)]
+        """
+        from ..sources.level_sets import boundary_curves
+
+        return boundary_curves(self.triangulation)
+
+    def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        from ..sources.places import corners_at
+
+        ids = self._triangulation_vertices(np.atleast_1d(np.asarray(vertices)))
+        mesh = self.triangulation
+        corners = corners_at(mesh.faces, ids, mesh.n_vertices, name)
+        return corners // 3, np.eye(3)[corners % 3]
+
+    def _triangulation_vertices(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Vertices of `triangulation` that stand for vertices of the domain."""
+        return vertices
+
+    def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Faces of `triangulation` that belong to faces of the domain."""
+        return face_mask

@@ -1,0 +1,63 @@
+"""Segments joined end to end."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def chains(
+    tails: NDArray[np.int64], heads: NDArray[np.int64], directed: bool = True
+) -> list[tuple[NDArray[np.int64], NDArray[np.bool_], bool]]:
+    """Join segments into chains as long as there is one way on.
+
+    Parameters
+    ----------
+    tails, heads : (k,) int
+        The nodes that each segment joins.
+    directed : bool
+        Whether segments keep their direction; if not, they are turned round where needed.
+
+    Returns
+    -------
+    list of (segments, backwards, closed)
+        Segment ids in order, which of them run from head to tail, and whether the chain closes.
+
+    Examples
+    --------
+    >>> [(segments.tolist(), closed) for segments, _, closed in chains(np.array([1, 0, 5]), np.array([2, 1, 5]))]
+    [([1, 0], False), ([2], True)]
+    """
+    n = int(max(tails.max(initial=-1), heads.max(initial=-1))) + 1
+    leaving, arriving = np.bincount(tails, minlength=n), np.bincount(heads, minlength=n)
+    through = (leaving == 1) & (arriving == 1) if directed else leaving + arriving == 2
+    at: list[list[int]] = [[] for _ in range(n)]
+    for segment, (tail, head) in enumerate(zip(tails.tolist(), heads.tolist(), strict=True)):
+        at[tail].append(segment)
+        if not directed:
+            at[head].append(segment)
+    used = np.zeros(len(tails), dtype=bool)
+
+    def walk(segment: int, start: int) -> tuple[list[int], list[bool], int]:
+        order, backwards, node = [], [], start
+        while True:
+            used[segment] = True
+            order.append(segment)
+            backwards.append(bool(tails[segment] != node))
+            node = int(tails[segment] if backwards[-1] else heads[segment])
+            onward = [s for s in at[node] if not used[s]] if through[node] else []
+            if not onward:
+                return order, backwards, node
+            segment = onward[0]
+
+    found = []
+    for pass_through in (False, True):  # ends and junctions first; what is left are loops
+        for segment in range(len(tails)):
+            start = int(tails[segment])
+            if not directed and not pass_through and through[start]:
+                start = int(heads[segment])
+            if used[segment] or (not pass_through and through[start]):
+                continue
+            order, backwards, end = walk(segment, start)
+            found.append((np.array(order), np.array(backwards), end == start))
+    return found
