@@ -69,7 +69,31 @@ class SurfaceDiscretization:
         """Unoriented curves and points inside faces get edges and vertices of their own."""
         if self.bring is not None:
             sources = [self.bring(source) for source in sources]
-        return self, sources
+        from ..sources.embedding import embed
+        from ..sources.pieces import in_pieces
+
+        positions = None if self.bring is not None else self.domain.triangulation.vertices
+        groups = in_pieces(sources, self.triangles, positions)
+        triangles, groups = embed(self.triangles, groups)
+        return self if triangles is self.triangles else self._cut_into(triangles), groups
+
+    def _cut_into(self, triangles: LaidOutTriangles) -> SurfaceDiscretization:
+        """The same surface in more triangles, whose first vertices are those of this."""
+        added = triangles.n_vertices - self.triangles.n_vertices
+        n_unknowns = self.triangles.n_vertices if self.prolongation is None else self.prolongation.shape[1]
+        cut = replace(
+            self,
+            triangles=triangles,
+            prolongation=None
+            if self.prolongation is None
+            else sparse.block_diag([self.prolongation, sparse.identity(added)], format="csr"),
+            restriction=np.arange(n_unknowns) if self.restriction is None else self.restriction,
+            bring=None,
+            notes={**self.notes, "vertices added for sources": added},
+            _factors={},
+        )
+        vars(cut)["spacing"] = self.spacing  # h is that of the domain, whatever small triangles the cuts made
+        return cut
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
         """X₀ and the rows that interpolate φ along the sources."""

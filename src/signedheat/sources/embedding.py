@@ -19,7 +19,9 @@ from .places import EDGE, FACE, VERTEX, Places, chained, distinct, places_at
 from .planar import arrange, triangulate
 
 
-def embed(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> tuple[LaidOutTriangles, list[Pieces]]:
+def embed(
+    triangles: LaidOutTriangles, groups: Sequence[Sequence[Pieces]]
+) -> tuple[LaidOutTriangles, list[list[Pieces]]]:
     """Cut faces wherever an unoriented curve or an isolated point leaves edges and vertices (MATH.md §2).
 
     Whatever else lies in a face that is cut, or on an edge that is split, is embedded too; all other faces and pieces
@@ -29,23 +31,24 @@ def embed(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> tuple[LaidOut
     ----------
     triangles : LaidOutTriangles
         The surface.
-    parts : sequence of Pieces
+    groups : sequence of sequences of Pieces
         The sources, in pieces.
 
     Returns
     -------
     triangles : LaidOutTriangles
         The old vertices first, then new ones; the very same object if nothing had to be cut.
-    parts : list of Pieces
+    groups : list of lists of Pieces
         The sources on these triangles.
     """
-    parts = list(parts)
+    parts = [part for group in groups for part in group]
     if all(part.fits for part in parts):
-        return triangles, parts
+        return triangles, [list(group) for group in groups]
     everything = Union.of(parts)
     cut_faces, split_edges = reach(triangles, everything, [not part.fits for part in parts])
     finer, moved = flipped(*Cut(triangles, everything, cut_faces, split_edges).assemble())
-    return finer, [moved.part(k, part.oriented) for k, part in enumerate(parts)]
+    pieces = iter([moved.part(k, part.oriented) for k, part in enumerate(parts)])
+    return finer, [[next(pieces) for _ in group] for group in groups]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
 from typing import Any
@@ -83,6 +84,16 @@ def pieces(
         f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a Curve or SurfacePoints "
         "(see the domain's path, polyline, level_set and points_at)"
     )
+
+
+def in_pieces(
+    sources: Sequence[Any], triangles: LaidOutTriangles, positions: NDArray[np.float64] | None = None
+) -> list[list[Pieces]]:
+    """Each of several sources in pieces; a sequence of curves and points counts as one source."""
+    return [
+        [pieces(item, triangles, positions, number) for item in (source if isinstance(source, Sequence) else [source])]
+        for number, source in enumerate(sources)
+    ]
 
 
 @pieces.register

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import SourceError
 from ..operators.laid_out_triangles import LaidOutTriangles
 from .free_ends import free_end_arcs
-from .pieces import Pieces, pieces, rows_of
+from .pieces import Pieces, in_pieces, rows_of
 from .places import VERTEX, chained, distinct
 
 
@@ -62,9 +62,9 @@ def surface_source(
     ----------
     triangles : LaidOutTriangles
         The surface; face ids of the sources refer to it.
-    sources : sequence of Curve, SurfacePoints or Pieces
-        What distance is measured to. Unoriented curves must run along edges and points must lie at vertices
-        (`embedding.embed` brings them there).
+    sources : sequence of Curve, SurfacePoints, Pieces or sequences of them
+        What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges and
+        points must lie at vertices (`embedding.embed` brings them there).
     diffusion : float
         τ in ``t = τ h²``.
     spacing : float
@@ -85,24 +85,24 @@ def surface_source(
     >>> surface_source(triangles, [across], 1.0, 0.5).weights
     array([0.25, 0.25])
     """
-    parts = [pieces(source, triangles, positions, number) for number, source in enumerate(sources)]
-    if not parts:
-        raise SourceError("there is no source: pass at least one curve or point")
-    for number, part in enumerate(parts):
-        if not part.fits:
-            raise SourceError(f"source {number} is unoriented and leaves the edges: embed it in the triangles first")
+    groups = in_pieces(sources, triangles, positions)
+    parts = [part for group in groups for part in group]
+    if not parts or not all(groups):
+        raise SourceError("there is no source: pass at least one curve or point, and no empty lists")
+    if not all(part.fits for part in parts):
+        raise SourceError("points and unoriented curves inside faces must be embedded in the triangles first")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
     vectors += unoriented_vectors(triangles, parts, spacing)
     vectors += spacing * point_vectors(triangles, [p for p in parts if len(p.ends) == 0])
 
-    sizes = [len(p.nodes) for p in parts]
+    sizes = [sum(len(p.nodes) for p in group) for group in groups]
     return SurfaceSource(
         vectors=vectors,
         time=diffusion * spacing**2,
         rows=vstack([rows_of(triangles, p.nodes) for p in parts], format="csr"),
         weights=np.concatenate([line_elements(p, spacing) for p in parts]),
         components=connected(parts),
-        owners=np.repeat(np.arange(len(parts)), sizes),
+        owners=np.repeat(np.arange(len(groups)), sizes),
         oriented=any(p.oriented for p in parts),
     )
 
