@@ -2,6 +2,7 @@
 
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .discretization import Diagnostics
+from .domains.digital_surface import DigitalSurface
 from .domains.grid import Grid
 from .domains.point_cloud import PointCloud
 from .domains.polygon_mesh import PolygonMesh
@@ -17,9 +18,13 @@ from .errors import (
     SourceError,
     UnreachedWarning,
 )
+from .extensions import grid_sharpening as _grid_sharpening  # noqa: F401  registers it
+from .extensions.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from .extensions.sharpening import sharpen
 from .fields.grid_field import GridField
 from .fields.vertex_field import VertexField
 from .io import load_field, read, save
+from .lowering import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
 from .lowering import grid as _grid  # noqa: F401  registers the lowering
 from .lowering import point_clouds as _point_clouds  # noqa: F401  registers the lowering
 from .lowering import polygons as _polygons  # noqa: F401  registers the lowering
@@ -33,6 +38,7 @@ __all__ = [
     "ConstraintError",
     "Curve",
     "Diagnostics",
+    "DigitalSurface",
     "EachComponent",
     "FactorizationError",
     "FileFormatError",
@@ -40,6 +46,7 @@ __all__ = [
     "GeometryError",
     "Grid",
     "GridField",
+    "IntrinsicTriangulation",
     "LevelValues",
     "MemoryLimitError",
     "OutsideError",
@@ -54,8 +61,10 @@ __all__ = [
     "UnreachedWarning",
     "VertexField",
     "ZeroSet",
+    "intrinsic_delaunay",
     "load_field",
     "read",
     "save",
+    "sharpen",
     "signed_distance",
 ]

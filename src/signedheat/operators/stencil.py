@@ -15,7 +15,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..parallel import n_threads
-from .sweeps import ScaledVectors, padded_shape
+from .sweeps import ScaledVectors
+from .wavefront import padded_shape
 
 SLAB = 16
 """Rows of lines that one job works on."""
@@ -25,7 +26,7 @@ def node_directions(vectors: ScaledVectors, dimension: int) -> NDArray[np.float3
     """(*shape, d) unit vectors, or zero where nothing arrived; each component is contiguous in memory."""
     shape = vectors.mantissas.shape[:4]
     directions = np.empty((dimension, *shape), dtype=np.float32)
-    _by_slabs(shape, _directions, vectors.mantissas, directions)
+    by_slabs(shape, _directions, vectors.mantissas, directions)
     return np.moveaxis(directions.reshape(dimension, *shape[4 - dimension :]), 0, -1)
 
 
@@ -41,7 +42,7 @@ def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -
     padded = padded_shape(shape)
     components = np.ascontiguousarray(np.moveaxis(directions, -1, 0)).reshape(-1, *padded)
     out = np.empty(padded)
-    _by_slabs(padded, _divergence, components, 0.5 / spacing, out)
+    by_slabs(padded, _divergence, components, 0.5 / spacing, out)
     return out.reshape(shape)
 
 
@@ -124,7 +125,7 @@ def scatter(
     return sums, touched
 
 
-def _by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: Any) -> None:
+def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: Any) -> None:
     """Run a kernel over slabs of the first long axis."""
     axis = 0 if shape[0] > 1 else 1
     n = shape[axis]

@@ -5,21 +5,18 @@ X decays over hundreds of decades and keeps its relative accuracy. Every stretch
 power of two beside single-precision mantissas, so that it cannot underflow either, on a grid of any length.
 
 Lines along the last axis are solved exactly; along all other axes lines are updated in order, in every combination of
-directions. Tiles of lines on one diagonal do not depend on each other and run on several threads; each line reads the
-same values as in plain order, so the result does not depend on the number of threads.
+directions.
 """
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..parallel import n_threads
+from .wavefront import sweep_lines
 
 STRETCH = 16
 """Nodes that share an exponent: X changes by less than e^16 over them at the default diffusion time."""
@@ -46,11 +43,6 @@ class ScaledVectors:
     exponents: NDArray[np.int32]
 
 
-def padded_shape(shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """Shape with axes of one node in front, to make four."""
-    return (1,) * (4 - len(shape)) + tuple(shape)
-
-
 def diffuse_by_sweeps(
     sources: NDArray[np.float32], touched: NDArray[np.bool_], ratios: NDArray[np.float64], rounds: int
 ) -> ScaledVectors:
@@ -70,45 +62,19 @@ def diffuse_by_sweeps(
     shape = sources.shape[:4]
     vectors = ScaledVectors(np.zeros(sources.shape, dtype=np.float32), np.full(touched.shape, NOTHING, dtype=np.int32))
     pivots = line_pivots(shape, ratios)
-    steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
-    tile = [max(1, min(32, -(-n // 8))) for n in shape[1:3]]
-    with ThreadPoolExecutor(n_threads()) as pool:
-        for _ in range(rounds):
-            for direction in product(*steps):
-                for plane in range(shape[0])[:: direction[0]]:
-                    for wave in wavefronts(shape[1:3], tile, direction[1:]):
-                        jobs = [
-                            pool.submit(
-                                _sweep_tile,
-                                vectors.mantissas,
-                                vectors.exponents,
-                                sources,
-                                touched,
-                                ratios.astype(np.float32),
-                                pivots,
-                                plane,
-                                block,
-                                POWERS,
-                            )
-                            for block in wave
-                        ]
-                        for job in jobs:
-                            job.result()
+    sweep_lines(
+        _sweep_tile,
+        shape,
+        rounds,
+        vectors.mantissas,
+        vectors.exponents,
+        sources,
+        touched,
+        ratios.astype(np.float32),
+        pivots,
+        POWERS,
+    )
     return vectors
-
-
-def wavefronts(shape: tuple[int, int], tile: list[int], direction: tuple[int, int]) -> list[list[NDArray[np.int64]]]:
-    """Tiles (begin, end, step; begin, end, step) of a plane of lines, in groups that may run at the same time."""
-    starts = [range(0, n, size)[::step] for n, size, step in zip(shape, tile, direction, strict=True)]
-    waves: list[list[NDArray[np.int64]]] = [[] for _ in range(len(starts[0]) + len(starts[1]) - 1)]
-    for a, first in enumerate(starts[0]):
-        for b, second in enumerate(starts[1]):
-            block = []
-            for start, n, size, step in zip((first, second), shape, tile, direction, strict=True):
-                stop = min(start + size, n)
-                block += [start, stop, 1] if step > 0 else [stop - 1, start - 1, -1]
-            waves[a + b].append(np.array(block))
-    return waves
 
 
 def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -142,15 +108,16 @@ def _lift(size, exponent):
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nnan", "nsz"})
-def _sweep_tile(mantissas, exponents, sources, touched, ratios, pivots, i, block, powers):
+def _sweep_tile(mantissas, exponents, sources, touched, ratios, pivots, powers, tile):
     """Update the lines of one tile in order."""
     n0, n1, n2, n = mantissas.shape[:4]
     stretches = exponents.shape[3]
     row = np.empty(4 * n, dtype=np.float32)
     scale_of = np.empty(stretches, dtype=np.int32)
     along = ratios[3]
-    for j in range(block[0], block[1], block[2]):
-        for k in range(block[3], block[4], block[5]):
+    i = tile[0]
+    for j in range(tile[3], tile[4], tile[5]):
+        for k in range(tile[6], tile[7], tile[8]):
             walls = 0
             if i == 0 or i == n0 - 1:
                 walls |= 1
