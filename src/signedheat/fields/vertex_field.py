@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -31,3 +31,8 @@ class VertexField:
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     source: Any = field(default=None, repr=False)
+
+    def restrict(self) -> VertexField:
+        """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself."""
+        mesh = getattr(self.domain, "mesh", self.domain)
+        return self if mesh is self.domain else replace(self, domain=mesh, values=self.values[: mesh.n_vertices])

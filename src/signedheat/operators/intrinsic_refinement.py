@@ -18,7 +18,9 @@ PER_FACE = ("tail", "edge", "forward", "front", "ring")
 PER_EDGE = ("start", "length", "fixed")
 
 
-def refine_all(gluing: Gluing, angle: float, needle: float, max_vertices: int) -> tuple[Gluing, bool]:
+def refine_all(
+    gluing: Gluing, angle: float, needle: float, max_vertices: int
+) -> tuple[Gluing, NDArray[np.int64], bool]:
     """Refine a Delaunay triangulation until every face that can be helped has no angle below `angle`.
 
     Fixed, boundary and nonmanifold edges may be split but stay. Small angles remain where fixed edges meet, or the
@@ -41,6 +43,8 @@ def refine_all(gluing: Gluing, angle: float, needle: float, max_vertices: int) -
     -------
     Gluing
         The refined triangulation.
+    (e,) int
+        The fixed edge before that each edge now is part of, or −1.
     bool
         Whether it was finished before the limit.
     """
@@ -74,7 +78,8 @@ def refine_all(gluing: Gluing, angle: float, needle: float, max_vertices: int) -
     while True:
         status = refine(gluing, agenda, goal)
         if status != GROW:
-            return gluing, status != FULL
+            n_edges = int(gluing.counts[1])
+            return gluing, np.append(segments, -1)[agenda.segment[:n_edges]], status != FULL
         gluing = gluing._replace(**{k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")})
         grown = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow")
         agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in grown})

@@ -1,0 +1,249 @@
+"""Intrinsic triangulations of a mesh: the same surface in better triangles (Sec. 9.4, Fig. 22).
+
+Edges are straightest lines along the surface instead of segments in space, so that triangles can be chosen for their
+angles alone: nothing of the surface changes. Flips give the intrinsic Delaunay triangulation (Bobenko & Springborn
+2007), in which the maximum principle holds; more vertices give a minimum angle (Sharp, Soliman & Crane 2019).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..discretization import discretize
+from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import frozen
+from ..errors import GeometryError
+from ..lowering.surface import SurfaceDiscretization
+from ..operators.intrinsic_history import History
+from ..operators.laid_out_triangles import LaidOutTriangles
+from ..operators.mollification import mollify
+from ..sources.carrying import Embedding, carry_pieces
+from ..sources.pieces import Pieces, in_pieces, pieces
+
+MARGIN = 1e-12
+"""Triangle inequalities hold at least by this fraction of the mean length; flat triangles are thickened to it."""
+
+LARGEST_ANGLE = 30.0
+"""Degrees; refinement is not sure to end for more."""
+
+NEEDLE = 0.5
+"""Degrees; refinement leaves alone what is thinner, unless it has an angle above 150°."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntrinsicTriangulation:
+    """A mesh in other triangles; made by `intrinsic_delaunay`. A domain like the mesh itself.
+
+    The first vertices are those of the mesh, under their numbers. Sources are given on the mesh; fields come back at
+    all vertices, and `restrict` returns to those of the mesh.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        What is triangulated.
+    triangles : LaidOutTriangles
+        The triangles: vertices, edges and shapes. Two edges may join the same two vertices, or a vertex with itself.
+    marked : (e,) bool
+        Edges along which the kept curves run.
+    goal : float
+        The angle, in degrees, that refinement aimed at; 0 for flips only.
+    complete : bool
+        Whether refinement ended before the limit on the number of vertices.
+    """
+
+    mesh: TriangleMesh
+    triangles: LaidOutTriangles
+    marked: NDArray[np.bool_]
+    goal: float
+    complete: bool
+    base: LaidOutTriangles = field(repr=False)
+    embedding: Embedding = field(repr=False)
+    history: History = field(repr=False)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices; those of the mesh go first."""
+        return self.triangles.n_vertices
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return self.triangles.n_faces
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """(m, 3) vertex ids. The corners alone do not tell a face: see `triangles` for its edges."""
+        return self.triangles.corner_vertices
+
+    @cached_property
+    def vertices(self) -> NDArray[np.float64]:
+        """(n, 3) where in space the vertices lie, all of them on the mesh."""
+        faces, weights = self.vertex_places
+        return frozen(self.in_space(faces, weights))
+
+    @cached_property
+    def vertex_places(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """(n,) face of the mesh, and (n, 3) barycentric coordinates in it, of every vertex; face −1 where unused."""
+        old = self.mesh.faces
+        faces, weights = np.full(self.mesh.n_vertices, -1), np.zeros((self.mesh.n_vertices, 3))
+        for k in range(3):
+            faces[old[:, k]], weights[old[:, k]] = np.arange(len(old)), np.eye(3)[k]
+        cut = self.embedding.triangles
+        extra, corner = np.unique(cut.corner_vertices.ravel(), return_index=True)
+        corner = corner[extra >= self.mesh.n_vertices]
+        put = self.embedding.up(corner // 3, np.eye(3)[corner % 3])
+        new = self.embedding.up(*self.history.new_vertices)
+        return np.concatenate([faces, put[0], new[0]]), np.concatenate([weights, put[1], new[1]])
+
+    @cached_property
+    def corner_angles(self) -> NDArray[np.float64]:
+        """(m, 3) radians."""
+        return np.arctan2(1.0, self.triangles.corner_cotangents)
+
+    @cached_property
+    def thin_faces(self) -> NDArray[np.int64]:
+        """(k,) faces with an angle below the goal."""
+        return np.flatnonzero(self.corner_angles.min(axis=1) < np.radians(self.goal) - 1e-9)
+
+    @property
+    def summary(self) -> str:
+        """What was reached, in words."""
+        if not self.goal:
+            return f"Delaunay; the smallest angle is {np.degrees(self.corner_angles.min()):.3g}°"
+        if not len(self.thin_faces):
+            return f"no angle below {self.goal:g}°"
+        angles = self.corner_angles[self.thin_faces]
+        needles = int(((angles.min(axis=1) < np.radians(NEEDLE)) & (angles.max(axis=1) < np.radians(150.0))).sum())
+        reasons = [f"{needles} where vertices all but coincide"] if needles else []
+        rest = len(angles) - needles
+        if rest and self.complete:
+            reasons.append(f"{rest} where the surface, its boundary or the kept curves close in at less than 60°")
+        elif rest:
+            reasons.append(f"{rest} because the limit of {self.n_vertices} vertices was reached: raise max_vertices")
+        return f"no angle below {self.goal:g}° but in {len(angles)} of {self.n_faces} faces: {', '.join(reasons)}"
+
+    def in_space(self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p, 3) positions of points given on the mesh."""
+        positions = np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[faces]])
+        lost = np.flatnonzero(np.asarray(faces) < 0)
+        positions[lost] = self.mesh.vertices[lost]
+        return positions
+
+    def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Points of the mesh (faces, barycentric coordinates) in the triangulation's own faces."""
+        faces, barycentric = np.asarray(faces, dtype=np.int64), np.asarray(barycentric, dtype=np.float64)
+        below = self.embedding.down(faces, barycentric, np.zeros((len(faces), 0, 3)))
+        found, weights, _ = self.history.forward(below[0], np.maximum(below[1], 0.0))
+        return found, weights / weights.sum(axis=1, keepdims=True)
+
+    def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Edges as they run on the mesh: number of the edge, start and end in space of each straight part."""
+        lines = self.history.edges_before()
+        starts = self.in_space(*self.embedding.up(lines.faces, lines.starts))
+        return lines.owners, starts, self.in_space(*self.embedding.up(lines.faces, lines.ends))
+
+    def bring(self, source: Any) -> Any:
+        """A source on the mesh, as these triangles see it."""
+        if isinstance(source, Sequence):
+            return [self.bring(part) for part in source]
+        seen = pieces(source, self.base, self.mesh.vertices)
+        return seen if isinstance(source, Pieces) else carry_pieces(seen, self.embedding, self.history, self.base)
+
+    def __repr__(self) -> str:
+        return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"
+
+
+def intrinsic_delaunay(
+    mesh: TriangleMesh,
+    keep: Any = (),
+    refine: bool = False,
+    angle: float = 28.0,
+    max_vertices: int | None = None,
+) -> IntrinsicTriangulation:
+    """Triangulate a mesh anew, along the surface: better angles, the same geometry.
+
+    Boundary and nonmanifold edges stay, and so do kept curves, which become paths of edges; refinement splits them
+    where it must. Any mesh will do: nonmanifold, nonorientable, with faces turned at random, nearly flat faces.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    keep : Curve, SurfacePoints or a sequence of them
+        Sources that are to run along edges, and to lie at vertices. Others can still be used afterwards.
+    refine : bool
+        Insert vertices until no angle is smaller than `angle`. Smaller ones remain where the surface, its boundary or
+        kept curves close in at less than 60°; and, on purpose, below half a degree in faces at two vertices that almost
+        coincide (they do no harm as long as no angle is large). `IntrinsicTriangulation.summary` tells.
+    angle : float
+        Degrees, at most 30.
+    max_vertices : int, optional
+        Refine no further; 20 for every vertex of the mesh, and 10,000 more, by default.
+
+    Returns
+    -------
+    IntrinsicTriangulation
+        A domain; time and memory grow in proportion to the flips and the new vertices, which on all but contrived
+        meshes are in proportion to the mesh.
+
+    Raises
+    ------
+    GeometryError
+        If the domain is not a triangle mesh, has no area, or `angle` is out of range.
+    SourceError
+        If a curve to be kept does not fit the mesh.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> vertices = [[0, 0, 0], [10, 0, 0], [10, 1, 0], [0, 1, 0]]
+    >>> strip = sh.TriangleMesh(vertices, [[0, 1, 2], [0, 2, 3]])
+    >>> better = sh.intrinsic_delaunay(strip, refine=True)
+    >>> better.summary
+    'no angle below 28°'
+    >>> bool(abs(better.triangles.face_areas.sum() - 10) < 1e-12)
+    True
+    """
+    from ..operators.intrinsic_delaunay import flip_all, glue, lay_out
+    from ..operators.intrinsic_refinement import refine_all
+
+    if not isinstance(mesh, TriangleMesh):
+        raise GeometryError(f"{type(mesh).__name__} has no triangles to flip: give a TriangleMesh")
+    if not 0 < angle <= LARGEST_ANGLE:
+        raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle}")
+    base, _ = laid_out(mesh)
+    listed = list(keep) if isinstance(keep, Sequence) else [keep]
+    kept = list(chain.from_iterable(in_pieces(listed, base, mesh.vertices)))
+    embedding = Embedding.of(base, kept)
+    gluing, marked, complete = flip_all(glue(embedding.triangles, embedding.marked)), embedding.marked, True
+    if refine:
+        limit = 20 * mesh.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
+        gluing, origin, complete = refine_all(gluing, np.radians(angle), np.radians(NEEDLE), limit)
+        marked = np.append(marked, False)[origin]
+    n = int(gluing.counts[3])
+    triangles = lay_out(gluing)
+    history = History(embedding.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
+    return IntrinsicTriangulation(
+        mesh, triangles, marked, angle if refine else 0.0, complete, base=base, embedding=embedding, history=history
+    )
+
+
+def laid_out(mesh: TriangleMesh) -> tuple[LaidOutTriangles, float]:
+    """A mesh as laid-out triangles, none of them quite flat; and the length that was added to all edges for that."""
+    lengths, added = mollify(mesh.edge_lengths[mesh.edges.of_faces], MARGIN)
+    if not lengths.max() > 0:
+        raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
+    return LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added
+
+
+@discretize.register
+def _(domain: IntrinsicTriangulation) -> SurfaceDiscretization:
+    notes = {"intrinsic triangulation": domain.summary}
+    return SurfaceDiscretization(domain, domain.triangles, bring=domain.bring, notes=notes)
