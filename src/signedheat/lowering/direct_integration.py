@@ -61,11 +61,12 @@ class DirectIntegration:
         The constants are those at which no group pulls: the multipliers of each add up to zero. One constant per
         connected part of the domain stays free, and is chosen by the mean.
         """
-        rows = self.rows(source)
+        pinned = getattr(source, "pinned", slice(None))
+        rows, values = self.rows(source)[pinned], levels.values[pinned]
         if levels.groups is None:
-            values, _ = self._interpolate(rows, divergence[:, None], levels.values[:, None])
-            return self._reached(values[:, 0], rows)
-        group, values = levels.groups, levels.values
+            fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
+            return self._reached(fitted[:, 0], rows)
+        group = levels.groups[pinned]
         part = self._part_of(rows)
         free = np.ones(int(group.max()) + 1, dtype=bool)
         free[group[np.unique(part, return_index=True)[1]]] = False

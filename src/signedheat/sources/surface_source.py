@@ -15,7 +15,7 @@ from ..errors import SourceError
 from ..operators.laid_out_triangles import LaidOutTriangles
 from .free_ends import free_end_arcs
 from .pieces import Pieces, in_pieces, rows_of
-from .places import VERTEX, chained, distinct
+from .places import FACE, VERTEX, chained, distinct
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +38,9 @@ class SurfaceSource:
         Which source each sample belongs to.
     oriented : bool
         Whether any source has two sides; where none has, φ is an unsigned distance.
+    pinned : (s,) bool
+        Samples at which exact constraints hold: not those inside faces, where their component has others. Three of them
+        inside one face, however close to a line, would flatten φ on it.
     """
 
     vectors: NDArray[np.complex128]
@@ -47,6 +50,7 @@ class SurfaceSource:
     components: NDArray[np.int64]
     owners: NDArray[np.int64]
     oriented: bool
+    pinned: NDArray[np.bool_]
 
 
 def surface_source(
@@ -95,15 +99,18 @@ def surface_source(
     vectors += unoriented_vectors(triangles, parts, spacing)
     vectors += spacing * point_vectors(triangles, [p for p in parts if len(p.ends) == 0])
 
+    components = connected(parts)
+    outside = np.concatenate([p.nodes.kinds != FACE for p in parts])
     sizes = [sum(len(p.nodes) for p in group) for group in groups]
     return SurfaceSource(
         vectors=vectors,
         time=diffusion * spacing**2,
         rows=vstack([rows_of(triangles, p.nodes) for p in parts], format="csr"),
         weights=np.concatenate([line_elements(p, spacing) for p in parts]),
-        components=connected(parts),
+        components=components,
         owners=np.repeat(np.arange(len(groups)), sizes),
         oriented=any(p.oriented for p in parts),
+        pinned=outside | ~np.isin(components, components[outside]),
     )
 
 
