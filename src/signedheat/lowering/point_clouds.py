@@ -13,7 +13,10 @@ from .surface import SurfaceDiscretization
 
 @discretize.register
 def _(domain: PointCloud) -> SurfaceDiscretization:
-    """φ lives at the points; points that coincide share one unknown."""
+    """φ lives at the points; points that coincide share one unknown.
+
+    h is the mean distance between neighbouring points: triangles between samples say nothing of the surface below it.
+    """
     mesh = domain.triangulation
     used = np.zeros(domain.n_points, dtype=bool)
     used[mesh.faces] = True
@@ -21,4 +24,5 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
         "duplicate points": int((domain.representatives != np.arange(domain.n_points)).sum()),
         "points without triangles": np.flatnonzero(~used[domain.representatives]),
     }
-    return replace(discretize(mesh), domain=domain, restriction=domain.representatives, notes=notes)
+    spacing = float(mesh.edge_lengths.mean())
+    return replace(discretize(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)

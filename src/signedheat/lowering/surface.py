@@ -38,6 +38,8 @@ class SurfaceDiscretization:
         Unknown of φ that belongs to each vertex of the domain, where the triangles have more vertices than it.
     bring : callable, optional
         Takes a source on the domain to the same source on the triangles, where their faces are not the domain's.
+    spacing : float, optional
+        h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
     notes : mapping
         What was repaired in making the triangles; passed on to the diagnostics of every field.
     """
@@ -47,15 +49,15 @@ class SurfaceDiscretization:
     prolongation: sparse.csr_matrix | None = None
     restriction: NDArray[np.int64] | None = None
     bring: Callable[[Any], Any] | None = None
+    spacing: float | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
     _factors: dict[float, Factor] = field(default_factory=dict, repr=False)
 
-    @cached_property
-    def spacing(self) -> float:
-        """h: half the mean edge length, the mean distance between neighbouring edge midpoints."""
-        lengths = np.empty(self.triangles.n_edges)
-        lengths[self.triangles.edges.of_faces] = self.triangles.edge_lengths
-        return 0.5 * float(lengths.mean())
+    def __post_init__(self) -> None:
+        if self.spacing is None:
+            lengths = np.empty(self.triangles.n_edges)
+            lengths[self.triangles.edges.of_faces] = self.triangles.edge_lengths
+            object.__setattr__(self, "spacing", 0.5 * float(lengths.mean()))
 
     @cached_property
     def integration(self) -> DirectIntegration:
@@ -81,7 +83,7 @@ class SurfaceDiscretization:
         """The same surface in more triangles, whose first vertices are those of this."""
         added = triangles.n_vertices - self.triangles.n_vertices
         n_unknowns = self.triangles.n_vertices if self.prolongation is None else self.prolongation.shape[1]
-        cut = replace(
+        return replace(
             self,
             triangles=triangles,
             prolongation=None
@@ -92,8 +94,6 @@ class SurfaceDiscretization:
             notes={**self.notes, "vertices added for sources": added},
             _factors={},
         )
-        vars(cut)["spacing"] = self.spacing  # h is that of the domain, whatever small triangles the cuts made
-        return cut
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
         """X₀ and the rows that interpolate φ along the sources."""

@@ -192,7 +192,7 @@ def _without_repeats(
 
 def _sums(values: NDArray[np.float64], groups: NDArray[np.int64], n_groups: int) -> NDArray[np.float64]:
     """Sums over the rows of each group."""
-    flat = values.reshape(len(values), -1)
+    flat = values.reshape(len(values), int(np.prod(values.shape[1:])))
     columns = [np.bincount(groups, column, n_groups) for column in flat.T]
     return np.stack(columns, axis=1).reshape(n_groups, *values.shape[1:])
 
