@@ -23,7 +23,7 @@ from .extensions.intrinsic_triangulation import IntrinsicTriangulation, intrinsi
 from .extensions.sharpening import sharpen
 from .fields.grid_field import GridField
 from .fields.vertex_field import VertexField
-from .io import load_field, read, save
+from .io import load_field, read, read_curves, save, write_curves
 from .lowering import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
 from .lowering import grid as _grid  # noqa: F401  registers the lowering
 from .lowering import point_clouds as _point_clouds  # noqa: F401  registers the lowering
@@ -64,7 +64,9 @@ __all__ = [
     "intrinsic_delaunay",
     "load_field",
     "read",
+    "read_curves",
     "save",
     "sharpen",
     "signed_distance",
+    "write_curves",
 ]

@@ -1,0 +1,217 @@
+"""What files of curves say: groups of nodes, in each of the formats."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError, SourceError
+from ..sources.chains import chains
+from ..sources.curves import Curve
+from .files import PathLike, text
+
+SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
+
+
+class Node(NamedTuple):
+    """A point of a file: up to three vertices and their weights."""
+
+    vertices: tuple[int, ...]
+    weights: tuple[float, ...]
+
+
+class Group(NamedTuple):
+    """A curve of a file, or several points."""
+
+    kind: str
+    nodes: list[Node]
+
+
+def edge_vertices(domain: Any) -> NDArray[np.int64]:
+    """(e, 2) tails and heads of the edges of a domain, by first appearance in its faces."""
+    if not hasattr(domain, "next_corners"):
+        return domain.triangulation.edges.vertices
+    ends = np.stack([domain.corners, domain.next_corners], axis=1)
+    first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)[1]
+    return ends[np.sort(first)]
+
+
+def read_text(path: PathLike, domain: Any) -> list[Group]:
+    """Both text formats."""
+    lines = [line.split() for line in text(path).splitlines()]
+    if any(words and words[0] in (SIGNED, UNSIGNED, POINTS) for words in lines):
+        return read_groups(path, lines, domain)
+    return read_segments(path, lines, domain)
+
+
+def read_groups(path: PathLike, lines: list[list[str]], domain: Any) -> list[Group]:
+    """The published demo's format."""
+    groups: list[tuple[Group, bool]] = []
+    edges = None
+    for number, words in enumerate(lines, start=1):
+        if not words or words[0].startswith("#"):
+            continue
+        if words[0] in (SIGNED, UNSIGNED, POINTS):
+            groups.append((Group(words[0], []), words[1:2] == ["1"]))
+            continue
+        if not groups:
+            raise damaged(path, number, words, f"a node comes before any {SIGNED}, {UNSIGNED} or {POINTS}")
+        nodes = groups[-1][0].nodes
+        try:
+            if words[0] == "l":
+                nodes += [Node((int(word) - 1,), (1.0,)) for word in words[1:]]
+            else:
+                edges = edge_vertices(domain) if edges is None and words[0] == "e" else edges
+                nodes.append(parsed(words, edges, domain))
+        except (ValueError, IndexError) as error:
+            raise damaged(path, number, words, str(error)) from error
+    return [Group(g.kind, g.nodes[::-1] if reverse else g.nodes) for g, reverse in groups]
+
+
+def read_segments(path: PathLike, lines: list[list[str]], domain: Any) -> list[Group]:
+    """Nodes, and oriented segments between them."""
+    nodes: list[Node] = []
+    segments: list[tuple[int, int]] = []
+    offset, edges = 1, None
+    for number, words in enumerate(lines, start=1):
+        if words[:1] == ["#offset"] and len(words) > 1:
+            offset = int(words[1])
+        if not words or words[0].startswith("#") or words[0] == "n":
+            continue
+        try:
+            if words[0] == "l":
+                ids = [int(word) - offset for word in words[1:]]
+                segments += pairwise(ids)
+            else:
+                edges = edge_vertices(domain) if edges is None and words[0] == "e" else edges
+                nodes.append(parsed(words, edges, domain))
+        except (ValueError, IndexError) as error:
+            raise damaged(path, number, words, str(error)) from error
+    return strands(path, SIGNED, nodes, segments)
+
+
+def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: Any) -> Node:
+    """A node from ``v i``, ``e i s`` or ``f i a b [c]``."""
+    kind, index, numbers = words[0], int(words[1]), [float(word) for word in words[2:]]
+    if kind == "v":
+        return Node((index,), (1.0,))
+    table = edges if kind == "e" else domain.triangulation.faces if kind == "f" else None
+    if table is None:
+        raise ValueError(f"'{kind}' is none of v, e, f, l")
+    if not 0 <= index < len(table):
+        raise ValueError(f"there is no {'edge' if kind == 'e' else 'face'} {index}; ids go from 0 to {len(table) - 1}")
+    if len(numbers) != (1 if kind == "e" else 2) and not (kind == "f" and len(numbers) == 3):
+        raise ValueError("an edge needs one number after its id, a face two or three")
+    weights = (1 - numbers[0], numbers[0]) if kind == "e" else (*numbers[:2], 1 - numbers[0] - numbers[1])
+    if not all(np.isfinite(weights)) or min(weights) < -1e-6 or (len(numbers) == 3 and abs(sum(numbers) - 1) > 1e-6):
+        raise ValueError("fractions must be between 0 and 1 and add up to no more than 1")
+    pairs = [(int(v), max(w, 0.0)) for v, w in zip(table[index], weights, strict=True) if w > 0]
+    return Node(tuple(v for v, _ in pairs), tuple(w for _, w in pairs))
+
+
+def strands(path: PathLike, kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]) -> list[Group]:
+    """Segments between nodes, joined to curves; nodes at the same place count as one."""
+    bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
+    if bad:
+        raise FileFormatError(
+            f"{path}: segment {list(bad[0])} names a node that does not exist: there are {len(nodes)}"
+        )
+    consecutive = [(k, k + 1) for k in range(len(nodes) - 1)]
+    if list(segments) in (consecutive, [*consecutive, (len(nodes) - 1, 0)]):
+        order = [*range(len(nodes))] + [0] * (len(segments) == len(nodes))
+        return [Group(kind, [nodes[i] for i in order])]
+    rank: dict[Node, int] = {}
+    place = np.array([rank.setdefault(node, len(rank)) for node in nodes])
+    ends = place[np.array([s for s in segments if place[s[0]] != place[s[1]]], dtype=np.int64).reshape(-1, 2)]
+    distinct = list(rank)
+    groups = []
+    for order, backwards, _ in chains(ends[:, 0], ends[:, 1], directed=kind == SIGNED):
+        first = np.where(backwards, ends[order, 1], ends[order, 0])
+        last = ends[order[-1], 0 if backwards[-1] else 1]
+        groups.append(Group(kind, [distinct[i] for i in [*first.tolist(), int(last)]]))
+    return groups
+
+
+def read_json(path: PathLike, domain: Any) -> list[Group]:
+    """Vertex ids and weights, independent of any order of edges."""
+    try:
+        content = json.loads(text(path))
+        base, groups = int(content.get("index_base", 0)), []
+        for group in content["groups"]:
+            nodes = [
+                Node(tuple(int(v) - base for v in node["v"]), tuple(float(w) for w in node["w"]))
+                for node in group["nodes"]
+            ]
+            if any(len(n.vertices) != len(n.weights) or not 0 < len(n.vertices) <= 3 for n in nodes):
+                raise ValueError("a node needs one to three vertices and as many weights")
+            if group["kind"] == POINTS:
+                groups.append(Group(POINTS, nodes))
+            elif group["kind"] in (SIGNED, UNSIGNED):
+                segments = [(int(i), int(j)) for i, j in group["segments"]]
+                groups += strands(path, group["kind"], nodes, segments)
+            else:
+                raise ValueError(f"the kind '{group['kind']}' is none of {SIGNED}, {UNSIGNED}, {POINTS}")
+        return groups
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        if isinstance(error, (FileFormatError, SourceError)):
+            raise
+        raise FileFormatError(f"{path}: these are no curves with vertex ids and weights ({error!r})") from error
+
+
+def read_obj(path: PathLike, domain: Any) -> Iterable[Group | Curve]:
+    """Line and point elements of an OBJ file."""
+    vertices, lines, points = [], [], []
+    for number, words in enumerate((line.split() for line in text(path).splitlines()), start=1):
+        try:
+            if words[:1] == ["v"]:
+                vertices.append([float(word) for word in words[1:4]])
+            elif words[:1] in (["l"], ["p"]):
+                ids = [int(word.split("/")[0]) for word in words[1:]]
+                ids = [i - 1 if i > 0 else len(vertices) + i for i in ids]
+                (lines if words[0] == "l" else points).append(ids)
+        except ValueError as error:
+            raise damaged(path, number, words, str(error)) from error
+    positions = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    bad = [i for ids in lines + points for i in ids if not 0 <= i < len(positions)]
+    if bad:
+        raise FileFormatError(f"{path}: vertex {bad[0] + 1} of an element does not exist: there are {len(positions)}")
+    corners = domain.triangulation.vertices
+    scale = 1e-6 * float(np.ptp(corners, axis=0).max())
+    n = min(len(positions), len(corners))
+    if len(positions) <= len(corners) and n and np.abs(positions - corners[:n]).max() <= scale:
+        groups = [Group(SIGNED, [Node((i,), (1.0,)) for i in ids]) for ids in lines]
+        return groups + [Group(POINTS, [Node((i,), (1.0,)) for i in ids]) for ids in points]
+    found: list[Any] = []
+    for ids in lines:
+        closed = len(ids) > 2 and ids[0] == ids[-1]
+        found.append(domain.polyline(positions[ids[:-1] if closed else ids], closed=closed))
+    if points:
+        found += [Group(POINTS, projected_nodes(domain, positions[ids])) for ids in points]
+    return found
+
+
+def projected_nodes(domain: Any, points: NDArray[np.float64]) -> list[Node]:
+    """Closest points of a surface, as nodes."""
+    from ..sources.projection import closest_points
+
+    faces, weights, _ = closest_points(domain.triangulation, points)
+    return nodes_of(faces, weights, domain)
+
+
+def damaged(path: PathLike, number: int, words: list[str], reason: str) -> FileFormatError:
+    """The error for a line that makes no sense."""
+    return FileFormatError(f"{path}: line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})")
+
+
+def nodes_of(faces: NDArray[np.int64], weights: NDArray[np.float64], domain: Any) -> list[Node]:
+    """Points on faces, as vertices and weights."""
+    corners = domain.triangulation.faces[faces]
+    return [
+        Node(tuple(v for v, w in zip(c, b, strict=True) if w > 0), tuple(w for w in b if w > 0))
+        for c, b in zip(corners.tolist(), weights.tolist(), strict=True)
+    ]

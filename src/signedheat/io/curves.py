@@ -1,0 +1,210 @@
+"""Curves on surfaces from files and back.
+
+The published demo's text format, its sibling with oriented segments, OBJ line elements, and portable JSON, in which
+points are vertex ids with weights. Edges are numbered by first appearance in the faces: corners 0–1, 1–2, 2–0, face
+after face; an edge runs the way its first face has it, and a fraction s along it leads from tail to head.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError, SourceError
+from ..sources.curves import Curve, SurfacePoints
+from .curve_readers import (
+    POINTS,
+    SIGNED,
+    UNSIGNED,
+    Group,
+    Node,
+    edge_vertices,
+    nodes_of,
+    read_json,
+    read_obj,
+    read_text,
+)
+from .files import PathLike, extension, replacing, unknown_extension
+
+
+def read_curves(path: PathLike, domain: Any) -> list[Curve | SurfacePoints]:
+    """Read curves and points on a surface.
+
+    Parameters
+    ----------
+    path : str or path
+        A ``.txt`` file of the published demo: ``signed_curve`` (a following ``1`` reverses it), ``unsigned_curve`` or
+        ``unsigned_point``, then nodes ``v vertex``, ``e edge fraction``, ``f face a b [c]`` (ids from 0) or ``l`` and
+        vertex ids from 1; or nodes and oriented segments ``l i j`` between them, with ``#offset 0`` where ids start at
+        0. A ``.obj`` file with line elements: on the vertices of the mesh if its vertices are those, projected onto it
+        if not. A ``.json`` file with vertex ids and weights.
+    domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
+        The surface that the ids refer to.
+
+    Returns
+    -------
+    list of Curve and SurfacePoints
+        In the order of the file; curves that end where they begin are closed.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown kind, or holds what the format does not have.
+    SourceError
+        If the curves do not fit the surface.
+
+    Examples
+    --------
+    >>> import tempfile, signedheat as sh
+    >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_curves(f"{folder}/curves.txt", [mesh.path([0, 1, 2])], mesh)
+    ...     read_curves(f"{folder}/curves.txt", mesh)
+    [Curve(3 points, open, oriented)]
+    """
+    if extension(path) not in READERS:
+        raise unknown_extension(path, READERS, "curves")
+    try:
+        found = READERS[extension(path)](path, domain)
+        sources = [source if isinstance(source, Curve) else placed(source, domain) for source in found]
+    except SourceError as error:
+        raise SourceError(f"{path}: {error}") from error
+    if not sources:
+        raise FileFormatError(f"{path}: there is no curve and no point: check that it is a file of curves")
+    return sources
+
+
+def write_curves(path: PathLike, curves: Any, domain: Any) -> None:
+    """Write curves and points on a surface; the extension says the format.
+
+    ``.txt`` (published demo) and ``.json`` (portable) keep everything but given normals, and read back the same;
+    ``.obj`` holds polylines in space.
+
+    Parameters
+    ----------
+    path : str or path
+        Where to. Written under a temporary name and then renamed: a file that was there before survives a failure.
+    curves : Curve, SurfacePoints or a sequence of them
+        What to write.
+    domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
+        The surface they lie on.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown or the file cannot be written.
+    """
+    if extension(path) not in WRITERS:
+        raise unknown_extension(path, WRITERS, "curves")
+    listed = [curves] if isinstance(curves, (Curve, SurfacePoints)) else list(curves)
+    content = WRITERS[extension(path)](listed, domain)
+    with replacing(path) as temporary:
+        temporary.write_text(content, encoding="utf-8")
+
+
+def placed(group: Group, domain: Any) -> Curve | SurfacePoints:
+    """A group of a file on its surface."""
+    faces, weights = on_faces(group.nodes, domain)
+    if group.kind == POINTS:
+        return SurfacePoints(faces, weights)
+    closed = len(group.nodes) > 2 and group.nodes[0] == group.nodes[-1]
+    end = -1 if closed else None
+    return Curve(faces[:end], weights[:end], closed=closed, oriented=group.kind == SIGNED)
+
+
+def on_faces(nodes: Sequence[Node], domain: Any) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Face and barycentric coordinates of nodes."""
+    mesh = domain.triangulation
+    count = np.array([len(node.vertices) for node in nodes])
+    faces, weights = np.zeros(len(nodes), dtype=np.int64), np.zeros((len(nodes), 3))
+    alone = np.flatnonzero(count == 1)
+    points = domain.points_at([nodes[k].vertices[0] for k in alone]) if len(alone) else None
+    if points is not None:
+        faces[alone], weights[alone] = points.faces, points.barycentric
+    several = np.flatnonzero(count > 1)
+    wanted = np.zeros(mesh.n_vertices + 1, dtype=bool)
+    known = np.array([v for k in several for v in nodes[k].vertices], dtype=np.int64)
+    wanted[known[(known >= 0) & (known < mesh.n_vertices)]] = True
+    around: dict[int, list[int]] = {}
+    for face in np.flatnonzero(wanted[mesh.faces].any(axis=1)).tolist() if len(several) else []:
+        for v in mesh.faces[face].tolist():
+            around.setdefault(v, []).append(face)
+    for k in several.tolist():
+        ids = nodes[k].vertices
+        shared = set.intersection(*(set(around.get(v, ())) for v in ids))
+        if not shared:
+            raise SourceError(f"point {k} lies between vertices {list(ids)}, which no face has in common")
+        faces[k] = min(shared)
+        corners = mesh.faces[faces[k]].tolist()
+        for v, w in zip(ids, nodes[k].weights, strict=True):
+            weights[k, corners.index(v)] = w
+    return faces, weights
+
+
+def groups_of(curves: Sequence[Any], domain: Any) -> list[Group]:
+    """Curves and points, as a file has them; closed curves end with their first point."""
+    groups = []
+    for number, curve in enumerate(curves):
+        if not isinstance(curve, (Curve, SurfacePoints)):
+            raise SourceError(
+                f"item {number} is a {type(curve).__name__}: files of curves hold Curve and SurfacePoints"
+            )
+        nodes = nodes_of(curve.faces, curve.barycentric, domain)
+        if isinstance(curve, Curve):
+            nodes += nodes[:1] * curve.closed
+        groups.append(
+            Group(POINTS if isinstance(curve, SurfacePoints) else SIGNED if curve.oriented else UNSIGNED, nodes)
+        )
+    return groups
+
+
+def write_text(curves: Sequence[Any], domain: Any) -> str:
+    """The published demo's format."""
+    table = edge_vertices(domain)
+    number = {tuple(sorted(e)): (k, e[0]) for k, e in enumerate(table.tolist())}
+    lines = []
+    for curve, group in zip(curves, groups_of(curves, domain), strict=True):
+        lines.append(group.kind)
+        faces = [*curve.faces.tolist(), int(curve.faces[0])]
+        weights = [*curve.barycentric.tolist(), curve.barycentric[0].tolist()]
+        for node, face, inside in zip(group.nodes, faces, weights, strict=False):
+            if len(node.vertices) == 1:
+                lines.append(f"v {node.vertices[0]}")
+            elif len(node.vertices) == 2 and tuple(sorted(node.vertices)) in number:
+                edge, tail = number[tuple(sorted(node.vertices))]
+                lines.append(f"e {edge} {node.weights[0 if node.vertices[0] != tail else 1]!r}")
+            else:
+                lines.append(f"f {face} {' '.join(repr(w) for w in inside)}")
+    return "\n".join(lines) + "\n"
+
+
+def write_json(curves: Sequence[Any], domain: Any) -> str:
+    """Portable JSON."""
+    groups = []
+    for group in groups_of(curves, domain):
+        nodes = [{"v": list(node.vertices), "w": list(node.weights)} for node in group.nodes]
+        steps = [] if group.kind == POINTS else [[k, k + 1] for k in range(len(nodes) - 1)]
+        groups.append({"kind": group.kind, "nodes": nodes, "segments": steps})
+    return json.dumps({"index_base": 0, "groups": groups}) + "\n"
+
+
+def write_obj(curves: Sequence[Any], domain: Any) -> str:
+    """Polylines in space."""
+    mesh, vertices, elements = domain.triangulation, [], []
+    for curve in curves:
+        points = np.einsum("ik,ikj->ij", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]])
+        ids = [len(vertices) + k + 1 for k in range(len(points))]
+        vertices += [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+        if isinstance(curve, Curve):
+            ids += ids[:1] * curve.closed
+        elements.append(("l " if isinstance(curve, Curve) else "p ") + " ".join(map(str, ids)))
+    return "\n".join([*vertices, *elements]) + "\n"
+
+
+READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {".json": read_json, ".obj": read_obj, ".txt": read_text}
+WRITERS: dict[str, Callable[..., str]] = {".json": write_json, ".obj": write_obj, ".txt": write_text}
+CURVE_FORMATS = frozenset(WRITERS)
