@@ -133,5 +133,8 @@ class DigitalSurface(Surface):
         """Values at the vertices of `triangulation`, from values at the vertices of the surface."""
         return self.squares.on_triangulation(values)
 
+    def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        return self.squares._triangle_mask(face_mask)
+
     def __repr__(self) -> str:
         return f"DigitalSurface({' × '.join(map(str, self.volume.shape))} voxels, radius={self.radius:.3g})"

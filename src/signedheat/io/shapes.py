@@ -12,17 +12,21 @@ from .obj import read_obj, write_obj, write_pc
 from .off import read_off, write_off
 from .ply import read_ply, write_ply
 from .stl import read_stl, write_stl
+from .volumes import read_volume
 from .vtk_xml import read_vtp, write_vtp
 from .xyz import read_xyz, write_xyz
 
 READERS: dict[str, Callable[[PathLike], Any]] = {
     ".glb": read_glb,
     ".gltf": read_glb,
+    ".npy": read_volume,
+    ".nrrd": read_volume,
     ".obj": read_obj,
     ".off": read_off,
     ".pc": read_obj,
     ".ply": read_ply,
     ".stl": read_stl,
+    ".vti": read_volume,
     ".vtp": read_vtp,
     ".xyz": read_xyz,
 }
@@ -45,7 +49,8 @@ def read(path: PathLike) -> Any:
 
     STL, OBJ, PLY, OFF, VTP and GLB hold surfaces; PLY, XYZ, PC, OBJ, OFF and VTP without faces hold points. Vertices
     and faces keep their number and order, whatever is wrong with them: nothing is merged, dropped, split or turned.
-    In STL, which knows no vertices, corners with the same coordinates to the last bit are one vertex.
+    In STL, which knows no vertices, corners with the same coordinates to the last bit are one vertex. NPY, NRRD and VTI
+    hold volumes of voxels, boolean or of zeros and ones.
 
     Parameters
     ----------
@@ -54,8 +59,9 @@ def read(path: PathLike) -> Any:
 
     Returns
     -------
-    TriangleMesh, PolygonMesh or PointCloud
-        A triangle mesh if every face is a triangle, a polygon mesh if not, a point cloud if there is no face.
+    TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
+        A triangle mesh if every face is a triangle, a polygon mesh if not, a point cloud if there is no face; of a
+        volume, the boundary of its voxels.
 
     Raises
     ------
