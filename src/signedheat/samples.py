@@ -93,7 +93,7 @@ def duck(n: int = 56) -> TriangleMesh:
     blend = -softness * np.logaddexp.reduce([-d / softness for d in depth], axis=0)
     body = GridField(grid, blend).contour(0.0)
     beak = sphere(3)
-    beak = TriangleMesh(beak.vertices * (0.2, 0.15, 0.07) + (0.82, 0.0, 0.6), beak.faces)
+    beak = TriangleMesh(beak.vertices * (0.2, 0.15, 0.07) + (0.88, 0.0, 0.6), beak.faces)
     return union(body, beak)
 
 

@@ -103,7 +103,7 @@ def draw_slices(
     panel.figure.colorbar(image, ax=list(axes), shrink=0.85, pad=0.015, label=f"signed distance, a line every {step:g}")
 
 
-def draw_shape(shape: Any, axes: Any, view: tuple[float, float] = (18, -58), max_faces: int = 40_000) -> None:
+def draw_shape(shape: Any, axes: Any, view: tuple[float, float] = (18, -58), max_faces: int = 200_000) -> None:
     """Draw a shape in perspective into 3-D axes; of larger shapes an even selection of the faces or points."""
     points = shape.points if isinstance(shape, PointCloud) else shape.vertices
     eye = _direction(*view)
@@ -123,7 +123,7 @@ def draw_shape(shape: Any, axes: Any, view: tuple[float, float] = (18, -58), max
         light = 0.45 + 0.55 * np.abs(normals @ _direction(55, view[1] + 40))
         tint = np.where((facing > 0)[:, None], [0.96, 0.86, 0.55], [0.80, 0.25, 0.20])
         axes.add_collection3d(
-            Poly3DCollection(corners, facecolors=np.clip(tint * light[:, None], 0, 1), edgecolor="none")
+            Poly3DCollection(corners, facecolors=np.clip(tint * light[:, None], 0, 1), edgecolor="face", linewidth=0.15)
         )
         used = corners.reshape(-1, 3)
     lower, upper = used.min(axis=0), used.max(axis=0)

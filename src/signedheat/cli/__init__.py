@@ -28,10 +28,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     try:
         arguments = _parser().parse_args(argv)
-    except SystemExit as stop:
-        return int(stop.code or 0)
-    try:
         summary, text = arguments.run(arguments)
+    except SystemExit as stop:  # argparse: help was asked for, or the usage is wrong
+        return int(stop.code or 0)
     except (SignedHeatError, MemoryError) as error:
         print(f"signedheat: {_one_line(error)}", file=sys.stderr)
         return 1

@@ -56,7 +56,7 @@ def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
     if arguments.padding is not None or reach == 0:
         return Grid.around(shape.bounds, padding=arguments.padding, **options)
     longest = float(np.ptp(shape.bounds, axis=0).max())
-    return Grid.around(shape.bounds, padding=0.15 * longest + 1.05 * reach, **options)
+    return Grid.around(shape.bounds, padding=0.2 * longest + 1.05 * reach, **options)
 
 
 def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:

@@ -70,7 +70,7 @@ class Grid:
         padding: float | None = None,
         spacing: ArrayLike | None = None,
     ) -> Grid:
-        """A grid that holds a box, with room around it.
+        """A grid around the middle of a box, with room on every side.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class Grid:
         resolution : int
             Nodes along the longest side, all axes with the same spacing.
         padding : float, optional
-            Room on every side; 15 % of the longest side by default.
+            Room on every side, or a little more; a fifth of the longest side by default.
         spacing : (d,) float or float, optional
             Distance between nodes; the resolution then plays no part.
 
@@ -90,26 +90,25 @@ class Grid:
 
         Examples
         --------
-        >>> Grid.around([[0, 0, 0], [2, 1, 1]], resolution=11, padding=0.5)
-        Grid(origin=[-0.5, -0.5, -0.5], spacing=[0.3, 0.3, 0.3], shape=(11, 8, 8))
+        >>> Grid.around([[0, 0, 0], [1, 2, 4]], resolution=7, padding=1.0)
+        Grid(origin=[-1.0, -1.0, -1.0], spacing=[1.0, 1.0, 1.0], shape=(4, 5, 7))
         """
         lower, upper = np.asarray(bounds, dtype=np.float64)
         longest = float((upper - lower).max())
-        room = 0.15 * longest if padding is None else float(padding)
-        if not (np.isfinite(room) and room >= 0):
-            raise GeometryError(f"padding must be finite and not negative, not {padding}")
-        if longest + 2 * room <= 0:
-            raise GeometryError("the shape is a single place: give a padding, or a grid of your own")
-        lower, upper = lower - room, upper + room
+        if padding is not None and not (np.isfinite(padding) and padding >= 0):
+            raise GeometryError(f"the padding must be a length, zero or more, not {padding}")
+        room = 0.2 * longest if padding is None else float(padding)
+        if not longest + 2 * room > 0:
+            raise GeometryError("the shape is a single point: give a padding or a grid")
         if spacing is None:
-            if resolution < 2:
-                raise GeometryError(f"resolution must be at least 2, not {resolution}")
-            spacing = (longest + 2 * room) / (resolution - 1)
+            if int(resolution) != resolution or resolution < 2:
+                raise GeometryError(f"the resolution must be a whole number of at least 2 nodes, not {resolution}")
+            spacing = (longest + 2 * room) / (int(resolution) - 1)
         steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), lower.shape)
         if not (np.isfinite(steps).all() and (steps > 0).all()):
             raise GeometryError(f"grid spacing must be positive and finite, not {np.asarray(spacing).tolist()}")
-        intervals = np.maximum(1, np.ceil((upper - lower) / steps * (1 - 1e-9)))
-        return cls(lower, steps, intervals.astype(np.int64) + 1)
+        cells = np.maximum(1, np.ceil((upper - lower + 2 * room) / steps - 1e-9))
+        return cls(0.5 * (lower + upper) - 0.5 * cells * steps, steps, cells.astype(np.int64) + 1)
 
     @property
     def dimension(self) -> int:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from math import gamma, pi
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,10 @@ from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import GeometryError, SourceError
+from ..errors import SourceError
+
+if TYPE_CHECKING:
+    from ..operators.pyramid import NodeSources
 
 NEIGHBOURS = 8
 """Neighbours from which the area of an oriented point is estimated."""
@@ -69,6 +72,8 @@ class AreaSamples:
         h_source: the largest of the sources' mean spacings.
     outside : float
         Fraction of the area that lies outside the grid.
+    nodes : NodeSources
+        The vectors brought to the nodes, up to a common factor.
     """
 
     positions: NDArray[np.float64]
@@ -78,6 +83,7 @@ class AreaSamples:
     owners: NDArray[np.int64]
     spacing: float
     outside: float
+    nodes: NodeSources
 
 
 @singledispatch
@@ -150,19 +156,8 @@ def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = 
     >>> grid_around([PointCloud([[0, 0, 0], [1, 2, 4]])], 7, padding=1.0)
     Grid(origin=[-1.0, -1.0, -1.0], spacing=[1.0, 1.0, 1.0], shape=(4, 5, 7))
     """
-    if int(resolution) != resolution or resolution < 2:
-        raise GeometryError(f"the resolution must be a whole number of at least 2 nodes, not {resolution}")
-    if padding is not None and not (np.isfinite(padding) and padding >= 0):
-        raise GeometryError(f"the padding must be a length, zero or more, not {padding}")
     extents = np.stack([extent(shape) for shape in shapes])
-    low, high = extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)
-    longest = float((high - low).max())
-    room = 0.2 * longest if padding is None else float(padding)
-    if not longest + 2 * room > 0:
-        raise GeometryError("the shape is a single point: give a padding or a grid")
-    spacing = (longest + 2 * room) / (int(resolution) - 1)
-    cells = np.maximum(1, np.ceil((high - low + 2 * room) / spacing - 1e-9)).astype(np.int64)
-    return Grid(0.5 * (low + high) - 0.5 * cells * spacing, spacing, cells + 1)
+    return Grid.around([extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)], resolution, padding)
 
 
 def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> NDArray[np.float64]:
@@ -197,8 +192,14 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
     SourceError
         If a shape cannot be used on this grid, or nothing of any lies within it.
     """
+    from ..operators.pyramid import NodeSources
+    from ..operators.wavefront import padded_shape
     from .binning import merge_in_cells
 
+    steps = np.zeros(4)
+    steps[4 - grid.dimension :] = grid.spacing
+    nodes = NodeSources.empty(padded_shape(grid.shape), steps)
+    scale = float(np.prod(grid.spacing)) ** ((grid.dimension - 1) / grid.dimension)
     parts, first, spacing = [], 0, 0.0
     total = inside = 0.0
     for owner, shape in enumerate(shapes):
@@ -210,7 +211,15 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         order = np.argsort(elements.components, kind="stable")
         corners = (elements.corners - grid.origin) / grid.spacing
         samples = merge_in_cells(
-            corners, elements.vectors, elements.weights, elements.components, order, np.array(grid.shape), size
+            corners,
+            elements.vectors,
+            elements.weights,
+            elements.components,
+            order,
+            np.array(grid.shape),
+            size,
+            nodes,
+            scale,
         )
         positions, vectors, weights, components = samples
         total += float(elements.weights.sum())
@@ -225,4 +234,4 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         raise SourceError(
             f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape: move or enlarge it"
         )
-    return AreaSamples(*joined, spacing=spacing, outside=max(0.0, 1.0 - inside / total))
+    return AreaSamples(*joined, spacing=spacing, outside=max(0.0, 1.0 - inside / total), nodes=nodes)
