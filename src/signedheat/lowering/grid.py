@@ -19,10 +19,8 @@ from ..sources.area_elements import AreaSamples, sample_on_grid
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-    from ..operators.sweeps import ScaledVectors
+    from ..operators.pyramid import Level, NodeSources
 
-ROUNDS = 2
-"""Rounds of sweeps; more change φ by less than its own error."""
 SAMPLE_SIZE = 0.6
 """Longest edge, in cells, of the pieces into which faces are cut."""
 BYTES_PER_NODE = 56
@@ -58,12 +56,20 @@ class GridSource:
     """Sources on a grid: samples, and how they act on its nodes."""
 
     samples: AreaSamples
-    shape: tuple[int, ...]
-    time: float
+    grid: Grid
+    diffusion: float
+
+    def time_on(self, spacing: float) -> float:
+        """t on a grid of this mean spacing (MATH: the larger of both spacings, squared)."""
+        return self.diffusion * max(spacing, self.samples.spacing) ** 2
 
     @property
-    def vectors(self) -> NDArray[np.float64]:
-        return self.samples.vectors
+    def time(self) -> float:
+        return self.time_on(float(self.grid.spacing.mean()))
+
+    @property
+    def vectors(self) -> NodeSources:
+        return self.samples.nodes
 
     @property
     def weights(self) -> NDArray[np.float64]:
@@ -82,7 +88,7 @@ class GridSource:
         """Nodes and weights that interpolate at each sample."""
         from ..operators.stencil import interpolation_stencil
 
-        return interpolation_stencil(self.samples.positions, self.shape)
+        return interpolation_stencil(self.samples.positions, self.grid.shape)
 
     @cached_property
     def rows(self) -> csr_matrix:
@@ -90,7 +96,7 @@ class GridSource:
 
         nodes, weights = self.stencil
         starts = np.arange(len(nodes) + 1) * nodes.shape[1]
-        size = (len(nodes), int(np.prod(self.shape)))
+        size = (len(nodes), self.grid.n_nodes)
         return csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=size)
 
     def at_samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -114,16 +120,21 @@ class GridDiscretization:
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
         samples = sample_on_grid(sources, self.grid, SAMPLE_SIZE)
-        spacing = max(float(self.grid.spacing.mean()), samples.spacing)
-        return GridSource(samples, self.grid.shape, diffusion * spacing**2)
+        return GridSource(samples, self.grid, diffusion)
 
-    def diffuse(self, source: GridSource) -> ScaledVectors:
-        return diffuse_samples(self.grid, source, source.vectors)
+    def diffuse(self, source: GridSource) -> list[Level]:
+        from ..operators.pyramid import diffuse_on_pyramid
 
-    def to_cells(self, vectors: ScaledVectors) -> NDArray[np.float32]:
-        from ..operators.stencil import node_directions
+        return diffuse_on_pyramid(source.vectors, source.time_on)
 
-        return node_directions(vectors, self.grid.dimension)
+    def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
+        from ..operators.extraction import unit_vectors
+        from ..operators.pyramid import collapse
+        from ..operators.wavefront import padded_shape
+
+        dimension = self.grid.dimension
+        directions = collapse(vectors, padded_shape(self.grid.shape), dimension, unit_vectors)
+        return np.moveaxis(directions.reshape(dimension, *self.grid.shape), 0, -1)
 
     def divergence(self, directions: NDArray[np.floating]) -> NDArray[np.float64]:
         from ..operators.stencil import divergence
@@ -133,18 +144,6 @@ class GridDiscretization:
     def field(self, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics) -> GridField:
         notes = {"samples": len(source.weights), "area outside the grid": source.samples.outside}
         return GridField(self.grid, values, replace(diagnostics, notes={**diagnostics.notes, **notes}))
-
-
-def diffuse_samples(grid: Grid, source: GridSource, values: NDArray[np.float64]) -> ScaledVectors:
-    """Diffuse values (s, c) given at the samples over the grid."""
-    from ..operators.stencil import scatter
-    from ..operators.sweeps import STRETCH, diffuse_by_sweeps
-
-    nodes, weights = source.stencil
-    sums, touched = scatter(nodes, weights, values / np.abs(values).max(), grid.shape, STRETCH)
-    ratios = np.zeros(4)
-    ratios[4 - grid.dimension :] = source.time / grid.spacing**2
-    return diffuse_by_sweeps(sums, touched, ratios, ROUNDS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +166,7 @@ class GridIntegration:
         """
         phi = self.solve(divergence, source)
         excess = excess_at_samples(source, phi, levels)
-        phi -= diffused_mean(self.grid, source, excess)
+        phi -= diffused_mean(source, excess)
         return phi
 
 
@@ -181,11 +180,22 @@ def excess_at_samples(source: GridSource, phi: NDArray[np.float64], levels: Leve
     return excess
 
 
-def diffused_mean(grid: Grid, source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(*grid.shape) mean of values given at the samples, weighted by area and nearness."""
-    pairs = np.stack([source.weights, source.weights * values], axis=1)
-    diffused = diffuse_samples(grid, source, pairs).mantissas
-    return (diffused[..., 1] / diffused[..., 0]).reshape(grid.shape)
+def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(*grid.shape) mean of values given at the samples, weighted by area and nearness: as the normals are diffused.
+
+    It varies slowly, so the finest level of the pyramid is left out.
+    """
+    from ..operators.extraction import quotients
+    from ..operators.pyramid import NodeSources, collapse, diffuse_on_pyramid, scatter
+
+    weights = source.weights / source.weights.max()
+    largest = np.abs(values).max()
+    if largest == 0.0:
+        return np.zeros(source.grid.shape, dtype=np.float32)
+    nodes = NodeSources.empty(source.vectors.shape, source.vectors.steps)
+    scatter(*source.stencil, np.stack([weights, weights * values / largest], axis=1), nodes)
+    levels = diffuse_on_pyramid(nodes, source.time_on, finest=1)
+    return collapse(levels, nodes.shape, 1, quotients).reshape(source.grid.shape) * np.float32(largest)
 
 
 @discretize.register

@@ -15,19 +15,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..parallel import n_threads
-from .sweeps import ScaledVectors
 from .wavefront import padded_shape
 
 SLAB = 16
 """Rows of lines that one job works on."""
-
-
-def node_directions(vectors: ScaledVectors, dimension: int) -> NDArray[np.float32]:
-    """(*shape, d) unit vectors, or zero where nothing arrived; each component is contiguous in memory."""
-    shape = vectors.mantissas.shape[:4]
-    directions = np.empty((dimension, *shape), dtype=np.float32)
-    by_slabs(shape, _directions, vectors.mantissas, directions)
-    return np.moveaxis(directions.reshape(dimension, *shape[4 - dimension :]), 0, -1)
 
 
 def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -107,24 +98,6 @@ def interpolation_stencil(
     return nodes, weights
 
 
-def scatter(
-    nodes: NDArray[np.int64],
-    weights: NDArray[np.float64],
-    vectors: NDArray[np.float64],
-    shape: tuple[int, ...],
-    stretch: int,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Add vectors (s, c ≤ 4) to nodes: the sweeps' right-hand side, and which stretches of its lines are not zero."""
-    padded = padded_shape(shape)
-    stretches = -(-padded[3] // stretch)
-    sums = np.zeros((*padded, 4), dtype=np.float32)  # untouched pages cost no memory
-    touched = np.zeros((*padded[:3], stretches), dtype=np.bool_)
-    four = np.zeros((len(vectors), 4))
-    four[:, : vectors.shape[1]] = vectors
-    _scatter(nodes, weights, four, sums.reshape(-1, 4), touched.reshape(-1, stretches), padded[3], stretch)
-    return sums, touched
-
-
 def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: Any) -> None:
     """Run a kernel over slabs of the first long axis."""
     axis = 0 if shape[0] > 1 else 1
@@ -133,30 +106,6 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
         jobs = [pool.submit(kernel, *arguments, axis, start, min(start + SLAB, n)) for start in range(0, n, SLAB)]
         for job in jobs:
             job.result()
-
-
-@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
-def _directions(mantissas, out, axis, start, stop):
-    dimension, n0, n1, n2, n = out.shape
-    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
-        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
-            for k in range(n2):
-                line = mantissas[i, j, k]
-                for m in range(n):
-                    x, y, z, w = line[m, 0], line[m, 1], line[m, 2], line[m, 3]
-                    largest = max(max(abs(x), abs(y)), max(abs(z), abs(w)))
-                    factor = np.float32(0)
-                    if largest > 0:
-                        factor = np.float32(1) / largest
-                        x, y, z, w = factor * x, factor * y, factor * z, factor * w
-                        factor = np.float32(1) / np.sqrt(x * x + y * y + z * z + w * w)
-                    out[0, i, j, k, m] = factor * x
-                    if dimension > 1:
-                        out[1, i, j, k, m] = factor * y
-                    if dimension > 2:
-                        out[2, i, j, k, m] = factor * z
-                    if dimension > 3:
-                        out[3, i, j, k, m] = factor * w
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
@@ -200,14 +149,3 @@ def _divergence(components, scales, out, axis, start, stop):
                         after = part[a, b, c]
                         for m in range(n):
                             line[m] -= scale * (here[m] + after[m])
-
-
-@njit(cache=True, nogil=True)
-def _scatter(nodes, weights, vectors, sums, touched, n, stretch):
-    for s in range(nodes.shape[0]):
-        for c in range(nodes.shape[1]):
-            node, weight = nodes[s, c], weights[s, c]
-            for d in range(4):
-                sums[node, d] += np.float32(weight * vectors[s, d])
-            if weight > 0.0:
-                touched[node // n, (node % n) // stretch] = True

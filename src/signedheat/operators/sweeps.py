@@ -44,7 +44,11 @@ class ScaledVectors:
 
 
 def diffuse_by_sweeps(
-    sources: NDArray[np.float32], touched: NDArray[np.bool_], ratios: NDArray[np.float64], rounds: int
+    sources: NDArray[np.float32],
+    touched: NDArray[np.bool_],
+    active: NDArray[np.bool_],
+    ratios: NDArray[np.float64],
+    rounds: int,
 ) -> ScaledVectors:
     """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j`` with no flux through the walls.
 
@@ -54,6 +58,8 @@ def diffuse_by_sweeps(
         B.
     touched : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
         Stretches in which B is not zero.
+    active : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
+        Stretches in which to solve; X is zero in all others.
     ratios : (4,) float
         a = t / h² along each axis.
     rounds : int
@@ -70,6 +76,7 @@ def diffuse_by_sweeps(
         vectors.exponents,
         sources,
         touched,
+        active,
         ratios.astype(np.float32),
         pivots,
         POWERS,
@@ -108,7 +115,7 @@ def _lift(size, exponent):
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nnan", "nsz"})
-def _sweep_tile(mantissas, exponents, sources, touched, ratios, pivots, powers, tile):
+def _sweep_tile(mantissas, exponents, sources, touched, active, ratios, pivots, powers, tile):
     """Update the lines of one tile in order."""
     n0, n1, n2, n = mantissas.shape[:4]
     stretches = exponents.shape[3]
@@ -129,6 +136,9 @@ def _sweep_tile(mantissas, exponents, sources, touched, ratios, pivots, powers, 
             # right-hand side: what flows in from the lines around, and the source
             anything = False
             for s in range(stretches):
+                scale_of[s] = NOTHING
+                if not active[i, j, k, s]:
+                    continue
                 begin, end = 4 * STRETCH * s, min(4 * STRETCH * (s + 1), 4 * n)
                 largest = np.int32(0) if touched[i, j, k, s] else NOTHING
                 for side in range(6):
@@ -174,10 +184,11 @@ def _sweep_tile(mantissas, exponents, sources, touched, ratios, pivots, powers, 
                 continue
             # elimination
             x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-            carried = NOTHING
+            carried = np.int64(NOTHING)
             for s in range(stretches):
                 largest = max(scale_of[s], carried)
-                if largest == NOTHING:
+                if largest == NOTHING or not active[i, j, k, s]:
+                    carried = np.int64(NOTHING)
                     continue
                 factor = powers[min(largest - scale_of[s], 127)]
                 if scale_of[s] == NOTHING:
@@ -185,7 +196,7 @@ def _sweep_tile(mantissas, exponents, sources, touched, ratios, pivots, powers, 
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
                         for c in range(4):
                             row[4 * m + c] = np.float32(0)
-                shift = powers[min(largest - carried, 127)]
+                shift = powers[min(largest - carried, 127)] if carried != NOTHING else np.float32(0)
                 x, y, z, w = shift * x, shift * y, shift * z, shift * w
                 for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
                     p = factor * pivot[m]
@@ -202,17 +213,20 @@ def _sweep_tile(mantissas, exponents, sources, touched, ratios, pivots, powers, 
                 carried = level
             # substitution
             x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-            carried = NOTHING
+            carried = np.int64(NOTHING)
             out = mantissas[i, j, k].reshape(-1)
             for s in range(stretches - 1, -1, -1):
                 largest = max(scale_of[s], carried)
+                if largest == NOTHING or not active[i, j, k, s]:
+                    carried = np.int64(NOTHING)
+                    continue
                 factor = powers[min(largest - scale_of[s], 127)]
                 if scale_of[s] == NOTHING:
                     factor = np.float32(0)
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
                         for c in range(4):
                             row[4 * m + c] = np.float32(0)
-                shift = powers[min(largest - carried, 127)]
+                shift = powers[min(largest - carried, 127)] if carried != NOTHING else np.float32(0)
                 x, y, z, w = shift * x, shift * y, shift * z, shift * w
                 for m in range(min(STRETCH * (s + 1), n) - 1, STRETCH * s - 1, -1):
                     q = along * pivot[m]

@@ -6,6 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from ..operators.pyramid import NodeSources
+from ..operators.sweeps import STRETCH
+
 
 def merge_in_cells(
     corners: NDArray[np.float64],
@@ -15,12 +18,17 @@ def merge_in_cells(
     order: NDArray[np.int64],
     shape: NDArray[np.int64],
     size: float,
+    sources: NodeSources,
+    scale: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Samples of the simplices `corners` (m, c, d), in cells, that lie on a grid of `shape` nodes.
 
     Every simplex is bisected across its longest edge until that is at most `size` cells, which halves its measure each
     time; parts whose box misses the grid are dropped at once, however large. Simplices come in an `order` that brings
     those of one component together.
+
+    The vectors of all parts, divided by `scale`, are added to the `sources` of the nodes around them with the weights
+    of linear interpolation.
 
     Returns
     -------
@@ -30,7 +38,18 @@ def merge_in_cells(
     slots = np.zeros(int(np.prod(shape - 1)), dtype=np.int32)  # untouched pages cost no memory
     dimension = corners.shape[2]
     sums, labels = _merge(
-        np.ascontiguousarray(corners), np.ascontiguousarray(vectors), weights, components, order, shape, size, slots
+        np.ascontiguousarray(corners),
+        np.ascontiguousarray(vectors),
+        weights,
+        components,
+        order,
+        shape,
+        size,
+        slots,
+        sources.sums.reshape(-1, 4),
+        sources.touched.reshape(-1, sources.touched.shape[3]),
+        scale,
+        STRETCH,
     )
     kept = sums[:, -1] > 0
     sums, labels = sums[kept], labels[kept]
@@ -39,7 +58,7 @@ def merge_in_cells(
 
 
 @njit(cache=True, nogil=True)
-def _merge(corners, vectors, weights, components, order, shape, size, slots):
+def _merge(corners, vectors, weights, components, order, shape, size, slots, nodes, touched, scale, stretch):
     """Sums of weight · position, vector and weight per (component, cell)."""
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
@@ -123,6 +142,21 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots):
                 slots[cell] = count
             share = 0.5 ** levels[top]
             weight = weights[face] * share
+            for corner in range(1 << dimension):
+                node, part = np.int64(0), share / scale
+                for d in range(dimension):
+                    below = min(max(np.int64(centre[d]), 0), shape[d] - 2)
+                    f = centre[d] - below
+                    if corner >> d & 1:
+                        below += 1
+                        part *= f
+                    else:
+                        part *= 1.0 - f
+                    node = node * shape[d] + below
+                if part > 0.0:
+                    for d in range(dimension):
+                        nodes[node, d] += np.float32(part * vectors[face, d])
+                    touched[node // shape[dimension - 1], node % shape[dimension - 1] // stretch] = True
             for d in range(dimension):
                 sums[slot, d] += weight * centre[d]
                 sums[slot, dimension + d] += vectors[face, d] * share

@@ -1,0 +1,258 @@
+"""Diffusion from sources on a grid, over a pyramid of coarser grids.
+
+X falls by e over √t. Farther than a few √t from the source its direction varies slowly, and the same question asked on
+a grid of twice the spacing, with the time that belongs to it (``t = τ max(h, h_source)²``, as on the finest grid), has
+the same answer at an eighth of the cost. So every level is swept only within `BAND` of the source, and the coarsest
+everywhere.
+
+Sources move to a coarser grid by the transpose of linear interpolation, which keeps their sums and first moments: two
+sides of a sheet thinner than a coarse cell do not cancel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .stencil import by_slabs
+from .sweeps import STRETCH, ScaledVectors, diffuse_by_sweeps
+
+BAND = 12.0
+"""Half width, in √t, of the band around the source in which a level is swept."""
+MARGIN = 3
+"""Lines at the rim of the band that take their values from the coarser level."""
+COARSEST = 32
+"""A grid with no more nodes than this along any axis is not coarsened."""
+ROUNDS = 3
+"""How often each combination of directions is swept."""
+
+
+@dataclass(frozen=True, eq=False)
+class NodeSources:
+    """Vectors at the nodes of a grid.
+
+    Attributes
+    ----------
+    sums : (l₀, l₁, l₂, n, 4) float32
+        Padded to four axes and four components.
+    touched : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
+        Stretches of the lines in which they are not all zero.
+    steps : (4,) float
+        Spacing of the grid; 0 along axes of one node.
+    """
+
+    sums: NDArray[np.float32]
+    touched: NDArray[np.bool_]
+    steps: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, shape: tuple[int, ...], steps: NDArray[np.float64]) -> NodeSources:
+        """Zero everywhere; pages that are never written cost no memory."""
+        stretches = -(-shape[3] // STRETCH)
+        return cls(np.zeros((*shape, 4), dtype=np.float32), np.zeros((*shape[:3], stretches), dtype=np.bool_), steps)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Nodes along each of the four axes."""
+        return self.sums.shape[:4]
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """What was diffused on one grid of the pyramid.
+
+    Attributes
+    ----------
+    vectors : ScaledVectors, or None on a level that was left out
+        X, within the band.
+    inside : (l₀, l₁, l₂, stretches) bool, or None
+        Stretches whose values hold; elsewhere the coarser level's do.
+    factors : (4,) int
+        Cells of this grid per cell of the next coarser one, along each axis.
+    """
+
+    vectors: ScaledVectors | None
+    inside: NDArray[np.bool_] | None
+    factors: NDArray[np.int64]
+
+
+def diffuse_on_pyramid(sources: NodeSources, time: Callable[[float], float], finest: int = 0) -> list[Level]:
+    """Solve ``(1 − tΔ) X = B`` on every level, from `finest` (0: the grid of the sources) to the coarsest.
+
+    Parameters
+    ----------
+    sources : NodeSources
+        B.
+    time : callable
+        Diffusion time t on a grid of a given mean spacing.
+    finest : int
+        Levels to leave out, where a coarser answer will do.
+    """
+    levels = []
+    while True:
+        factors = coarsening(sources.shape, sources.steps)
+        last = not (factors > 1).any()
+        if len(levels) >= finest or last:
+            levels.append(_diffuse_level(sources, time, factors, last))
+        else:
+            levels.append(Level(None, None, factors))
+        if last:
+            return levels
+        sources = _restricted(sources, factors)
+
+
+def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(4,) 2 along the axes that the next coarser grid halves, else 1: the finest axes first, down to a small grid."""
+    counts = np.array(shape)
+    if counts.max() <= COARSEST:
+        return np.ones(4, dtype=np.int64)
+    wide = counts > 4
+    least = steps[wide].min()
+    return np.where(wide & (steps < 1.5 * least), 2, 1)
+
+
+def _diffuse_level(
+    sources: NodeSources, time: Callable[[float], float], factors: NDArray[np.int64], last: bool
+) -> Level:
+    real = sources.steps > 0
+    t = time(float(sources.steps[real].mean()))
+    ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
+    if last:
+        active = inside = np.ones_like(sources.touched)
+    else:
+        width = np.ceil(BAND * np.sqrt(ratios)).astype(int)
+        active = _dilated(sources.touched, width)
+        inside = _dilated(sources.touched, np.maximum(width - MARGIN, 0))
+    vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, ROUNDS)
+    return Level(vectors, inside, factors)
+
+
+def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bool_]:
+    from scipy.ndimage import maximum_filter1d
+
+    spread = mask.view(np.uint8)
+    for axis, n in enumerate(mask.shape):
+        reach = int(width[axis]) if axis < 3 else -(-int(width[3]) // STRETCH)
+        if n > 1 and reach > 0:
+            spread = maximum_filter1d(spread, 2 * min(reach, n) + 1, axis=axis, mode="constant")
+    return spread.view(np.bool_)
+
+
+def _restricted(sources: NodeSources, factors: NDArray[np.int64]) -> NodeSources:
+    shape = tuple(int(n // 2 + 1) if f == 2 else int(n) for n, f in zip(sources.shape, factors, strict=True))
+    coarse = NodeSources.empty(shape, sources.steps * factors)
+    _restrict(sources.sums, sources.touched, factors, coarse.sums, coarse.touched)
+    return coarse
+
+
+def scatter(
+    nodes: NDArray[np.int64], weights: NDArray[np.float64], values: NDArray[np.float64], sources: NodeSources
+) -> None:
+    """Add values (s, c ≤ 4) to the `nodes` (s, k) of a grid with `weights` (s, k)."""
+    four = np.zeros((len(values), 4))
+    four[:, : values.shape[1]] = values
+    stretches = sources.touched.shape[3]
+    _scatter(
+        nodes, weights, four, sources.sums.reshape(-1, 4), sources.touched.reshape(-1, stretches), sources.shape[3]
+    )
+
+
+def collapse(
+    levels: list[Level], shape: tuple[int, ...], components: int, extract: Callable[..., None]
+) -> NDArray[np.float32]:
+    """(components, *shape) what `extract` makes of X at each node, from the finest level that knows it.
+
+    `extract(mantissas, inside, out, axis, start, stop)` fills `out` where `inside`.
+    """
+    result = np.empty((components, 1, 1, 1, 1), dtype=np.float32)
+    for depth in range(len(levels) - 1, -1, -1):
+        level = levels[depth]
+        fine_shape = shape if depth == 0 else level.vectors.mantissas.shape[:4]
+        out = np.empty((components, *fine_shape), dtype=np.float32)
+        if depth < len(levels) - 1:
+            by_slabs(fine_shape, _interpolate, result, level.factors, out)
+        if level.vectors is not None:
+            by_slabs(fine_shape, extract, level.vectors.mantissas, level.inside, out)
+        result = out
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _scatter(nodes, weights, values, sums, touched, n):
+    for s in range(nodes.shape[0]):
+        for c in range(nodes.shape[1]):
+            node, weight = nodes[s, c], weights[s, c]
+            if weight > 0.0:
+                for q in range(4):
+                    sums[node, q] += np.float32(weight * values[s, q])
+                touched[node // n, node % n // STRETCH] = True
+
+
+@njit(cache=True, nogil=True)
+def _restrict(sums, touched, factors, coarse, coarse_touched):
+    """The transpose of `_interpolate`."""
+    n0, n1, n2, n3 = sums.shape[:4]
+    for i in range(n0):
+        for j in range(n1):
+            for k in range(n2):
+                for s in range(touched.shape[3]):
+                    if not touched[i, j, k, s]:
+                        continue
+                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
+                        odd = (
+                            (8 if factors[0] == 2 and i % 2 else 0)
+                            | (4 if factors[1] == 2 and j % 2 else 0)
+                            | (2 if factors[2] == 2 and k % 2 else 0)
+                            | (1 if factors[3] == 2 and m % 2 else 0)
+                        )
+                        share = np.float32(1)
+                        for bit in range(4):
+                            if odd >> bit & 1:
+                                share *= np.float32(0.5)
+                        for corner in range(16):
+                            if corner & ~odd:
+                                continue
+                            a = i // factors[0] + (corner >> 3 & 1)
+                            b = j // factors[1] + (corner >> 2 & 1)
+                            c = k // factors[2] + (corner >> 1 & 1)
+                            d = m // factors[3] + (corner & 1)
+                            for q in range(4):
+                                coarse[a, b, c, d, q] += share * sums[i, j, k, m, q]
+                            coarse_touched[a, b, c, d // STRETCH] = True
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
+def _interpolate(coarse, factors, out, axis, start, stop):
+    """Values of a coarser grid at all nodes, linear along every axis that was coarsened."""
+    _, n0, n1, n2, n = out.shape
+    row = np.empty(coarse.shape[4], dtype=np.float32)
+    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
+        a = i // factors[0]
+        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
+            b = j // factors[1]
+            for k in range(n2):
+                c = k // factors[2]
+                more0 = 1 + (1 if factors[0] == 2 and i % 2 else 0)
+                more1 = 1 + (1 if factors[1] == 2 and j % 2 else 0)
+                more2 = 1 + (1 if factors[2] == 2 and k % 2 else 0)
+                share = np.float32(1.0 / (more0 * more1 * more2))
+                for q in range(out.shape[0]):
+                    row[:] = np.float32(0)
+                    for x in range(more0):
+                        for y in range(more1):
+                            for z in range(more2):
+                                line = coarse[q, a + x, b + y, c + z]
+                                for m in range(row.shape[0]):
+                                    row[m] += share * line[m]
+                    into = out[q, i, j, k]
+                    if factors[3] == 1:
+                        into[:] = row
+                    else:
+                        for m in range((n + 1) // 2):
+                            into[2 * m] = row[m]
+                        for m in range(n // 2):
+                            into[2 * m + 1] = np.float32(0.5) * (row[m] + row[m + 1])
