@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..discretization import Diagnostics
+from ..domains.validation import finite_rows
+from ..errors import OutsideError
+from ..sources.curves import Curve, SurfacePoints
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from ..domains.triangle_mesh import TriangleMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +34,18 @@ class VertexField:
         What happened on the way.
     source : SourceTerm
         The source as the solver saw it.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> phi = VertexField(mesh, np.array([-0.5, 0.5, 0.5, -0.5]))
+    >>> phi([[0.75, 0.5, 0.0]]).round(3)
+    array([0.25])
+    >>> phi.face_gradients.tolist()
+    [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    >>> phi.contour(0.0)
+    [Curve(3 points, open, oriented)]
     """
 
     domain: Any
@@ -32,7 +53,110 @@ class VertexField:
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     source: Any = field(default=None, repr=False)
 
+    def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
+        """φ at points of the surface, linear between vertices.
+
+        Parameters
+        ----------
+        points : SurfacePoints, Curve or (n, 3) float
+            Where; for positions in space, the closest points of the surface count.
+
+        Returns
+        -------
+        (n,) float
+        """
+        mesh, values, faces, weights = self._at(points)
+        return np.einsum("ik,ik->i", weights, values[mesh.faces[faces]])
+
+    def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
+        """(n, 3) ∇φ in the faces that points lie in; see `__call__`."""
+        _, _, faces, _ = self._at(points)
+        return self.face_gradients[faces]
+
+    @cached_property
+    def face_gradients(self) -> NDArray[np.float64]:
+        """(m, 3) ∇φ on the faces of the domain's triangulation; of length 1 wherever φ is a distance.
+
+        Degenerate faces have no gradient: theirs is zero.
+        """
+        field = self.restrict()
+        mesh = field.domain.triangulation
+        rise = field.domain.on_triangulation(field.values)[mesh.faces]
+        corners = mesh.vertices[mesh.faces]
+        opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+        doubled = 2 * mesh.face_area_vectors
+        square = np.einsum("ij,ij->i", doubled, doubled)
+        turned = np.cross(doubled[:, None], opposite)
+        sums = np.einsum("ik,ikj->ij", rise, turned)
+        return sums / np.where(square > 0, square, np.inf)[:, None]
+
+    def contour(self, level: float = 0.0) -> list[Curve]:
+        """Where φ takes a value.
+
+        Parameters
+        ----------
+        level : float
+            The value.
+
+        Returns
+        -------
+        list of Curve
+            One for each connected line, closed where it closes; φ grows to its left.
+
+        Raises
+        ------
+        OutsideError
+            If φ takes the value nowhere.
+        """
+        field = self.restrict()
+        known = field.values[np.isfinite(field.values)]
+        low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
+        if not low <= level <= high:
+            raise OutsideError(
+                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}; choose a level between"
+            )
+        return field.domain.level_set(field.values, level)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the surface with φ at its vertices; the extension says the format.
+
+        ``.ply`` and ``.vtp`` have a property ``signed_distance`` per vertex, ``.obj`` a texture coordinate,
+        ``.npz`` the arrays ``values``, ``vertices`` and ``faces``.
+
+        Parameters
+        ----------
+        path : str or path
+            Where to. Written under a temporary name and then renamed: a file that was there before survives a failure.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is unknown or the file cannot be written.
+        """
+        from ..io.surface_fields import save_vertex_field
+
+        save_vertex_field(self.restrict(), path)
+
     def restrict(self) -> VertexField:
         """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself."""
         mesh = getattr(self.domain, "mesh", self.domain)
         return self if mesh is self.domain else replace(self, domain=mesh, values=self.values[: mesh.n_vertices])
+
+    def _at(
+        self, points: Curve | SurfacePoints | ArrayLike
+    ) -> tuple[TriangleMesh, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+        field = self.restrict()
+        mesh = field.domain.triangulation
+        values = field.domain.on_triangulation(field.values)
+        if isinstance(points, (Curve, SurfacePoints)):
+            outside = np.flatnonzero((points.faces < 0) | (points.faces >= mesh.n_faces))
+            if len(outside):
+                raise OutsideError(
+                    f"point {outside[0]} lies in face {points.faces[outside[0]]}, but face ids go from 0 to "
+                    f"{mesh.n_faces - 1}: was it made for another surface?"
+                )
+            return mesh, values, points.faces, points.barycentric
+        from ..sources.projection import closest_points
+
+        faces, weights, _ = closest_points(mesh, finite_rows(points, "points", 3))
+        return mesh, values, faces, weights

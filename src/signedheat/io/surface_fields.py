@@ -1,0 +1,118 @@
+"""Surfaces with φ at their vertices, to files that other programs show.
+
+PLY is written here because trimesh writes single precision, VTP because VTK is too large for one format.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import FileFormatError
+from ..fields.vertex_field import VertexField
+from .elements import faces_of, points_of
+from .files import PathLike, contents, extension, replacing, unknown_extension
+from .vtk_xml import _Writer
+
+NAME = "signed_distance"
+
+
+def save_vertex_field(field: VertexField, path: PathLike) -> None:
+    """Write a surface with φ at its vertices; see `VertexField.save`."""
+    writer = WRITERS.get(extension(path))
+    if writer is None:
+        raise unknown_extension(path, WRITERS, "a field on a surface")
+    if not isinstance(field.domain, (TriangleMesh, PolygonMesh, PointCloud)):
+        field = VertexField(field.domain.triangulation, field.domain.on_triangulation(field.values))
+    content = writer(field)
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def load_vertex_field(path: PathLike) -> VertexField:
+    """Read what `save_vertex_field` wrote to an ``.npz`` file."""
+    try:
+        with np.load(io.BytesIO(contents(path)), allow_pickle=False) as file:
+            arrays = dict(file)
+        vertices, values = arrays["vertices"], arrays["values"]
+        if "offsets" in arrays:
+            domain: Any = PolygonMesh(vertices, np.split(arrays["faces"], arrays["offsets"][1:-1]))
+        elif "faces" in arrays:
+            domain = TriangleMesh(vertices, arrays["faces"])
+        else:
+            domain = PointCloud(vertices, arrays.get("normals"))
+    except KeyError as error:
+        raise FileFormatError(f"{path}: {error}: a field on a surface has values and vertices") from error
+    except (ValueError, OSError, EOFError) as error:
+        if isinstance(error, FileFormatError):
+            raise
+        raise FileFormatError(f"{path}: it is no .npz file, or is damaged ({error}): write it again") from error
+    if values.shape != (len(vertices),):
+        raise FileFormatError(f"{path}: {values.shape} values for {len(vertices)} vertices: the file is damaged")
+    return VertexField(domain, values)
+
+
+def write_npz(field: VertexField) -> bytes:
+    """Arrays, exact to the last bit."""
+    domain, buffer = field.domain, io.BytesIO()
+    arrays = {"values": field.values, "vertices": points_of(domain)}
+    if isinstance(domain, TriangleMesh):
+        arrays["faces"] = domain.faces
+    elif isinstance(domain, PolygonMesh):
+        arrays |= {"faces": domain.corners, "offsets": domain.offsets}
+    elif domain.normals is not None:
+        arrays["normals"] = domain.normals
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def write_ply(field: VertexField) -> bytes:
+    """Binary, in double precision."""
+    corners, counts = faces_of(field.domain)
+    table = np.column_stack([points_of(field.domain), field.values]).astype("<f8")
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
+    lines += [f"property double {name}" for name in ("x", "y", "z", NAME)]
+    lines += [f"element face {len(counts)}", "property list int int vertex_indices"] * (len(counts) > 0)
+    listed = np.insert(corners, np.cumsum(counts) - counts, counts).astype("<i4")
+    return ("\n".join([*lines, "end_header"]) + "\n").encode() + table.tobytes() + listed.tobytes()
+
+
+def write_vtp(field: VertexField) -> bytes:
+    """For ParaView."""
+    points, (corners, counts) = points_of(field.domain), faces_of(field.domain)
+    group = "Polys" if len(counts) else "Verts"
+    if not len(counts):
+        corners, counts = np.arange(len(points)), np.ones(len(points), dtype=np.int64)
+    writer = _Writer()
+    data = f'<PointData Scalars="{NAME}">{writer.array(NAME, field.values)}</PointData>'
+    xyz = f"<Points>{writer.array('Points', points)}</Points>"
+    ends = np.cumsum(counts)
+    cells = f"<{group}>{writer.array('connectivity', corners)}{writer.array('offsets', ends)}</{group}>"
+    sizes = f'NumberOfPoints="{len(points)}" NumberOf{group}="{len(counts)}"'
+    return writer.file("PolyData", f"<PolyData><Piece {sizes}>{data}{xyz}{cells}</Piece></PolyData>")
+
+
+def write_obj(field: VertexField) -> bytes:
+    """φ as the first texture coordinate, in the units of the surface."""
+    corners, counts = faces_of(field.domain)
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points_of(field.domain).tolist()]
+    lines += [f"vt {value!r} 0" for value in field.values.tolist()]
+    words = [f"{v}/{v}" for v in (corners + 1).tolist()]
+    ends = np.cumsum(counts).tolist()
+    lines += ["f " + " ".join(words[end - count : end]) for end, count in zip(ends, counts.tolist(), strict=True)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+WRITERS: dict[str, Callable[[VertexField], bytes]] = {
+    ".npz": write_npz,
+    ".obj": write_obj,
+    ".ply": write_ply,
+    ".vtp": write_vtp,
+}
+VERTEX_FIELD_FORMATS = frozenset(WRITERS)
