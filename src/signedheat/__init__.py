@@ -19,7 +19,9 @@ from .errors import (
     UnreachedWarning,
 )
 from .extensions import grid_sharpening as _grid_sharpening  # noqa: F401  registers it
+from .extensions.close_curves import close_curves
 from .extensions.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.sharpening import sharpen
 from .fields.grid_field import GridField
 from .fields.vertex_field import VertexField
@@ -61,12 +63,19 @@ __all__ = [
     "UnreachedWarning",
     "VertexField",
     "ZeroSet",
+    "close_curves",
+    "closing",
+    "dilate",
+    "erode",
     "intrinsic_delaunay",
     "load_field",
+    "opening",
     "read",
     "read_curves",
     "save",
     "sharpen",
+    "shell",
     "signed_distance",
+    "thicken",
     "write_curves",
 ]
