@@ -122,9 +122,8 @@ def draw_shape(shape: Any, axes: Any, view: tuple[float, float] = (18, -58), max
         facing = normals @ eye
         light = 0.45 + 0.55 * np.abs(normals @ _direction(55, view[1] + 40))
         tint = np.where((facing > 0)[:, None], [0.96, 0.86, 0.55], [0.80, 0.25, 0.20])
-        axes.add_collection3d(
-            Poly3DCollection(corners, facecolors=np.clip(tint * light[:, None], 0, 1), edgecolor="face", linewidth=0.15)
-        )
+        colors = np.clip(tint * light[:, None], 0, 1)
+        axes.add_collection3d(Poly3DCollection(corners, facecolors=colors, edgecolors=colors, linewidths=0.2))
         used = corners.reshape(-1, 3)
     lower, upper = used.min(axis=0), used.max(axis=0)
     extent = np.maximum(upper - lower, 1e-3 * max(float((upper - lower).max()), np.finfo(float).tiny))
