@@ -7,6 +7,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 MAX_SIDES = 64
+TOUCHING = 1e-7  # radians by which sectors may overlap
 
 
 @njit(cache=True, parallel=True)
@@ -80,18 +81,34 @@ def voronoi_fans(
 
 
 @njit(cache=True)
-def accept_one_per_side(edges: NDArray[np.int64], sides: NDArray[np.int64], n_edges: int) -> NDArray[np.bool_]:
-    """(m,) triangles that find all three of their edges free on their side, in the order given."""
-    taken = np.zeros((n_edges, 2), dtype=np.bool_)
-    accepted = np.zeros(len(edges), dtype=np.bool_)
-    for f in range(len(edges)):
-        free = True
+def accept_apart(
+    triangles: NDArray[np.int64], starts: NDArray[np.float64], widths: NDArray[np.float64], n_points: int
+) -> NDArray[np.bool_]:
+    """(m,) triangles whose sector overlaps no earlier accepted one at any of their three corners.
+
+    At corner k of triangle f the sector goes from angle ``starts[f, k]`` counter-clockwise by ``widths[f, k]``.
+    """
+    accepted = np.zeros(len(triangles), dtype=np.bool_)
+    taken = np.zeros((n_points, MAX_SIDES, 2))
+    count = np.zeros(n_points, dtype=np.int64)
+    for f in range(len(triangles)):
+        apart = True
         for k in range(3):
-            free = free and not taken[edges[f, k], sides[f, k]]
-        if free:
+            v = triangles[f, k]
+            apart = apart and count[v] < MAX_SIDES
+            for s in range(count[v]):
+                ahead = (starts[f, k] - taken[v, s, 0]) % (2 * np.pi)
+                behind = (taken[v, s, 0] - starts[f, k]) % (2 * np.pi)
+                inside = min(ahead, behind) > TOUCHING and (ahead < taken[v, s, 1] - TOUCHING)
+                around = min(ahead, behind) > TOUCHING and (behind < widths[f, k] - TOUCHING)
+                same = min(ahead, behind) <= TOUCHING and min(widths[f, k], taken[v, s, 1]) > TOUCHING
+                apart = apart and not (inside or around or same)
+        if apart:
             accepted[f] = True
             for k in range(3):
-                taken[edges[f, k], sides[f, k]] = True
+                v = triangles[f, k]
+                taken[v, count[v], 0], taken[v, count[v], 1] = starts[f, k], widths[f, k]
+                count[v] += 1
     return accepted
 
 

@@ -2,8 +2,8 @@
 
 Every point triangulates its neighbours in its own tangent plane (as for the Laplacian of Sharp & Crane 2020) and
 offers the triangles around itself. Where the points agree, three corners offer the same triangle; where they do not,
-triangles that more corners offer, and then rounder ones, come first, and none is accepted on a side of an edge that is
-taken. The result is a mesh whose edges have at most two faces each.
+triangles that more corners offer, and then rounder ones, come first, and none is accepted that overlaps another around
+one of its corners. The result is a mesh whose edges have at most two faces each.
 """
 
 from __future__ import annotations
@@ -67,8 +67,7 @@ def local_triangulations(
     axis = axes[:, 2]
     if len(candidates) == 0:
         return LocalTriangulations(candidates, axis)
-    faces = agreed(points, axis, candidates[np.lexsort((circumradii, -votes))])
-    faces = faces[~stray(faces, len(points))]
+    faces = agreed(points, axes, candidates[np.lexsort((circumradii, -votes))])
     oriented = axis * aligned(points, axis, faces, normals)[:, None]
     faces = facing(points, oriented, faces)
     return LocalTriangulations(np.concatenate([faces, hole_fillings(points, oriented, faces)]), oriented)
@@ -155,33 +154,23 @@ def plausible(
     return triangles[keep], votes[keep], product[keep] / (2 * twice_area[keep])
 
 
-def agreed(
-    points: NDArray[np.float64], normals: NDArray[np.float64], triangles: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """The triangles that find all their edges free on their side, first come, first served.
+def agreed(points: NDArray[np.float64], axes: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The triangles that overlap no other around any of their corners, first come, first served.
 
-    On which side of an edge a triangle lies is told in the plane between those of its two ends.
+    Overlap is told by the sector that a triangle takes up in the tangent plane of its corner.
     """
-    from .local_triangulation_kernels import accept_one_per_side
+    from .local_triangulation_kernels import accept_apart
 
-    edges = face_edges(triangles)
-    sides = np.empty(triangles.shape, dtype=np.int64)
+    starts, widths = np.empty(triangles.shape), np.empty(triangles.shape)
     for k in range(3):
-        tail, head = edges.vertices[edges.of_faces[:, k]].T
-        apex = triangles[:, (k + 2) % 3]
-        same = np.where((normals[tail] * normals[head]).sum(axis=1) < 0, -1.0, 1.0)
-        between = normals[tail] + same[:, None] * normals[head]
-        inward = np.cross(between, points[head] - points[tail])
-        sides[:, k] = ((points[apex] - points[tail]) * inward).sum(axis=1) > 0
-    return triangles[accept_one_per_side(edges.of_faces, sides, len(edges.vertices))]
-
-
-def stray(faces: NDArray[np.int64], n_points: int) -> NDArray[np.bool_]:
-    """(m,) faces that share no edge with another, though all their corners have other faces: they overlap those."""
-    edges = face_edges(faces)
-    alone = (edges.face_counts[edges.of_faces] == 1).all(axis=1)
-    shared = np.bincount(faces.ravel(), minlength=n_points) > 1
-    return alone & shared[faces].all(axis=1)
+        here, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
+        angle = []
+        for there in (right, left):
+            step = points[there] - points[here]
+            angle.append(np.arctan2((step * axes[here, 1]).sum(axis=1), (step * axes[here, 0]).sum(axis=1)))
+        turn = np.mod(angle[1] - angle[0] + np.pi, 2 * np.pi) - np.pi
+        starts[:, k], widths[:, k] = np.where(turn < 0, angle[1], angle[0]), np.abs(turn)
+    return triangles[accept_apart(triangles, starts, widths, len(points))]
 
 
 def aligned(
