@@ -1,0 +1,141 @@
+"""Growing and shrinking: closed forms, idempotence, volumes, broken input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.cli import main
+
+BALL = samples.sphere(4)
+
+
+def radii(mesh):
+    return np.linalg.norm(mesh.vertices, axis=1)
+
+
+def volume(mesh):
+    corners = mesh.vertices[mesh.faces]
+    return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6)
+
+
+def is_closed_and_manifold(mesh):
+    return mesh.to_trimesh().is_watertight and (mesh.edges.face_counts == 2).all()
+
+
+def box_with_arms():
+    import trimesh
+
+    boxes = [trimesh.creation.box(sides) for sides in [(1, 1, 1), (3, 0.2, 0.2)]]
+    return samples.union(*map(sh.TriangleMesh.from_trimesh, boxes))
+
+
+def waved_sheet(n=20):
+    x, y = np.meshgrid(np.linspace(-1, 1, n + 1), np.linspace(-1, 1, n + 1), indexing="ij")
+    vertices = np.stack([x, y, 0.2 * np.sin(2 * x)], axis=-1).reshape(-1, 3)
+    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.concatenate([np.stack([i, i + n + 1, i + n + 2], 1), np.stack([i, i + n + 2, i + 1], 1)])
+    return sh.TriangleMesh(vertices, faces)
+
+
+@pytest.mark.parametrize(("operation", "radius"), [(sh.dilate, 1.4), (sh.erode, 0.6), (sh.opening, 1), (sh.closing, 1)])
+def test_balls_stay_balls(operation, radius):
+    ball = operation(BALL, 0.4, resolution=64)
+    assert is_closed_and_manifold(ball)
+    np.testing.assert_allclose(radii(ball), radius, atol=0.005)
+    assert volume(ball) > 0
+
+
+def test_a_broken_ball_grows_as_if_it_were_whole():
+    broken = samples.with_flipped_faces(samples.without_patches(BALL, 4, 0.35), 0.05)
+    grown = sh.dilate(broken, 0.3, resolution=64)
+    assert is_closed_and_manifold(grown)
+    # Holes of angular radius 0.35 leave 1 − cos 0.35 = 0.06 open to interpretation.
+    assert np.quantile(np.abs(radii(grown) - 1.3), 0.99) < 0.06
+    np.testing.assert_allclose(radii(grown), 1.3, atol=0.1)
+
+
+@pytest.mark.parametrize("operation", [sh.opening, sh.closing])
+def test_a_second_time_changes_nothing_beyond_a_cell(operation):
+    from scipy.spatial import cKDTree
+
+    grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=80, padding=0.5)
+    once = operation(box_with_arms(), 0.2, grid)
+    twice = operation(once, 0.2, grid)
+    assert cKDTree(once.vertices).query(twice.vertices)[0].max() < 1.5 * grid.spacing.max()
+
+
+def test_opening_takes_thin_arms_off():
+    opened = sh.opening(box_with_arms(), 0.2, resolution=80)
+    assert np.abs(opened.vertices).max() < 0.56
+
+
+@pytest.mark.parametrize("sides", [(0.1,), (0.1, 0.0), (0.0, 0.1), (0.15, 0.1)])
+def test_a_sheet_gains_twice_its_area_times_the_distance(sides):
+    sheet = waved_sheet()
+    solid = sh.thicken(sheet, *sides, resolution=96)
+    assert is_closed_and_manifold(solid)
+    above, below = sides if len(sides) == 2 else 2 * sides
+    reach, rim = max(above, below), 8.2
+    flat = (above + below) * sheet.face_areas.sum()
+    # Rounded ends add at most half a disk along the rim.
+    assert flat * 0.97 < volume(solid) < flat * 1.03 + 0.5 * np.pi * reach**2 * rim
+
+
+def test_thickening_evenly_does_not_ask_which_side_is_which():
+    sheet = waved_sheet()
+    flipped = samples.with_flipped_faces(sheet, 0.5)
+    np.testing.assert_array_equal(
+        sh.thicken(sheet, 0.1, resolution=48).vertices, sh.thicken(flipped, 0.1, resolution=48).vertices
+    )
+
+
+def test_a_shell_lies_between_two_offsets():
+    wall = sh.shell(BALL, 0.0, 0.2, resolution=64)
+    assert is_closed_and_manifold(wall)
+    assert volume(wall) == pytest.approx(4 / 3 * np.pi * (1.2**3 - 1), rel=0.01)
+    assert radii(wall).min() == pytest.approx(1.0, abs=0.005)
+    assert radii(wall).max() == pytest.approx(1.2, abs=0.005)
+
+
+def test_a_disk_on_a_plane_grows():
+    n = 40
+    x, y = np.meshgrid(np.linspace(-1, 1, n + 1), np.linspace(-1, 1, n + 1), indexing="ij")
+    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.concatenate([np.stack([i, i + n + 1, i + n + 2], 1), np.stack([i, i + n + 2, i + 1], 1)])
+    mesh = sh.TriangleMesh(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces)
+    circles = mesh.level_set(np.hypot(x, y).ravel(), 0.4)
+    for operation, radius in [(sh.dilate, 0.6), (sh.erode, 0.2), (sh.closing, 0.4), (sh.opening, 0.4)]:
+        (grown,) = operation(circles, 0.2, mesh)
+        assert grown.closed
+        positions = np.einsum("ij,ijk->ik", grown.barycentric, mesh.vertices[mesh.faces[grown.faces]])
+        np.testing.assert_allclose(np.linalg.norm(positions, axis=1), radius, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: sh.dilate(BALL, -0.1), "negative"),
+        (lambda: sh.dilate(BALL, np.nan), "finite"),
+        (lambda: sh.erode(BALL, 2.0, resolution=32), "level -2"),
+        (lambda: sh.shell(BALL, 0.2, 0.1), "inner < outer"),
+        (lambda: sh.shell(BALL, 0.0, 0.001, resolution=32), "resolution"),
+        (lambda: sh.thicken(samples.oriented_points(BALL, 50), 0.1, resolution=32), "has none"),
+        (lambda: sh.thicken(waved_sheet(), 0.0), "by nothing"),
+    ],
+)
+def test_bad_input_is_named(call, words):
+    with pytest.raises(sh.SignedHeatError, match=words):
+        call()
+
+
+def test_the_command_writes_a_closed_surface(tmp_path, capsys):
+    source, target = tmp_path / "ball.stl", tmp_path / "out.stl"
+    sh.save(BALL, source)
+    assert main(["morph", "shell", str(source), "-0.2", "0.1", "-o", str(target), "--resolution", "40"]) == 0
+    assert is_closed_and_manifold(sh.read(target))
+    assert main(["morph", "shell", str(source), "0.1", "-o", str(target)]) == 2
+    assert main(["morph", "erode", str(source), "3", "-o", str(target), "--resolution", "32"]) == 1
+    assert str(source) in capsys.readouterr().err
