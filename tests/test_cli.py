@@ -1,0 +1,258 @@
+"""The command line, as a user meets it: files made, one-line errors, exit codes, nothing lost."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.cli import main
+from signedheat.domains.inspection import inspect
+
+
+@pytest.fixture
+def ball(tmp_path):
+    """A sphere with a third of its faces gone."""
+    path = tmp_path / "ball.ply"
+    samples.without_faces(samples.sphere(3), 0.35).save(path)
+    return str(path)
+
+
+def succeed(capsys, *arguments):
+    assert main(list(arguments)) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    return out
+
+
+def fail(capsys, *arguments, code=1):
+    assert main(list(arguments)) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("signedheat")
+    assert err.count("\n") == 1
+    return err
+
+
+@pytest.mark.parametrize("ending", ["npz", "vti", "nrrd", "npy"])
+def test_volume(tmp_path, ball, capsys, ending):
+    output = str(tmp_path / f"phi.{ending}")
+    summary = json.loads(succeed(capsys, "volume", ball, "-o", output, "--resolution", "32", "--json"))
+    phi = sh.load_field(output)
+    assert summary["shape"] == list(phi.grid.shape)
+    assert max(phi.grid.shape) == 32
+    assert abs(phi([[1.2, 0, 0]])[0] - 0.2) < 0.03
+    assert phi([[0, 0, 0]])[0] < -0.8
+
+
+def test_volume_is_sharpened_unless_plain(tmp_path, ball):
+    ours, papers = str(tmp_path / "sharp.npz"), str(tmp_path / "plain.npz")
+    options = ["--resolution", "32", "--quiet", "--diffusion", "4"]
+    assert main(["volume", ball, "-o", ours, *options]) == 0
+    assert main(["volume", ball, "-o", papers, *options, "--plain"]) == 0
+    plain = sh.load_field(papers)
+    grid = plain.grid
+    np.testing.assert_array_equal(plain.values, sh.SignedHeatSolver(grid, diffusion=4.0).distance(sh.read(ball)).values)
+    np.testing.assert_array_equal(sh.load_field(ours).values, sh.sharpen(plain).values)
+
+
+@pytest.mark.parametrize("constraint", ["free", "zero-set", "hard", "each-component", "soft:10"])
+def test_every_constraint_has_a_name(tmp_path, ball, capsys, constraint):
+    output = str(tmp_path / "phi.npz")
+    succeed(capsys, "volume", ball, "-o", output, "--resolution", "20", "--constraint", constraint, "--plain")
+    assert sh.load_field(output)([[0, 0, 0]])[0] < -0.7
+
+
+def test_volume_on_a_grid_of_ones_own(tmp_path, ball, capsys):
+    output = str(tmp_path / "phi.npz")
+    own = ["--origin", "-1.5", "-1.6", "-1.7", "--spacing", "0.2", "0.25", "0.3", "--shape", "16", "14", "12"]
+    succeed(capsys, "volume", ball, "-o", output, *own)
+    grid = sh.load_field(output).grid
+    assert grid.origin.tolist() == [-1.5, -1.6, -1.7]
+    assert grid.spacing.tolist() == [0.2, 0.25, 0.3]
+    assert grid.shape == (16, 14, 12)
+
+
+def test_spacing_and_padding(tmp_path, ball, capsys):
+    output = str(tmp_path / "phi.npz")
+    succeed(capsys, "volume", ball, "-o", output, "--spacing", "0.125", "--padding", "0.5")
+    grid = sh.load_field(output).grid
+    assert grid.spacing.tolist() == [0.125] * 3
+    assert (grid.origin <= -1.5 + 0.05).all()
+
+
+def test_offsets_are_closed_one_file_each(tmp_path, ball, capsys):
+    output = str(tmp_path / "shell.stl")
+    arguments = ["offset", ball, "0.2", "-1e-1", "0.6", "-o", output, "--resolution", "48", "--json"]
+    summary = json.loads(succeed(capsys, *arguments))
+    names = ["shell_+0.2.stl", "shell_-0.1.stl", "shell_+0.6.stl"]
+    assert [os.path.basename(surface["output"]) for surface in summary["surfaces"]] == names
+    for name, radius in zip(names, (1.2, 0.9, 1.6), strict=True):
+        surface = sh.read(tmp_path / name)
+        report = inspect(surface)
+        assert report.is_closed
+        assert report.is_manifold
+        assert report.inconsistent_edges == 0
+        np.testing.assert_allclose(np.linalg.norm(surface.vertices, axis=1).mean(), radius, rtol=0.02)
+        volume = np.einsum("ij,ij->", surface.vertices[surface.faces[:, 0]], surface.face_area_vectors) / 3
+        assert volume > 0
+
+
+def test_offset_of_one_distance_has_the_name_given(tmp_path, ball, capsys):
+    text = succeed(capsys, "offset", ball, "0.1", "-o", str(tmp_path / "a.obj"), "--resolution", "24")
+    assert "a.obj" in text
+    assert sh.read(tmp_path / "a.obj").n_faces > 100
+
+
+def test_contour(tmp_path, ball, capsys):
+    field, output = str(tmp_path / "phi.npz"), str(tmp_path / "zero.ply")
+    succeed(capsys, "volume", ball, "-o", field, "--resolution", "32")
+    succeed(capsys, "contour", field, "0.1", "-o", output)
+    assert inspect(sh.read(output)).is_closed
+    assert "phi.npz" in fail(capsys, "contour", field, "100", "-o", output)
+
+
+def test_info_of_shapes_and_fields(tmp_path, ball, capsys):
+    summary = json.loads(succeed(capsys, "info", ball, "--json", "--resolution", "64", "512"))
+    report = inspect(sh.read(ball))
+    assert summary["open_edges"] == report.open_edges
+    assert summary["memory_bytes"]["512"] > 50 * summary["memory_bytes"]["64"] > 0
+    assert "open edges" in succeed(capsys, "info", ball)
+    field = str(tmp_path / "phi.vti")
+    succeed(capsys, "volume", ball, "-o", field, "--resolution", "16")
+    assert json.loads(succeed(capsys, "info", field, "--json"))["kind"] == "GridField"
+    cloud = str(tmp_path / "points.xyz")
+    samples.oriented_points(samples.sphere(2), 50).save(cloud)
+    assert json.loads(succeed(capsys, "info", cloud, "--json"))["has_normals"] is True
+
+
+def test_pictures(tmp_path, ball, capsys):
+    import matplotlib.image
+
+    field, slices, scene = (str(tmp_path / name) for name in ("phi.npz", "slices.png", "scene.png"))
+    succeed(capsys, "volume", ball, "-o", field, "--resolution", "24", "--preview", slices)
+    succeed(capsys, "view", ball, "-o", scene)
+    for picture in (slices, scene):
+        assert matplotlib.image.imread(picture)[..., :3].std() > 0.05
+    succeed(capsys, "view", field, "-o", slices)
+
+
+def test_demo_needs_no_file(tmp_path, capsys):
+    summary = json.loads(succeed(capsys, "demo", "-o", str(tmp_path / "demo"), "--resolution", "40", "--json"))
+    assert sorted(p.name for p in (tmp_path / "demo").iterdir()) == sorted(map(os.path.basename, summary["files"]))
+    assert inspect(sh.read(tmp_path / "demo" / "offset.stl")).is_closed
+    assert sh.load_field(tmp_path / "demo" / "distance.vti").values.min() < -0.2
+
+
+def test_quiet_prints_nothing(tmp_path, ball, capsys):
+    assert succeed(capsys, "offset", ball, "0.1", "-o", str(tmp_path / "a.stl"), "--resolution", "16", "--quiet") == ""
+
+
+USAGE = {
+    "no command": [],
+    "unknown command": ["inflate"],
+    "no output": ["volume", "BALL"],
+    "spacing zero": ["volume", "BALL", "-o", "OUT", "--spacing", "0"],
+    "spacing negative": ["volume", "BALL", "-o", "OUT", "--spacing", "-0.1"],
+    "two spacings": ["volume", "BALL", "-o", "OUT", "--spacing", "0.1", "0.1"],
+    "resolution one": ["volume", "BALL", "-o", "OUT", "--resolution", "1"],
+    "resolution and spacing": ["volume", "BALL", "-o", "OUT", "--resolution", "16", "--spacing", "0.1"],
+    "origin alone": ["volume", "BALL", "-o", "OUT", "--origin", "0", "0", "0"],
+    "padding nan": ["volume", "BALL", "-o", "OUT", "--padding", "nan"],
+    "diffusion": ["volume", "BALL", "-o", "OUT", "--diffusion", "0"],
+    "constraint": ["volume", "BALL", "-o", "OUT", "--constraint", "loose"],
+    "soft": ["volume", "BALL", "-o", "OUT", "--constraint", "soft:-1"],
+    "distance": ["offset", "BALL", "far", "-o", "OUT"],
+}
+
+
+@pytest.mark.parametrize("case", USAGE)
+def test_bad_usage_is_one_line_and_status_2(tmp_path, ball, capsys, case):
+    swap = {"BALL": ball, "OUT": str(tmp_path / "phi.npz")}
+    fail(capsys, *(swap.get(word, word) for word in USAGE[case]), code=2)
+    assert not (tmp_path / "phi.npz").exists()
+
+
+BAD_SHAPES = {
+    "missing.stl": (None, "no such file"),
+    "cut.stl": (b"x" * 80 + (9).to_bytes(4, "little"), "truncated"),
+    "what.step": (b"ISO", "not a known format"),
+    "empty.off": (b"OFF\n0 0 0\n", "no points"),
+    "nan.obj": (b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "NaN or infinity"),
+    "range.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "vertex ids go from"),
+    "flat.obj": (b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "area"),
+    "bare.xyz": (b"0 0 0\n1 0 0\n0 1 0\n", "normals"),
+}
+
+
+@pytest.mark.parametrize("command", ["volume", "offset"])
+@pytest.mark.parametrize("name", BAD_SHAPES)
+def test_bad_shapes_are_one_line_that_names_the_file(tmp_path, capsys, name, command):
+    content, reason = BAD_SHAPES[name]
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    output = tmp_path / ("a.npz" if command == "volume" else "a.stl")
+    output.write_text("precious")
+    distance = ["0.1"] if command == "offset" else []
+    error = fail(capsys, command, str(tmp_path / name), *distance, "-o", str(output), "--resolution", "16")
+    assert name in error
+    assert reason in error
+    assert output.read_text() == "precious"
+
+
+@pytest.mark.parametrize(("name", "error"), [("flat.obj", sh.GeometryError), ("bare.xyz", sh.SourceError)])
+def test_bad_shapes_raise_in_python(tmp_path, name, error):
+    (tmp_path / name).write_bytes(BAD_SHAPES[name][0])
+    shape = sh.read(tmp_path / name)
+    with pytest.raises(sh.SignedHeatError) as caught:
+        sh.signed_distance(shape, resolution=16)
+    assert isinstance(caught.value, (error, sh.SourceError))
+
+
+def test_grids_that_cannot_be(tmp_path, ball, capsys):
+    output = tmp_path / "phi.npz"
+    output.write_text("precious")
+    own = ["--origin", "50", "50", "50", "--spacing", "0.1", "--shape", "9", "9", "9"]
+    assert "ball.ply" in fail(capsys, "volume", ball, "-o", str(output), *own)
+    begin = time.perf_counter()
+    assert "GB" in fail(capsys, "volume", ball, "-o", str(output), "--resolution", "40000")
+    assert "GB" in fail(capsys, "volume", ball, "-o", str(output), "--spacing", "1e-9")
+    assert time.perf_counter() - begin < 5
+    with pytest.raises(sh.MemoryLimitError, match="GB"):
+        sh.signed_distance(sh.read(ball), resolution=40_000)
+    assert output.read_text() == "precious"
+
+
+def test_offset_outside_the_grid(tmp_path, ball, capsys):
+    output = tmp_path / "a.stl"
+    output.write_text("precious")
+    arguments = ["offset", ball, "0.9", "-o", str(output), "--resolution", "24", "--padding", "0.3"]
+    assert "padding" in fail(capsys, *arguments)
+    assert "ball.ply" in fail(capsys, "offset", ball, "-5", "-o", str(output), "--resolution", "16")
+    assert output.read_text() == "precious"
+
+
+def test_outputs_are_checked_before_anything_else(tmp_path, capsys):
+    """The shape does not even exist: the complaint is about the output."""
+    for output in (tmp_path / "none" / "phi.npz", tmp_path / "phi.doc", tmp_path):
+        error = fail(capsys, "volume", "missing.stl", "-o", str(output))
+        assert str(output) in error
+        assert "missing" not in error
+    assert "p.txt" in fail(capsys, "volume", "missing.stl", "-o", str(tmp_path / "a.npz"), "--preview", "p.txt")
+    error = fail(capsys, "offset", "missing.stl", "1", "-o", str(tmp_path / "points.xyz"))
+    assert "points.xyz" in error
+
+
+def test_module_runs_as_a_process(tmp_path, ball):
+    output = str(tmp_path / "a.npz")
+    command = [sys.executable, "-m", "signedheat.cli", "volume", ball, "-o", output, "--resolution", "16"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = subprocess.run([*command[:4], "missing.stl", "-o", output], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == "signedheat: missing.stl: there is no such file: check the name\n"
