@@ -1,18 +1,19 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
 .PHONY: demo test lint clean
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --only-binary=:all: --no-build-isolation hatchling editables
-	$(BIN)/pip install --quiet --no-build-isolation --editable .
+	$(PIP) --upgrade pip
+	$(PIP) hatchling editables
+	$(PIP) --no-build-isolation --editable .
 	touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed
-	$(BIN)/pip install --quiet --no-build-isolation --editable .[test]
+	$(PIP) --no-build-isolation --editable .[test]
 	touch $@
 
 demo: $(VENV)/.installed
