@@ -140,7 +140,7 @@ class PointCloud(Exchangeable, Surface):
 
     @cached_property
     def surface_normals(self) -> NDArray[np.float64]:
-        """(n, 3) unit normals, given or estimated, on the side from which `triangulation` is oriented."""
+        """(n, 3) unit normals, estimated from neighbours, on the side from which `triangulation` is oriented."""
         ids, found = self._distinct
         normals = np.empty_like(self.points)
         normals[ids] = found.normals

@@ -46,8 +46,8 @@ def local_triangulations(
     points : (n, 3) float
         Distinct points.
     normals : (n, 3) float, optional
-        Unit normals; estimated where absent. They may point to either side: the faces are oriented alike by themselves,
-        each connected part to the side to which most of its normals point, or else outward.
+        Unit normals, of which only the side counts: the faces are oriented alike by themselves, each connected part to
+        the side to which most of its normals point, or else outward.
     n_neighbors : int
         Size of the neighbourhoods. No triangle has a circumradius beyond the distance to the last neighbour.
 
@@ -61,7 +61,7 @@ def local_triangulations(
     >>> local_triangulations(square, n_neighbors=3).faces.tolist()
     [[0, 1, 2], [0, 2, 3]]
     """
-    axes, neighbors, reach = tangent_planes(points, normals, n_neighbors)
+    axes, neighbors, reach = tangent_planes(points, n_neighbors)
     candidates, votes = offers(points, axes, neighbors, reach)
     candidates, votes, circumradii = plausible(points, candidates, votes, reach)
     axis = axes[:, 2]
@@ -74,9 +74,12 @@ def local_triangulations(
 
 
 def tangent_planes(
-    points: NDArray[np.float64], normals: NDArray[np.float64] | None, n_neighbors: int
+    points: NDArray[np.float64], n_neighbors: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-    """Axes (n, 3, 3) of each point's tangent plane, its normal last; neighbours (n, k); distance (n,) to the last."""
+    """Axes (n, 3, 3) of each point's tangent plane, its normal last; neighbours (n, k); distance (n,) to the last.
+
+    Normals that come with scans are often those of a mesh that is gone: planes fitted to neighbours agree better.
+    """
     from scipy.spatial import cKDTree
 
     k = min(n_neighbors, len(points) - 1)
@@ -88,11 +91,7 @@ def tangent_planes(
         chunk = slice(begin, begin + _CHUNK)
         distances, near = tree.query(points[chunk], k=k + 1, workers=-1)
         neighbors[chunk], reach[chunk] = near[:, 1:], distances[:, -1]
-        offsets = points[near] - points[chunk, None]
-        if normals is None:
-            axes[chunk] = principal_axes(offsets, distances)
-        else:
-            axes[chunk] = any_axes(normals[chunk])
+        axes[chunk] = principal_axes(points[near] - points[chunk, None], distances)
     return axes, neighbors, reach
 
 
@@ -103,14 +102,6 @@ def principal_axes(offsets: NDArray[np.float64], distances: NDArray[np.float64])
     covariance = (weights * offsets).transpose(0, 2, 1) @ offsets
     first, second = np.moveaxis(np.linalg.eigh(covariance)[1][:, :, :0:-1], 2, 0)
     return np.stack([first, second, np.cross(first, second)], axis=1)
-
-
-def any_axes(normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3, 3) right-handed axes of which the last is the normal."""
-    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    first = np.cross(normals, least)
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(normals, first), normals], axis=1)
 
 
 def offers(
