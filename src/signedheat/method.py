@@ -47,7 +47,22 @@ def unit(vectors: NDArray[Any]) -> NDArray[Any]:
     if np.iscomplexobj(vectors):
         pairs = np.ascontiguousarray(vectors).view(vectors.real.dtype).reshape(*vectors.shape, 2)
         return unit(pairs).view(vectors.dtype)[..., 0]
-    largest = np.abs(vectors).max(axis=-1, keepdims=True)
-    scaled = vectors / np.where(largest > 0, largest, 1)
-    length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
-    return scaled / np.where(length > 0, length, 1)
+    result = np.empty_like(vectors)
+    for block in _blocks(vectors.shape):
+        part = vectors[block]
+        largest = np.abs(part).max(axis=-1, keepdims=True)
+        scaled = part / np.where(largest > 0, largest, 1)
+        length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
+        np.divide(scaled, np.where(length > 0, length, 1), out=result[block])
+    return result
+
+
+def _blocks(shape: tuple[int, ...], size: int = 2**16) -> list[Any]:
+    """Slices of the leading axes into blocks of about `size` vectors, which stay in the cache."""
+    if len(shape) == 1 or np.prod(shape[:-1]) <= size:
+        return [...]
+    inner = int(np.prod(shape[1:-1], dtype=np.int64))
+    if inner <= size:
+        rows = max(1, size // inner)
+        return [(slice(start, start + rows),) for start in range(0, shape[0], rows)]
+    return [(slice(i, i + 1), *(() if b is ... else b)) for i in range(shape[0]) for b in _blocks(shape[1:], size)]

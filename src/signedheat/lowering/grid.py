@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..operators.pyramid import Level, NodeSources
 
-SAMPLE_SIZE = 0.6
+SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the pieces into which faces are cut."""
 BYTES_PER_NODE = 56
 """Peak of a distance computation, measured."""

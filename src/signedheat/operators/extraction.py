@@ -1,4 +1,4 @@
-"""Kernels: what is made of diffused vectors, node by node. A common factor of a node's components does not matter."""
+"""Kernels: what is made of diffused vectors, node by node. A common factor of a node's components is of no matter."""
 
 from __future__ import annotations
 
@@ -7,46 +7,46 @@ from numba import njit
 
 from .sweeps import STRETCH
 
+TINY = np.float32(1e-34)
+"""Where nothing greater arrives, the coarser level knows better."""
+
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
-def unit_vectors(mantissas, inside, out, axis, start, stop):
-    """The vectors scaled to length one, or zero where nothing arrived."""
+def unit_vectors(vectors, inside, out, axis, start, stop):
+    """The vectors scaled to length one, where they are not lost beneath the range of numbers."""
     dimension, n0, n1, n2, n = out.shape
     stretches = inside.shape[3]
-    v = np.empty(4, dtype=np.float32)
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
         for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
             for k in range(n2):
-                line = mantissas[i, j, k]
+                line = vectors[i, j, k]
                 for s in range(stretches):
                     if not inside[i, j, k, s]:
                         continue
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
-                        largest = np.float32(0)
-                        for d in range(4):
-                            v[d] = line[m, d]
-                            largest = max(largest, abs(v[d]))
                         square = np.float32(0)
-                        factor = np.float32(0)
-                        if largest > 0:
-                            factor = np.float32(1) / largest
-                            for d in range(4):
-                                square += (factor * v[d]) ** 2
-                            factor /= np.sqrt(square)
+                        largest = max(max(abs(line[m, 0]), abs(line[m, 1])), max(abs(line[m, 2]), abs(line[m, 3])))
+                        if largest < TINY:
+                            continue
+                        factor = np.float32(1) / largest
                         for d in range(dimension):
-                            out[d, i, j, k, m] = factor * v[d]
+                            square += (factor * line[m, d]) ** 2
+                        factor /= np.sqrt(square)
+                        for d in range(dimension):
+                            out[d, i, j, k, m] = factor * line[m, d]
 
 
 @njit(cache=True, nogil=True)
-def quotients(mantissas, inside, out, axis, start, stop):
+def quotients(vectors, inside, out, axis, start, stop):
     """Second component over first."""
     _, n0, n1, n2, n = out.shape
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
         for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
             for k in range(n2):
-                line = mantissas[i, j, k]
+                line = vectors[i, j, k]
                 for s in range(inside.shape[3]):
                     if not inside[i, j, k, s]:
                         continue
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n)):
-                        out[0, i, j, k, m] = line[m, 1] / line[m, 0] if line[m, 0] > 0 else np.float32(0)
+                        if line[m, 0] > TINY:
+                            out[0, i, j, k, m] = line[m, 1] / line[m, 0]

@@ -19,15 +19,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .stencil import by_slabs
-from .sweeps import STRETCH, ScaledVectors, diffuse_by_sweeps
+from .sweeps import STRETCH, diffuse_by_sweeps
 
-BAND = 12.0
+BAND = 10.0
 """Half width, in √t, of the band around the source in which a level is swept."""
 MARGIN = 3
 """Lines at the rim of the band that take their values from the coarser level."""
 COARSEST = 32
 """A grid with no more nodes than this along any axis is not coarsened."""
-ROUNDS = 3
+ROUNDS = 2
 """How often each combination of directions is swept."""
 
 
@@ -67,7 +67,7 @@ class Level:
 
     Attributes
     ----------
-    vectors : ScaledVectors, or None on a level that was left out
+    vectors : (l₀, l₁, l₂, n, 4) float32, or None on a level that was left out
         X, within the band.
     inside : (l₀, l₁, l₂, stretches) bool, or None
         Stretches whose values hold; elsewhere the coarser level's do.
@@ -75,7 +75,7 @@ class Level:
         Cells of this grid per cell of the next coarser one, along each axis.
     """
 
-    vectors: ScaledVectors | None
+    vectors: NDArray[np.float32] | None
     inside: NDArray[np.bool_] | None
     factors: NDArray[np.int64]
 
@@ -166,17 +166,17 @@ def collapse(
 ) -> NDArray[np.float32]:
     """(components, *shape) what `extract` makes of X at each node, from the finest level that knows it.
 
-    `extract(mantissas, inside, out, axis, start, stop)` fills `out` where `inside`.
+    `extract(vectors, inside, out, axis, start, stop)` fills `out` where `inside`.
     """
     result = np.empty((components, 1, 1, 1, 1), dtype=np.float32)
     for depth in range(len(levels) - 1, -1, -1):
         level = levels[depth]
-        fine_shape = shape if depth == 0 else level.vectors.mantissas.shape[:4]
-        out = np.empty((components, *fine_shape), dtype=np.float32)
+        fine_shape = shape if depth == 0 else level.vectors.shape[:4]
+        out = np.zeros((components, *fine_shape), dtype=np.float32)
         if depth < len(levels) - 1:
             by_slabs(fine_shape, _interpolate, result, level.factors, out)
         if level.vectors is not None:
-            by_slabs(fine_shape, extract, level.vectors.mantissas, level.inside, out)
+            by_slabs(fine_shape, extract, level.vectors, level.inside, out)
         result = out
     return result
 
