@@ -1,7 +1,7 @@
 """VTK's XML files: image data (``.vti``) and polygonal data (``.vtp``).
 
 Written with appended raw data, as VTK itself prefers; read in every encoding that VTK writes. The one library that
-does all this, VTK, is a download of 120 MB: too much for two formats.
+does all this, VTK, takes more than half a gigabyte installed: too much for two formats.
 """
 
 from __future__ import annotations
