@@ -1,0 +1,104 @@
+"""``signedheat surface``: a mesh and curves on it in, signed distance at its vertices out."""
+
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
+from typing import Any
+
+import numpy as np
+
+from ..constraints import LevelValues, ZeroSet
+from ..errors import SourceError
+from ..io import CURVE_FORMATS, ensure_writable, read, read_curves, write_curves
+from ..io.surface_fields import VERTEX_FIELD_FORMATS
+from ..viewing import PICTURE_FORMATS
+from .computing import naming
+from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
+from .progress import ProgressBar
+
+
+def add_to(commands: Any) -> None:
+    """Register the command."""
+    parser = add_command(
+        commands,
+        "surface",
+        run=lambda arguments: run(parser, arguments),
+        help="signed distance to curves on a surface",
+        description="Signed distance on a mesh or a point cloud to curves, broken or not, and to points on it.",
+    )
+    parser.add_argument("mesh", metavar="MESH", help="surface or points: .obj .ply .stl .off .vtp .glb .pc .xyz")
+    parser.add_argument("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="field: .ply .vtp .obj .npz")
+    parser.add_argument(
+        "--constraint",
+        type=surface_constraint,
+        default=ZeroSet(),
+        metavar="C",
+        help="free, zero-set (default), each-component, soft:WEIGHT, or levels:V,V,…, one for each curve of the file",
+    )
+    parser.add_argument(
+        "--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"
+    )
+    parser.add_argument(
+        "--contours", type=whole_number(1), metavar="N", help="write N isolines beside the output, as OUT.contours.obj"
+    )
+    parser.add_argument("--close", metavar="FILE", help="write the completed curves, φ = 0: .txt .json .obj")
+    parser.add_argument("--preview", metavar="PNG", help="draw the result")
+
+
+def run(parser: Parser, arguments: Namespace) -> Summary:
+    """Read, check that the results can be written, compute, write."""
+    ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
+    if arguments.preview:
+        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+    if arguments.close:
+        ensure_writable(arguments.close, CURVE_FORMATS, "curves")
+    surface = read(arguments.mesh)
+    with naming(arguments.mesh):
+        if not hasattr(surface, "triangulation"):
+            raise SourceError("curves lie on meshes and point clouds: this file holds neither")
+    curves = read_curves(arguments.curves, surface)
+    from ..solver import SignedHeatSolver
+
+    with naming(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
+        field = SignedHeatSolver(surface, arguments.diffusion, progress).distance(curves, arguments.constraint)
+    field.save(arguments.output)
+    low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
+    summary = {
+        "mesh": arguments.mesh,
+        "curves": arguments.curves,
+        "output": arguments.output,
+        "n_vertices": len(field.values),
+        "minimum": low,
+        "maximum": high,
+        "unreached": len(field.diagnostics.unreached),
+        "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
+    }
+    if arguments.contours:
+        summary["contours"] = f"{arguments.output}.contours.obj"
+        levels = np.linspace(low, high, arguments.contours + 2)[1:-1]
+        lines = [curve for level in levels for curve in field.contour(float(level))]
+        write_curves(summary["contours"], lines, surface)
+    if arguments.close:
+        summary["closed"] = arguments.close
+        write_curves(arguments.close, field.contour(0.0), surface)
+    if arguments.preview:
+        from ..surface_pictures import save_surface
+
+        save_surface(field, arguments.preview, curves, arguments.contours or 20)
+    text = f"{arguments.output}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
+    if summary["unreached"]:
+        text += f", {summary['unreached']} vertices without any source"
+    return summary, text
+
+
+def surface_constraint(word: str) -> Any:
+    """A constraint from its name; on surfaces also given levels."""
+    name, _, values = word.partition(":")
+    if name == "levels":
+        return LevelValues([finite(value) for value in values.split(",")])
+    try:
+        return constraint(word)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{error}, levels:V,V,…") from None
