@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .matrices import upper_triangle, whole
+from .ordering import elimination_order
 
-__all__ = ["Factor", "available_backends", "factorize", "upper_triangle", "whole"]
+__all__ = ["Factor", "available_backends", "elimination_order", "factorize", "upper_triangle", "whole"]
 
 
 class Factor(Protocol):
@@ -25,9 +26,13 @@ class Factor(Protocol):
 
 def available_backends() -> list[str]:
     """Names of the back ends that this machine has, best first."""
-    from . import pardiso
+    from . import cholmod, pardiso
 
-    return [*(["pardiso"] if pardiso.is_available() else []), "superlu"]
+    return [
+        *(["pardiso"] if pardiso.is_available() else []),
+        *(["cholmod"] if cholmod.is_available() else []),
+        "superlu",
+    ]
 
 
 def factorize(matrix: Any, backend: str | None = None, order: NDArray[np.integer] | None = None) -> Factor:
@@ -62,6 +67,10 @@ def factorize(matrix: Any, backend: str | None = None, order: NDArray[np.integer
         from .pardiso import PardisoFactor
 
         return PardisoFactor(upper, order)
+    if name == "cholmod":
+        from .cholmod import CholmodFactor
+
+        return CholmodFactor(upper, order)
     from .superlu import SuperLUFactor
 
     return SuperLUFactor(upper, order)

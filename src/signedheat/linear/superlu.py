@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..errors import FactorizationError
 from .matrices import whole
+from .ordering import elimination_order
 
 
 class SuperLUFactor:
@@ -19,29 +21,35 @@ class SuperLUFactor:
     upper : sparse CSR, float64 or complex128
         Upper triangle.
     order : (n,) int, optional
-        Elimination order: ``order[k]`` is the unknown eliminated k-th.
+        Elimination order: ``order[k]`` is the unknown eliminated k-th. Without it, nested dissection finds one: with
+        SuperLU's own minimum degree, surfaces of 100 000 unknowns take minutes in place of a second.
     """
 
     backend = "superlu"
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
         from scipy.sparse.linalg import splu
+        from threadpoolctl import threadpool_limits
 
         self.n, self.dtype = upper.shape[0], upper.dtype
-        self._order = order
-        matrix = whole(upper) if order is None else whole(upper)[order][:, order]
-        self._factor = splu(
-            sparse.csc_matrix(matrix),
-            permc_spec="MMD_AT_PLUS_A" if order is None else "NATURAL",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        self._order = elimination_order(upper) if order is None else order
+        matrix = whole(upper)[self._order][:, self._order]
+        with threadpool_limits(1, "blas"):  # its dense blocks are tiny: threads cost ten times what they bring
+            try:
+                self._factor = splu(
+                    sparse.csc_matrix(matrix),
+                    permc_spec="NATURAL",
+                    diag_pivot_thresh=0.0,
+                    options={"SymmetricMode": True},
+                )
+            except RuntimeError as error:
+                raise FactorizationError(f"SuperLU failed on {self.n} unknowns: {error}") from error
+        if not (self._factor.U.diagonal().real > 0).all():
+            raise FactorizationError(f"SuperLU failed on {self.n} unknowns: the matrix is not positive definite")
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
         """Solution for one right-hand side (n,) or several (n, k)."""
         rhs = np.asarray(rhs, dtype=self.dtype)
-        if self._order is None:
-            return self._factor.solve(rhs)
         solution = np.empty_like(rhs)
         solution[self._order] = self._factor.solve(rhs[self._order])
         return solution

@@ -1,0 +1,64 @@
+"""CHOLMOD through scikit-sparse, where that is installed."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..errors import FactorizationError
+
+
+class CholmodFactor:
+    """Supernodal Cholesky factor of a Hermitian positive definite matrix.
+
+    Parameters
+    ----------
+    upper : sparse CSR, float64 or complex128
+        Upper triangle.
+    order : (n,) int, optional
+        Elimination order: ``order[k]`` is the unknown eliminated k-th. Without it, CHOLMOD finds one.
+    """
+
+    backend = "cholmod"
+
+    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
+        from sksparse import cholmod
+
+        self.n, self.dtype, self._order = upper.shape[0], upper.dtype, order
+        lower = sparse.csc_matrix((upper.data.conj(), upper.indices, upper.indptr), shape=upper.shape)
+        if order is not None:
+            whole = lower + sparse.tril(lower, -1).conj().T
+            lower = sparse.csc_matrix(sparse.tril(whole[order][:, order]))
+        try:
+            self._factor = cholmod.cholesky(
+                lower, mode="supernodal", ordering_method="default" if order is None else "natural"
+            )
+        except cholmod.CholmodError as error:
+            raise FactorizationError(f"CHOLMOD failed on {self.n} unknowns: {error}") from error
+
+    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
+        """Solution for one right-hand side (n,) or several (n, k)."""
+        rhs = np.asarray(rhs, dtype=self.dtype)
+        if self._order is None:
+            return self._factor(rhs)
+        solution = np.empty_like(rhs)
+        solution[self._order] = self._factor(rhs[self._order])
+        return solution
+
+    @property
+    def nonzeros(self) -> int:
+        """Entries stored in the factor."""
+        return int(self._factor.L().nnz)
+
+
+def is_available() -> bool:
+    """Whether scikit-sparse is installed, with the interface that its wheels and distributions have had until 0.4."""
+    if find_spec("sksparse") is None:
+        return False
+    from sksparse import cholmod
+
+    return hasattr(cholmod, "cholesky")

@@ -1,0 +1,131 @@
+"""Nested dissection by breadth-first levels, compiled at first use."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def dissect(starts, neighbors, leaf):
+    """Elimination order: both sides of a small separator first, then the separator; the sides likewise.
+
+    A separator is the smallest level near the middle of a breadth-first search from the end of a long path, less what
+    does not touch the level after it (George 1973). `order` is split in place; a region is a range of it.
+    """
+    n = len(starts) - 1
+    order = np.arange(n)
+    region = np.zeros(n, dtype=np.int64)  # which unfinished region each unknown lies in
+    level = np.empty(n, dtype=np.int64)
+    queue = np.empty(n, dtype=np.int64)
+    stack = [(0, n)]
+    regions = 1
+    while len(stack) > 0:
+        begin, end = stack.pop()
+        if end - begin <= leaf:
+            continue
+        here = region[order[begin]]
+        seed = order[begin]
+        depth, reached = -1, 0
+        while True:
+            for p in range(begin, end):
+                level[order[p]] = -1
+            reached = _levels(starts, neighbors, region, here, seed, level, queue)
+            last = level[queue[reached - 1]]
+            if last <= depth or reached < end - begin:
+                break
+            depth, seed = last, queue[reached - 1]
+        if reached < end - begin:  # several parts: one of them, and the rest
+            regions = _split(order, begin, end, level, -1, region, regions, stack)
+            continue
+        last = level[queue[reached - 1]]
+        if last < 2:
+            continue
+        cut = _thinnest(level, queue, reached, last)
+        for p in range(reached):
+            i = queue[p]
+            if level[i] == cut:
+                touches = False
+                for q in range(starts[i], starts[i + 1]):
+                    j = neighbors[q]
+                    if region[j] == here and level[j] == cut + 1:
+                        touches = True
+                        break
+                if not touches:
+                    level[i] = cut - 1
+        low, high = begin, end  # below the cut to the front, the cut to the back, above it between
+        for p in range(reached):
+            if level[queue[p]] < cut:
+                order[low] = queue[p]
+                low += 1
+        middle = low
+        for p in range(reached):
+            if level[queue[p]] > cut:
+                order[middle] = queue[p]
+                middle += 1
+        for p in range(reached):
+            if level[queue[p]] == cut:
+                high -= 1
+                order[high] = queue[p]
+        for p in range(begin, low):
+            region[order[p]] = regions
+        for p in range(low, middle):
+            region[order[p]] = regions + 1
+        for p in range(middle, end):
+            region[order[p]] = -1
+        regions += 2
+        stack.append((begin, low))
+        stack.append((low, middle))
+    return order
+
+
+@njit(cache=True)
+def _levels(starts, neighbors, region, here, seed, level, queue):
+    """Breadth-first search within a region; the number of unknowns reached."""
+    level[seed] = 0
+    queue[0] = seed
+    head, tail = 0, 1
+    while head < tail:
+        i = queue[head]
+        head += 1
+        for q in range(starts[i], starts[i + 1]):
+            j = neighbors[q]
+            if region[j] == here and level[j] < 0:
+                level[j] = level[i] + 1
+                queue[tail] = j
+                tail += 1
+    return tail
+
+
+@njit(cache=True)
+def _split(order, begin, end, level, unreached, region, regions, stack):
+    """Part a region into what was reached and what was not."""
+    low, high = begin, end
+    while low < high:
+        if level[order[low]] != unreached:
+            low += 1
+        else:
+            high -= 1
+            order[low], order[high] = order[high], order[low]
+    for p in range(begin, low):
+        region[order[p]] = regions
+    for p in range(low, end):
+        region[order[p]] = regions + 1
+    stack.append((begin, low))
+    stack.append((low, end))
+    return regions + 2
+
+
+@njit(cache=True)
+def _thinnest(level, queue, reached, last):
+    """The smallest level that leaves at least 40 % on either side, or the median level."""
+    best, size, median = -1, reached, level[queue[reached // 2]]
+    p = 0
+    while p < reached:
+        current, first = level[queue[p]], p
+        while p < reached and level[queue[p]] == current:
+            p += 1
+        balanced = first >= 0.4 * reached and reached - p >= 0.4 * reached
+        if balanced and 0 < current < last and p - first < size:
+            best, size = current, p - first
+    if best < 0:
+        best = min(max(median, 1), last - 1)
+    return best

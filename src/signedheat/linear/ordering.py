@@ -1,0 +1,32 @@
+"""Fill-reducing elimination orders for matrices that couple what is close on a surface."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .matrices import whole
+
+_LEAF = 8  # unknowns that are not dissected further
+
+
+def elimination_order(upper: Any) -> NDArray[np.int64]:
+    """Nested dissection of a sparse symmetric matrix, from its upper triangle: ``order[k]`` is eliminated k-th.
+
+    On surfaces it leaves as much fill as METIS on even meshes, up to twice as much on very uneven ones, and takes a
+    fifth of its time; time grows as n log n times the number of levels of a search. For unknowns that fill space METIS,
+    which PARDISO runs by itself, is better.
+
+    Examples
+    --------
+    >>> from scipy import sparse
+    >>> path = sparse.diags_array([np.ones(20), np.ones(19)], offsets=[0, 1], format="csr")
+    >>> int(elimination_order(path)[-1])  # the separator comes last
+    9
+    """
+    from .dissection_kernels import dissect
+
+    graph = whole(upper)
+    return dissect(graph.indptr, graph.indices, _LEAF)
