@@ -22,8 +22,10 @@ from .extensions import grid_sharpening as _grid_sharpening  # noqa: F401  regis
 from .extensions.close_curves import close_curves
 from .extensions.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
+from .extensions.piecewise import piecewise_distance
 from .extensions.sharpening import sharpen
 from .fields.grid_field import GridField
+from .fields.piecewise_field import PiecewiseField
 from .fields.vertex_field import VertexField
 from .io import load_field, read, read_curves, save, write_curves
 from .lowering import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
@@ -52,6 +54,7 @@ __all__ = [
     "LevelValues",
     "MemoryLimitError",
     "OutsideError",
+    "PiecewiseField",
     "PointCloud",
     "PolygonMesh",
     "SignedHeatError",
@@ -70,6 +73,7 @@ __all__ = [
     "intrinsic_delaunay",
     "load_field",
     "opening",
+    "piecewise_distance",
     "read",
     "read_curves",
     "save",
