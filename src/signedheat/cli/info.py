@@ -8,7 +8,8 @@ from typing import Any
 
 from ..domains.grid import Grid
 from ..domains.inspection import inspect
-from ..io import FIELD_FORMATS, load_field, read
+from ..errors import SourceError
+from ..io import FIELD_FORMATS, load_field, read, read_curves
 from ..io.files import extension
 from ..io.obj import read_obj_lines
 from .computing import describe
@@ -26,6 +27,7 @@ def add_to(commands: Any) -> None:
         "the memory that grids around a shape take. Of a field: its grid and range.",
     )
     parser.add_argument("file", metavar="FILE", help="a shape or a field")
+    parser.add_argument("curves", metavar="CURVES", nargs="?", help="curves on the shape: .txt .obj .json")
     parser.add_argument(
         "--resolution",
         type=whole_number(2),
@@ -47,7 +49,17 @@ def run(arguments: Namespace) -> Summary:
     if extension(arguments.file) == ".obj":
         summary["line_elements"] = len(read_obj_lines(arguments.file)[1])
     summary["memory_bytes"] = {str(n): _memory(shape, n) for n in arguments.resolution}
-    return summary, _table(summary)
+    text = _table(summary)
+    if arguments.curves:
+        if not hasattr(shape, "triangulation"):
+            raise SourceError(
+                f"{arguments.curves}: curves lie on meshes and point clouds, not a {type(shape).__name__}"
+            )
+        from .curve_report import as_text, curve_reports
+
+        summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
+        text += f"\n\n{arguments.curves}\n{as_text(summary['curves'])}"
+    return summary, text
 
 
 def _memory(shape: Any, resolution: int) -> int | None:
