@@ -28,7 +28,8 @@ def chains(
     >>> [(segments.tolist(), closed) for segments, _, closed in chains(np.array([1, 0, 5]), np.array([2, 1, 5]))]
     [([1, 0], False), ([2], True)]
     """
-    n = int(max(tails.max(initial=-1), heads.max(initial=-1))) + 1
+    nodes, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)
+    (tails, heads), n = ends.reshape(2, -1), len(nodes)
     leaving, arriving = np.bincount(tails, minlength=n), np.bincount(heads, minlength=n)
     through = (leaving == 1) & (arriving == 1) if directed else leaving + arriving == 2
     at: list[list[int]] = [[] for _ in range(n)]
