@@ -22,6 +22,7 @@ def add_to(commands: Any) -> None:
         description="Closed surfaces at given distances from a shape, broken or not. Several distances make several "
         "files: OUT.stl becomes OUT_+0.2.stl, OUT_-0.1.stl.",
     )
+    parser.usage = "%(prog)s SHAPE DISTANCE [DISTANCE ...] -o OUT [options]"
     parser.add_argument(
         "shape", metavar="SHAPE", help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc"
     )

@@ -20,6 +20,7 @@ def add_to(commands: Any) -> None:
         help="signed distance on a grid",
         description="Signed distance to a shape, broken or not, at the nodes of a grid.",
     )
+    parser.usage = "%(prog)s SHAPE -o OUT [options]"
     parser.add_argument(
         "shape", metavar="SHAPE", help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc"
     )
