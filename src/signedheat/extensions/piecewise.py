@@ -92,7 +92,7 @@ def piecewise_distance(
     --------
     >>> from signedheat.samples import torus
     >>> mesh = torus(n_around=48, n_across=24)
-    >>> phi = piecewise_distance(mesh, mesh.path(list(range(24)) + [0]))  # once round the tube: bounds nothing
+    >>> phi = piecewise_distance(mesh, mesh.path(range(24), closed=True))  # round the tube: bounds nothing
     >>> len(phi.cut), phi.diagnostics.notes["gap"] < 0.002
     (1, True)
     >>> bool(phi.cut[0].height > 4)  # nearly the length of the way round, 2π

@@ -1,0 +1,278 @@
+"""Nonbounding curves: the fast solution against the exact one, cuts where they must be, bounding curves left alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat.extensions.jump_solvers import JumpProblem, minimize_exactly, minimize_fast
+from signedheat.fields.piecewise_field import chains
+from signedheat.operators.face_pairs import face_pairs
+from signedheat.operators.laid_out_triangles import LaidOutTriangles
+from signedheat.samples import sphere, torus
+
+
+def moebius(n: int = 80, m: int = 8, width: float = 0.3, flips: float = 0.0) -> sh.TriangleMesh:
+    """A strip with half a twist around the z axis; vertex (i, j) is number i (m + 1) + j."""
+    u, v = np.meshgrid(np.arange(n), np.arange(m + 1), indexing="ij")
+    angle, across = 2 * np.pi * u / n, width * (2 * v / m - 1)
+    ring = 1 + across * np.cos(angle / 2)
+    points = np.stack([ring * np.cos(angle), ring * np.sin(angle), across * np.sin(angle / 2)], axis=-1)
+    ids = np.arange(n * (m + 1)).reshape(n, m + 1)
+    following = np.vstack([ids[1:], ids[:1, ::-1]])
+    a, b, c, d = ids[:, :-1], following[:, :-1], following[:, 1:], ids[:, 1:]
+    faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
+    turned = np.random.default_rng(0).random(len(faces)) < flips
+    return sh.TriangleMesh(points.reshape(-1, 3), np.where(turned[:, None], faces[:, ::-1], faces))
+
+
+def shaken(mesh: sh.TriangleMesh, amount: float) -> sh.TriangleMesh:
+    noise = np.random.default_rng(1).normal(size=mesh.vertices.shape)
+    return sh.TriangleMesh(mesh.vertices + amount * noise, mesh.faces)
+
+
+def arc(mesh: sh.TriangleMesh, angle: float = 2.0) -> sh.Curve:
+    """An open arc of a circle of latitude on the unit sphere, through faces."""
+    t = np.linspace(0, angle, 40)
+    return mesh.polyline(np.stack([0.9 * np.cos(t), 0.9 * np.sin(t), np.full_like(t, 0.4)], axis=1))
+
+
+CASES = {
+    "round the tube": lambda: (m := shaken(torus(n_around=48, n_across=24), 0.005), m.path(range(24), closed=True)),
+    "round the hole": lambda: (
+        m := shaken(torus(n_around=48, n_across=24), 0.005),
+        m.path(np.arange(48) * 24, closed=True),
+    ),
+    "open arc": lambda: (m := sphere(4), arc(m)),
+    "Moebius core": lambda: (m := moebius(), m.path(np.arange(80) * 9 + 4, closed=True)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_fast_is_as_good_as_exact(case):
+    mesh, curve = CASES[case]()
+    fast, exact = (sh.piecewise_distance(mesh, curve, exact=e).diagnostics.notes for e in (False, True))
+    assert exact["gap"] < 1e-6
+    assert exact["objective"] * (1 - 1e-6) <= fast["objective"] <= 1.005 * exact["objective"]
+    assert fast["bound"] <= exact["objective"] * (1 + 1e-6)
+
+
+def test_loop_round_the_tube_is_cut_across_the_tube():
+    mesh = torus(n_around=64, n_across=24)
+    phi = sh.piecewise_distance(mesh, mesh.path(range(24), closed=True))
+    assert len(phi.cut) == 1
+    cut = phi.cut[0]
+    assert cut.vertices[0] == cut.vertices[-1]
+    assert cut.length == pytest.approx(2 * np.pi * 0.4, rel=0.03)
+    assert 2 * np.pi * 0.6 < cut.height < 2 * np.pi * 1.4  # between the ways round the inner and the outer equator
+    ring = np.arctan2(*mesh.vertices[cut.vertices, 1::-1].T)
+    assert np.abs(ring).min() > 2 * np.pi / 64  # not at the source
+    assert np.allclose(np.linalg.norm(phi.gradient, axis=1), 1)
+
+
+def test_source_is_cut_only_where_nothing_else_is_possible():
+    mesh = torus(n_around=48, n_across=24)  # the inner equator is the shortest loop of all
+    ids = np.arange(48) * 24 + 12
+    phi = sh.piecewise_distance(mesh, mesh.path(ids, closed=True), exact=True)
+    assert len(phi.cut) == 1
+    assert not np.isin(phi.cut[0].vertices, ids).any()
+
+
+def test_gradient_is_one_and_source_is_zero():
+    mesh = sphere(4)
+    curve = arc(mesh)
+    phi = sh.piecewise_distance(mesh, curve)
+    spacing = mesh.edge_lengths.mean()
+    assert np.allclose(np.linalg.norm(phi.gradient, axis=1), 1)
+    assert np.abs(phi(curve)).max() < spacing
+    assert abs(np.median(phi(curve))) < 0.1 * spacing
+
+
+def test_bounding_curve_equals_plain_distance():
+    """rms of the difference ≤ integration_error / √λ, λ = 2 on the unit sphere (10 % for the polyhedron's own λ)."""
+    mesh = sphere(4)
+    t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+    circle = mesh.polyline(np.stack([0.9 * np.cos(t), 0.9 * np.sin(t), np.full_like(t, 0.4)], axis=1), closed=True)
+    phi = sh.piecewise_distance(mesh, circle)
+    notes = phi.diagnostics.notes
+    assert notes["continuous"] and phi.cut == [] and notes["cut_length"] == 0
+    plain = sh.SignedHeatSolver(mesh).distance(circle, sh.Free())
+    split = phi.split()
+    assert split.domain.n_vertices == mesh.n_vertices
+    at_vertices = np.empty(mesh.n_vertices)
+    at_vertices[mesh.faces] = split.values[split.domain.faces]
+    area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3))
+    difference = at_vertices - plain.values
+    difference -= np.average(difference, weights=area)
+    assert np.sqrt(np.average(difference**2, weights=area)) <= 1.1 * notes["integration_error"] / np.sqrt(2)
+
+
+def test_orientation_of_faces_does_not_matter():
+    """The same strip, 30 % of its faces turned over, with the source's normals given: the same field."""
+    fields = []
+    for flips in (0.0, 0.3):
+        mesh = moebius(flips=flips)
+        ids = np.arange(9) + 9 * 20
+        across = mesh.path(ids)
+        along = np.cross(np.diff(mesh.vertices[ids], axis=0), [0.0, 0.0, 1.0])
+        curve = sh.Curve(across.faces, across.barycentric, normals=along)
+        fields.append(sh.piecewise_distance(mesh, curve, exact=True))
+    assert fields[0].diagnostics.notes["objective"] == pytest.approx(fields[1].diagnostics.notes["objective"], rel=1e-9)
+    assert np.ptp(fields[0].values) > 4 and not fields[0].diagnostics.notes["continuous"]
+
+
+def test_reversal_changes_the_sign():
+    mesh = torus(n_around=40, n_across=20)
+    curve = mesh.path(range(20), closed=True)
+    forth, back = (sh.piecewise_distance(mesh, c, exact=True) for c in (curve, curve.reversed()))
+    assert forth.diagnostics.notes["objective"] == pytest.approx(back.diagnostics.notes["objective"], rel=1e-9)
+    assert np.allclose(forth.gradient, -back.gradient)
+
+
+def test_scale():
+    mesh, curve = CASES["round the tube"]()
+    large = sh.TriangleMesh(1000 * mesh.vertices, mesh.faces)
+    small, scaled = sh.piecewise_distance(mesh, curve), sh.piecewise_distance(large, curve)
+    assert np.allclose(scaled.values, 1000 * small.values, rtol=0, atol=1e-3)
+
+
+def test_inconsistently_oriented_curve():
+    """Fig. 14: half of an equator runs the wrong way; the cut joins the two places where the orientation changes."""
+    mesh = sphere(4)
+    t = np.linspace(0, np.pi, 60)
+    halves = [mesh.polyline(np.stack([np.cos(t), s * np.sin(t), 0 * t], axis=1)) for s in (1, -1)]
+    phi = sh.piecewise_distance(mesh, halves)
+    assert not phi.diagnostics.notes["continuous"]
+    ends = np.concatenate([c.points for c in phi.cut])
+    assert min(np.linalg.norm(ends - [1, 0, 0], axis=1).min(), np.linalg.norm(ends - [-1, 0, 0], axis=1).min()) < 0.5
+    for side in (1, -1):
+        vertex = np.argmin(np.linalg.norm(mesh.vertices - [0, 0.8 * side, 0.6], axis=1))
+        assert phi(mesh.points_at([vertex]))[0] == pytest.approx(side * np.arcsin(0.6), abs=0.1)
+
+
+def test_polygons_equal_triangles():
+    mesh = torus(n_around=40, n_across=20)
+    polygons = sh.PolygonMesh(mesh.vertices, mesh.faces)
+    curve = mesh.path(range(20), closed=True)
+    a, b = sh.piecewise_distance(mesh, curve), sh.piecewise_distance(polygons, curve)
+    assert np.allclose(a.values, b.values, atol=1e-9)
+
+
+def test_quads():
+    mesh = torus(n_around=40, n_across=20)
+    ids = np.arange(800).reshape(40, 20)
+    right, up = np.roll(ids, -1, axis=0), np.roll(ids, -1, axis=1)
+    quads = np.stack([ids, right, np.roll(right, -1, axis=1), up], axis=-1).reshape(-1, 4)
+    phi = sh.piecewise_distance(sh.PolygonMesh(mesh.vertices, quads), sh.PolygonMesh(mesh.vertices, quads).path(ids[0]))
+    assert phi.surface.n_faces == 4 * len(quads)
+    assert phi.cut[0].length == pytest.approx(2 * np.pi * 0.4, rel=0.05)
+
+
+def test_smoothing_takes_small_jumps_away_and_leaves_the_cut():
+    mesh, curve = CASES["round the tube"]()
+    rough, smooth = sh.piecewise_distance(mesh, curve), sh.piecewise_distance(mesh, curve, smoothing=1.0)
+    small = np.abs(rough.jumps)[~rough.is_cut]
+    assert small.max() > 1e-3
+    assert np.abs(smooth.jumps)[~rough.is_cut].max() < 1e-12
+    assert [c.length for c in smooth.cut] == pytest.approx([c.length for c in rough.cut])
+    assert np.abs(smooth.values - rough.values).max() < 2 * mesh.edge_lengths.mean()
+
+
+def test_save_and_contour_show_the_jump(tmp_path):
+    mesh, curve = CASES["round the tube"]()
+    phi = sh.piecewise_distance(mesh, curve)
+    split = phi.split()
+    assert split.domain.n_vertices == mesh.n_vertices + len(phi.cut[0].vertices) - 1  # the closed cut, doubled
+    assert np.array_equal(split.domain.vertices[split.domain.faces], mesh.vertices[mesh.faces])
+    lines = phi.contour(0.0)
+    assert np.abs(phi(lines[0])).max() < mesh.edge_lengths.mean()
+    phi.save(tmp_path / "phi.ply")
+    assert sh.read(tmp_path / "phi.ply").n_vertices == split.domain.n_vertices
+
+
+def test_parts_without_source_are_nan():
+    mesh = torus(n_around=40, n_across=20)
+    both = sh.TriangleMesh(
+        np.concatenate([mesh.vertices, mesh.vertices + 5]), np.concatenate([mesh.faces, mesh.faces + mesh.n_vertices])
+    )
+    with pytest.warns(sh.UnreachedWarning):
+        phi = sh.piecewise_distance(both, both.path(range(20), closed=True))
+    assert np.isnan(phi.values[mesh.n_faces :]).all() and np.isfinite(phi.values[: mesh.n_faces]).all()
+    assert np.array_equal(phi.diagnostics.unreached, np.arange(mesh.n_faces, 2 * mesh.n_faces))
+    assert len(phi.cut) == 1
+
+
+def test_single_face():
+    mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    curve = sh.Curve([0, 0], [[0.5, 0.5, 0.0], [0.5, 0.0, 0.5]])
+    for exact in (False, True):
+        phi = sh.piecewise_distance(mesh, curve, exact=exact)
+        assert np.allclose(phi.values, np.sqrt(0.125) * np.array([1, -1, -1]))
+
+
+def test_nonmanifold_edge():
+    """Three half planes at one edge; each pair of pages is joined, and the source on one of them reaches all."""
+    angles = 2 * np.pi * np.arange(3) / 3
+    pages = [[np.cos(a) * r, np.sin(a) * r, z] for a in angles for r in (1, 2) for z in (0, 1)]
+    vertices = np.array([[0, 0, 0], [0, 0, 1], *pages], dtype=float)
+    faces = []
+    for k in range(3):
+        a, b, c, d = 2 + 4 * k + np.arange(4)
+        faces += [[0, a, b], [0, b, 1], [a, c, d], [a, d, b]]
+    mesh = sh.TriangleMesh(vertices, faces)
+    pairs = face_pairs(LaidOutTriangles.from_lengths(mesh.faces, np.ones((12, 3)), 14, mesh.edges))
+    spine = np.flatnonzero(pairs.shares == 0.5)
+    assert len(spine) == 3 and len(np.unique(pairs.faces[spine])) == 3
+    phi = sh.piecewise_distance(mesh, mesh.path([2, 3]))
+    assert np.isfinite(phi.values).all()
+
+
+def test_certificate_against_brute_force():
+    """Two faces and one edge: the minimum is the floor. Three faces in a ring: the cheapest edge takes the jump."""
+    ring = JumpProblem(
+        np.array([[0, 1], [1, 2], [2, 0]]), np.array([1.0, 1, 1]), np.array([1.0, 1, 1]), np.array([3.0, 1, 2]), 3
+    )
+    for solve in (minimize_fast, minimize_exactly):
+        solution = solve(ring)
+        assert solution.objective == pytest.approx(6.0, rel=3e-3)
+        assert solution.bound <= 6.0 * (1 + 1e-9)
+        assert solution.bound == pytest.approx(6.0, rel=3e-3)
+
+
+def test_chains_close_and_end_at_forks():
+    lines = chains(np.array([[0, 1], [1, 2], [2, 0], [5, 6], [6, 7], [6, 8]]))
+    assert sorted(len(line) for line, _ in lines) == [1, 1, 1, 3]
+
+
+@pytest.mark.parametrize(
+    ("keywords", "error"),
+    [({"smoothing": -1.0}, ValueError), ({"diffusion": 0.0}, ValueError), ({"smoothing": np.nan}, ValueError)],
+)
+def test_bad_options(keywords, error):
+    mesh = sphere(1)
+    with pytest.raises(error):
+        sh.piecewise_distance(mesh, mesh.path([0, mesh.faces[0, 1]]), **keywords)
+
+
+def test_bad_domain_and_source():
+    with pytest.raises(TypeError, match="TriangleMesh"):
+        sh.piecewise_distance(sh.PointCloud(np.eye(3)), [])
+    mesh = sphere(1)
+    with pytest.raises(sh.SourceError):
+        sh.piecewise_distance(mesh, [])
+    with pytest.raises(sh.SourceError, match="unoriented"):
+        sh.piecewise_distance(mesh, sh.SurfacePoints([0], [[0.2, 0.3, 0.5]]))
+
+
+def test_progress_can_cancel():
+    class Stop(Exception):
+        pass
+
+    def progress(fraction, step):
+        if step == "integrate":
+            raise Stop
+
+    mesh = sphere(2)
+    with pytest.raises(Stop):
+        sh.piecewise_distance(mesh, mesh.path(mesh.faces[0, :2]), progress=progress)
