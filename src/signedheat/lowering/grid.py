@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization import Diagnostics, Levels, discretize
+from ..discretization import Diagnostics, discretize
 from ..domains.grid import Grid
 from ..errors import MemoryLimitError, SourceError
 from ..fields.grid_field import GridField
-from ..sources.area_elements import AreaSamples, sample_on_grid
+from ..sources.area_elements import sample_on_grid
+from ..sources.grid_source import GridSource
+from .grid_integration import GridIntegration
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
-
-    from ..operators.pyramid import Level, NodeSources
+    from ..operators.pyramid import Level
 
 SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the pieces into which faces are cut."""
@@ -49,60 +49,6 @@ def refuse_beyond_memory(grid: Grid) -> None:
             f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, and this machine "
             f"has {available / 1e9:.1f} GB: choose a lower resolution"
         )
-
-
-@dataclass(frozen=True, eq=False)
-class GridSource:
-    """Sources on a grid: samples, and how they act on its nodes."""
-
-    samples: AreaSamples
-    grid: Grid
-    diffusion: float
-
-    def time_on(self, spacing: float) -> float:
-        """t on a grid of this mean spacing (MATH: the larger of both spacings, squared)."""
-        return self.diffusion * max(spacing, self.samples.spacing) ** 2
-
-    @property
-    def time(self) -> float:
-        return self.time_on(float(self.grid.spacing.mean()))
-
-    @property
-    def vectors(self) -> NodeSources:
-        return self.samples.nodes
-
-    @property
-    def weights(self) -> NDArray[np.float64]:
-        return self.samples.weights
-
-    @property
-    def components(self) -> NDArray[np.int64]:
-        return self.samples.components
-
-    @property
-    def owners(self) -> NDArray[np.int64]:
-        return self.samples.owners
-
-    @cached_property
-    def stencil(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Nodes and weights that interpolate at each sample."""
-        from ..operators.stencil import interpolation_stencil
-
-        return interpolation_stencil(self.samples.positions, self.grid.shape)
-
-    @cached_property
-    def rows(self) -> csr_matrix:
-        from scipy.sparse import csr_matrix
-
-        nodes, weights = self.stencil
-        starts = np.arange(len(nodes) + 1) * nodes.shape[1]
-        size = (len(nodes), self.grid.n_nodes)
-        return csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=size)
-
-    def at_samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of the nodes, interpolated."""
-        nodes, weights = self.stencil
-        return np.einsum("ij,ij->i", values.ravel()[nodes], weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,58 +90,6 @@ class GridDiscretization:
     def field(self, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics) -> GridField:
         notes = {"samples": len(source.weights), "area outside the grid": source.samples.outside}
         return GridField(self.grid, values, replace(diagnostics, notes={**diagnostics.notes, **notes}))
-
-
-@dataclass(frozen=True, eq=False)
-class GridIntegration:
-    """Step 3 on a grid."""
-
-    grid: Grid
-
-    def solve(self, divergence: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
-        from ..operators.stencil import solve_poisson
-
-        phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
-        phi -= np.average(source.at_samples(phi), weights=source.weights)
-        return phi
-
-    def fit(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
-        """Subtract from φ the mean of its error at the samples, weighted by how well each is seen from a node.
-
-        The weights are the samples' areas, diffused as the normals are.
-        """
-        phi = self.solve(divergence, source)
-        excess = excess_at_samples(source, phi, levels)
-        phi -= diffused_mean(source, excess)
-        return phi
-
-
-def excess_at_samples(source: GridSource, phi: NDArray[np.float64], levels: Levels) -> NDArray[np.float64]:
-    """φ − level at the samples; the unknown constant of a group is the group's mean."""
-    excess = source.at_samples(phi) - levels.values
-    if levels.groups is not None:
-        sums = np.bincount(levels.groups, source.weights * excess)
-        sizes = np.bincount(levels.groups, source.weights)
-        excess -= (sums / np.where(sizes > 0, sizes, 1))[levels.groups]
-    return excess
-
-
-def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(*grid.shape) mean of values given at the samples, weighted by area and nearness: as the normals are diffused.
-
-    It varies slowly, so the finest level of the pyramid is left out.
-    """
-    from ..operators.extraction import quotients
-    from ..operators.pyramid import NodeSources, collapse, diffuse_on_pyramid, scatter
-
-    weights = source.weights / source.weights.max()
-    largest = np.abs(values).max()
-    if largest == 0.0:
-        return np.zeros(source.grid.shape, dtype=np.float32)
-    nodes = NodeSources.empty(source.vectors.shape, source.vectors.steps)
-    scatter(*source.stencil, np.stack([weights, weights * values / largest], axis=1), nodes)
-    levels = diffuse_on_pyramid(nodes, source.time_on, finest=1)
-    return collapse(levels, nodes.shape, 1, quotients).reshape(source.grid.shape) * np.float32(largest)
 
 
 @discretize.register

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .stencil import by_slabs
 from .sweeps import STRETCH, diffuse_by_sweeps
 
-BAND = 10.0
+BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
 MARGIN = 3
 """Lines at the rim of the band that take their values from the coarser level."""
