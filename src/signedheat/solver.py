@@ -37,6 +37,10 @@ class SignedHeatSolver:
         τ in ``t = τ h²``, h the mean distance between unknowns. Larger values complete broken sources more roundly.
     progress : callable, optional
         Called as ``progress(fraction, step)``.
+    intrinsic : bool
+        Triangulate a triangle mesh anew, along its surface, for every set of sources: slower, since nothing is kept
+        from one distance to the next, and far more accurate where triangles are bad or curves cross them. For control
+        over it, or several distances, make the domain yourself with `intrinsic_delaunay`.
 
     Raises
     ------
@@ -47,6 +51,7 @@ class SignedHeatSolver:
     domain: Any
     diffusion: float = 1.0
     progress: Progress | None = field(default=None, repr=False)
+    intrinsic: bool = False
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.diffusion) and self.diffusion > 0):
@@ -55,6 +60,10 @@ class SignedHeatSolver:
     @cached_property
     def discretization(self) -> Discretization:
         """The domain as the method sees it."""
+        if self.intrinsic:
+            from .extensions.intrinsic_triangulation import Retriangulated
+
+            return Retriangulated(self.domain)
         return discretize(self.domain)
 
     def distance(self, sources: Any, constraint: Constraint | None = None) -> Any:

@@ -245,5 +245,41 @@ def laid_out(mesh: TriangleMesh) -> tuple[LaidOutTriangles, float]:
 
 @discretize.register
 def _(domain: IntrinsicTriangulation) -> SurfaceDiscretization:
-    notes = {"intrinsic triangulation": domain.summary}
-    return SurfaceDiscretization(domain, domain.triangles, bring=domain.bring, notes=notes)
+    return lowered(domain)
+
+
+@dataclass(frozen=True, eq=False)
+class Retriangulated:
+    """A mesh that gets an intrinsic triangulation of its own for every set of sources; fields stay on the mesh.
+
+    Stands in for the mesh's discretisation until the sources are known.
+    """
+
+    mesh: TriangleMesh
+
+    def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
+        """Refine the mesh with the sources along edges."""
+        domain = intrinsic_delaunay(self.mesh, keep=sources, refine=True)
+        own = np.arange(self.mesh.n_vertices)
+        return lowered(domain, domain=self.mesh, restriction=own).adapt(sources)
+
+
+def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
+    """An intrinsic triangulation as the three steps see it."""
+    options = {
+        "domain": triangulation,
+        "bring": triangulation.bring,
+        "spacing": spacing(triangulation.triangles),
+        "notes": {"intrinsic triangulation": triangulation.summary},
+        **options,
+    }
+    return SurfaceDiscretization(triangles=triangulation.triangles, **options)
+
+
+def spacing(triangles: LaidOutTriangles) -> float:
+    """h: half the mean edge length, where the mean is over the area of the surface.
+
+    The plain mean would follow the many small triangles that refinement puts where the mesh needs them, and then
+    ``√t`` would not bridge the others.
+    """
+    return 0.5 * float(triangles.face_areas @ triangles.edge_lengths.mean(axis=1) / triangles.face_areas.sum())
