@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,14 @@ from scipy import sparse
 
 from ..discretization import Diagnostics, discretize
 from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError, UnreachedWarning
 from ..fields.vertex_field import VertexField
-from ..linear import Factor, factorize, upper_triangle, whole
+from ..linear import elimination_order, factorize, upper_triangle, whole
 from ..operators.cotan import cotan_matrix, divergence
-from ..operators.crouzeix_raviart import vector_heat_matrix
 from ..operators.laid_out_triangles import LaidOutTriangles
+from ..operators.mollification import mollify
 from .direct_integration import DirectIntegration
+from .vector_heat import VectorHeat
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +54,7 @@ class SurfaceDiscretization:
     bring: Callable[[Any], Any] | None = None
     spacing: float | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
-    _factors: dict[float, Factor] = field(default_factory=dict, repr=False)
+    _heats: dict[float, VectorHeat] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if self.spacing is None:
@@ -62,10 +65,20 @@ class SurfaceDiscretization:
     @cached_property
     def integration(self) -> DirectIntegration:
         """Step 3."""
-        matrix = cotan_matrix(self.triangles)
-        if self.prolongation is not None:
-            matrix = upper_triangle(self.prolongation.T @ whole(matrix) @ self.prolongation)
-        return DirectIntegration(matrix, self.prolongation)
+        if self.prolongation is None:
+            return DirectIntegration(self.stiffness, factorize=partial(factorize, order=self.vertex_order))
+        stiffness = upper_triangle(self.prolongation.T @ whole(self.stiffness) @ self.prolongation)
+        return DirectIntegration(stiffness, self.prolongation)
+
+    @cached_property
+    def stiffness(self) -> sparse.csr_matrix:
+        """Upper triangle of C, on the vertices of the triangles."""
+        return cotan_matrix(self.triangles)
+
+    @cached_property
+    def vertex_order(self) -> NDArray[np.int64]:
+        """Fill-reducing order of the vertices, from which that of the edges follows."""
+        return elimination_order(self.stiffness)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Unoriented curves and points inside faces get edges and vertices of their own."""
@@ -92,7 +105,7 @@ class SurfaceDiscretization:
             restriction=np.arange(n_unknowns) if self.restriction is None else self.restriction,
             bring=None,
             notes={**self.notes, "vertices added for sources": added},
-            _factors={},
+            _heats={},
         )
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
@@ -101,19 +114,26 @@ class SurfaceDiscretization:
 
         return surface_source(self.triangles, sources, diffusion, self.spacing)
 
-    def diffuse(self, source: Any) -> NDArray[np.complex128]:
-        """Solve ``(M + tL) X = X₀``; one vector per edge."""
-        factor = self._factors.get(source.time)
-        if factor is None:
-            self._factors.clear()
-            factor = self._factors[source.time] = factorize(vector_heat_matrix(self.triangles, source.time))
-        if self.triangles.is_consistently_oriented:
-            return factor.solve(source.vectors)
-        return factor.solve(np.ascontiguousarray(source.vectors).view(np.float64)).view(np.complex128)
+    def diffuse(self, source: Any) -> list[NDArray[np.complex128]]:
+        """Solve ``(M + tL) X = X₀``; one vector per edge, in stages (see `VectorHeat`)."""
+        return self.diffuse_many([source])[0]
 
-    def to_cells(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """X at the faces, as complex numbers in their layouts."""
-        return self.triangles.in_face_frames(vectors).sum(axis=1)
+    def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
+        """Solve for several sources of the same t at once."""
+        heat = self._heats.get(sources[0].time)
+        if heat is None:
+            self._heats.clear()
+            order = self.triangles.edges.elimination_order(self.vertex_order)
+            heat = self._heats[sources[0].time] = VectorHeat(self.triangles, sources[0].time, order)
+        return heat.solve([source.vectors for source in sources])
+
+    def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+        """X at the faces, as complex numbers in their layouts: each face from the last stage that covers it."""
+        vectors = self.triangles.sum_in_faces(stages[0])
+        for stage in stages[1:]:
+            later = self.triangles.sum_in_faces(stage)
+            vectors = np.where(np.isnan(later), vectors, later)
+        return vectors
 
     def divergence(self, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
         """b, the right-hand side of ``C φ = b``."""
@@ -125,13 +145,21 @@ class SurfaceDiscretization:
         if self.restriction is not None:
             values = values[self.restriction]
         unreached = np.flatnonzero(np.isnan(values))
+        if len(unreached):
+            warnings.warn(
+                f"no source is connected to {len(unreached)} of {len(values)} vertices, the first of them number "
+                f"{unreached[0]}: distance there is NaN. Put a source on every part, or join the parts",
+                UnreachedWarning,
+                stacklevel=3,
+            )
         diagnostics = replace(diagnostics, unreached=unreached, notes={**diagnostics.notes, **self.notes})
         return VertexField(self.domain, values, diagnostics, source)
 
 
 @discretize.register
 def _(domain: TriangleMesh) -> SurfaceDiscretization:
-    a, b, c = (domain.vertices[domain.faces[:, k]] for k in range(3))
-    lengths = np.stack([np.linalg.norm(d, axis=1) for d in (b - a, c - b, a - c)], axis=1)
+    lengths, added = mollify(domain.edge_lengths[domain.edges.of_faces], 1e-6)
+    if not lengths.max() > 0:
+        raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
     triangles = LaidOutTriangles.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)
-    return SurfaceDiscretization(domain, triangles)
+    return SurfaceDiscretization(domain, triangles, notes={"added to edge lengths": added} if added else {})

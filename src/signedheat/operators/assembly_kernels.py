@@ -90,3 +90,27 @@ def _merge(starts, columns, values):
                 total += 1
         merged[i + 1] = total
     return merged, columns[:total].copy(), values[:total].copy()
+
+
+@njit(cache=True)
+def gather(of_faces, directions, reflected, vectors):
+    """Sum of the three edge vectors of each face, in its layout."""
+    sums = np.empty(len(of_faces), dtype=np.complex128)
+    for f in range(len(of_faces)):
+        total = 0j
+        for k in range(3):
+            vector = vectors[of_faces[f, k]]
+            total += directions[f, k] * (np.conj(vector) if reflected[f, k] else vector)
+        sums[f] = total
+    return sums
+
+
+@njit(cache=True)
+def add_fluxes(corners, positions, directions, n):
+    """Half of each face's opposite edge, turned inward, times the face's direction, summed at every vertex."""
+    sums = np.zeros(n)
+    for f in range(len(corners)):
+        for k in range(3):
+            opposite = positions[f, (k + 2) % 3] - positions[f, (k + 1) % 3]
+            sums[corners[f, k]] += 0.5 * (opposite.real * directions[f].imag - opposite.imag * directions[f].real)
+    return sums

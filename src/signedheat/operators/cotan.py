@@ -33,6 +33,7 @@ def divergence(triangles: LaidOutTriangles, directions: NDArray[np.complex128]) 
 
     The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
     """
-    opposite = np.roll(triangles.edge_vectors, -1, axis=1)
-    flux = 0.5 * (np.conj(1j * opposite) * directions[:, None]).real
-    return np.bincount(triangles.corner_vertices.ravel(), flux.ravel(), triangles.n_vertices)
+    from .assembly_kernels import add_fluxes
+
+    directions = np.ascontiguousarray(directions)
+    return add_fluxes(triangles.corner_vertices, triangles.corner_positions, directions, triangles.n_vertices)

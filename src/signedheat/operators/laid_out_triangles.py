@@ -130,3 +130,10 @@ class LaidOutTriangles:
         """(m, 3) the vectors of an (e,) edge array as seen in the layout of each face."""
         of_face = vectors[self.edges.of_faces]
         return self.edge_directions * np.where(self.reflected, np.conj(of_face), of_face)
+
+    def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """(m,) sum of the vectors of an (e,) edge array at the three edges of each face, in its layout."""
+        from .assembly_kernels import gather
+
+        vectors = np.ascontiguousarray(vectors)
+        return gather(self.edges.of_faces, self.edge_directions, self.reflected, vectors)
