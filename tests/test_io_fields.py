@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat.io import load_field, save_field
+from signedheat.io import ensure_field_writable, load_field, save_field
 
 FORMATS = ["npz", "npy", "nrrd", "vti"]
 
@@ -97,8 +97,9 @@ def test_nrrd_along_turned_axes_is_refused(tmp_path):
 
 def test_vdb_without_its_module_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr("importlib.import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
-    with pytest.raises(sh.FileFormatError, match="needs OpenVDB's Python module"):
-        save_field(field(), tmp_path / "phi.vdb")
+    for attempt in (lambda path: save_field(field(), path), ensure_field_writable):
+        with pytest.raises(sh.FileFormatError, match=r"phi\.vdb: \.vdb needs OpenVDB's Python module"):
+            attempt(tmp_path / "phi.vdb")
     assert not list(tmp_path.iterdir())
 
 
@@ -135,3 +136,11 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, ending, monkeypatch):
         field().save(path)
     assert path.read_text() == "precious"
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+def test_fields_of_four_dimensions_fit_npz_only(tmp_path):
+    phi = sh.GridField(sh.Grid((0, 0, 0, 0), 1.0, (2, 3, 2, 4)), np.arange(48.0).reshape(2, 3, 2, 4))
+    phi.save(tmp_path / "phi.npz")
+    np.testing.assert_array_equal(load_field(tmp_path / "phi.npz").values, phi.values)
+    with pytest.raises(sh.FileFormatError, match="4 axes"):
+        phi.save(tmp_path / "phi.vti")

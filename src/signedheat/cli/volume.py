@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from ..io import FIELD_FORMATS, ensure_writable, read, save_field
+from ..io import ensure_field_writable, ensure_writable, read, save_field
 from ..viewing import PICTURE_FORMATS, save_slices
 from .computing import check_grid_options, compute, describe, grid_for, naming
 from .options import Parser, Summary, add_command, add_grid_options
@@ -31,7 +31,7 @@ def add_to(commands: Any) -> None:
 def run(parser: Parser, arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, write."""
     check_grid_options(parser, arguments)
-    ensure_writable(arguments.output, FIELD_FORMATS, "a field")
+    ensure_field_writable(arguments.output)
     if arguments.preview:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
     shape = read(arguments.shape)

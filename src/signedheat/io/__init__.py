@@ -1,7 +1,7 @@
 """Reading and writing: shapes, and the fields computed from them."""
 
 from .curves import CURVE_FORMATS, read_curves, write_curves
-from .fields import FIELD_FORMATS, load_field, save_field
+from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable
 from .shapes import SHAPE_FORMATS, read, save
 
@@ -9,6 +9,7 @@ __all__ = [
     "CURVE_FORMATS",
     "FIELD_FORMATS",
     "SHAPE_FORMATS",
+    "ensure_field_writable",
     "ensure_writable",
     "load_field",
     "read",

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError
 from ..fields.grid_field import GridField
-from .files import PathLike, contents, extension, replacing, unknown_extension
+from ..fields.tet_field import TetField
+from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
+from .tets import TET_FIELD_FORMATS, load_tet_field
 from .vtk_xml import read_vti, write_vti
 
 CONVENTION = (
@@ -47,10 +49,11 @@ def save_field(field: GridField, path: PathLike) -> None:
     FileFormatError
         If the format is unknown, has no room for the field's dimension, or the file cannot be written.
     """
-    if extension(path) not in _FORMATS:
-        raise unknown_extension(path, _FORMATS, "a field")
     if not isinstance(field, GridField):
         raise FileFormatError(f"{path}: a {type(field).__name__} is no field on a grid: it has formats of its own")
+    if field.grid.dimension not in _DIMENSIONS.get(extension(path), (field.grid.dimension,)):
+        raise FileFormatError(f"{path}: the field has {field.grid.dimension} axes, too many or few: save it as .npz")
+    ensure_field_writable(path)
     write, _ = _FORMATS[extension(path)]
     if extension(path) == ".npy":
         with replacing(Path(path).with_suffix(".json")) as beside, replacing(path) as temporary:
@@ -61,18 +64,31 @@ def save_field(field: GridField, path: PathLike) -> None:
             write(field, temporary)
 
 
-def load_field(path: PathLike) -> GridField:
+def ensure_field_writable(path: PathLike) -> None:
+    """Find out before a long computation whether a field can be written.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown or needs a module that is not installed, or no file can be made there.
+    """
+    ensure_writable(path, _FORMATS, "a field")
+    if extension(path) == ".vdb":
+        _openvdb(path)
+
+
+def load_field(path: PathLike) -> GridField | TetField:
     """Read a field that `save_field` wrote, exactly as it was: values and transform.
 
     Parameters
     ----------
     path : str or path
         A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file. Images of other programs will
-        do if their axes are x, y, z.
+        do if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file holds a field on tets.
 
     Returns
     -------
-    GridField
+    GridField or TetField
         The field; its diagnostics are empty.
 
     Raises
@@ -89,6 +105,8 @@ def load_field(path: PathLike) -> GridField:
     ...     bool((load_field(f"{folder}/phi.vti").values == phi.values).all())
     True
     """
+    if extension(path) in TET_FIELD_FORMATS:
+        return load_tet_field(path)
     if extension(path) not in _FORMATS:
         raise unknown_extension(path, _FORMATS, "a field")
     _, read = _FORMATS[extension(path)]
@@ -149,8 +167,6 @@ def _read_npy(path: PathLike) -> Parts:
 
 
 def _write_vti(field: GridField, path: Path) -> None:
-    if field.grid.dimension > 3:
-        raise FileFormatError(f"{path}: .vti has three axes, the field {field.grid.dimension}: save it as .npz")
     path.write_bytes(write_vti(field.values, field.grid.origin, field.grid.spacing, NAME, CONVENTION))
 
 
@@ -199,8 +215,6 @@ def _openvdb(path: PathLike) -> ModuleType:
 
 def _write_vdb(field: GridField, path: Path) -> None:
     openvdb = _openvdb(path)
-    if field.grid.dimension != 3:
-        raise FileFormatError(f"{path}: .vdb has three axes, the field {field.grid.dimension}: save it as .npz")
     # Nodes that equal the background are left out of a VDB tree: no node may.
     volume = openvdb.FloatGrid(float(np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))))
     volume.copyFromArray(field.values.astype(np.float32))
@@ -234,5 +248,8 @@ _FORMATS: dict[str, tuple[Callable[[GridField, Path], None], Callable[[PathLike]
     ".vdb": (_write_vdb, _read_vdb),
     ".vti": (_write_vti, read_vti),
 }
+
+_DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
+"""Numbers of axes that a format has room for; the others have room for any."""
 
 FIELD_FORMATS = frozenset(_FORMATS)
