@@ -42,7 +42,7 @@ class DigitalSurface(Surface):
 
     Notes
     -----
-    Voxels may touch along edges and at corners only. `vertices` are corners of voxels, and lie up to a voxel's
+    Voxels may touch along edges, where they count as connected, and at corners. `vertices` are corners of voxels, and lie up to a voxel's
     diagonal off the surface that was digitised.
 
     Examples

@@ -3,26 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..discretization import discretize
 from ..domains.digital_surface import DigitalSurface
 from ..operators.laid_out_triangles import LaidOutTriangles
-from ..operators.surfels import flattened_sides
+from ..operators.surfels import flattened_sides, separated_edges
 from .surface import SurfaceDiscretization
-
-
-class OutwardTriangles(LaidOutTriangles):
-    """Triangles that are all oriented outward.
-
-    Edge frames point into the faces that run along the edge in its direction and out of those that run against it,
-    so that none is reflected even where two voxels touch along an edge and four faces meet.
-    """
-
-    @property
-    def reflected(self) -> NDArray[np.bool_]:
-        """(m, 3) nowhere."""
-        return np.zeros((self.n_faces, 3), dtype=bool)
 
 
 @discretize.register
@@ -39,7 +25,7 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
         [np.stack([side[k % 2], diagonal[k % 2], diagonal[1 - k % 2]], axis=1) for k in range(4)], axis=1
     ).reshape(-1, 3)
     mesh = domain.triangulation
-    laid_out = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
-    triangles = OutwardTriangles(laid_out.corner_vertices, laid_out.corner_positions, mesh.edges, mesh.n_vertices)
+    edges = separated_edges(mesh.edges, domain.surfels)
+    triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
     spacing = max(0.5 * domain.radius, float(domain.spacing.mean()))
     return SurfaceDiscretization(domain, triangles, restriction=np.arange(domain.n_vertices), spacing=spacing)

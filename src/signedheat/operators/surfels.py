@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .edges import EdgeTable
+
 _STEEPEST = 0.05  # no corrected normal is farther than the cosine of this from the square's own
 
 
@@ -114,6 +116,40 @@ def corrected_normals(
     steep = _STEEPEST - (normals * own).sum(axis=1)
     normals += np.maximum(steep, 0)[:, None] * own
     return normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
+    """The edges of four triangles to a surfel, with two where two voxels touch along one.
+
+    Four surfels meet there. Those that face the same voxel outside go together, so that the surface leads from the
+    one voxel inside to the other: voxels that touch along an edge are connected.
+
+    Parameters
+    ----------
+    edges : EdgeTable
+        Of triangles four to a surfel, edge 0 of each its side.
+    surfels : Surfels
+        The surfels.
+    """
+    triangles = np.flatnonzero(edges.face_counts[edges.of_faces[:, 0]] > 2)
+    surfel = triangles // 4
+    step = np.zeros((len(surfel), 3), dtype=np.int64)
+    step[np.arange(len(surfel)), surfels.axes[surfel]] = surfels.signs[surfel]
+    outside = surfels.voxels[surfel] + step
+    key = np.column_stack([edges.of_faces[triangles, 0], outside])
+    _, first, pair = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    kept = np.isin(first, np.unique(edges.of_faces[triangles, 0], return_index=True)[1])
+    n_edges = len(edges.vertices)
+    ids = np.where(kept, key[first, 0], n_edges + np.cumsum(~kept) - 1)
+
+    leading = triangles[first[~kept]]  # the first triangle of each new edge gives it its direction
+    direction = edges.vertices[edges.of_faces[leading, 0]]
+    direction = np.where(edges.forward[leading, 0, None], direction, direction[:, ::-1])
+    of_faces, forward = edges.of_faces.copy(), edges.forward.copy()
+    of_faces[triangles, 0] = ids[pair.ravel()]
+    renamed = triangles[~kept[pair.ravel()]]
+    forward[renamed, 0] ^= ~edges.forward[leading, 0][of_faces[renamed, 0] - n_edges]
+    return EdgeTable(np.concatenate([edges.vertices, direction]), of_faces, forward)
 
 
 def flattened_sides(
