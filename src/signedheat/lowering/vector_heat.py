@@ -14,7 +14,7 @@ from ..linear import Factor, factorize, whole
 from ..operators.crouzeix_raviart import vector_heat_matrix
 from ..operators.laid_out_triangles import LaidOutTriangles
 
-_LOUD, _FAINT = 2.0**830, 2.0**-860  # within these, no step of a solve overflows or underflows
+_FAINT = 2.0**-800  # of the largest X: below, what underflows in the factor or on the way may be missing
 _BATCH = 16  # right-hand sides solved at a time
 
 
@@ -22,7 +22,7 @@ _BATCH = 16  # right-hand sides solved at a time
 class VectorHeat:
     """``(M + tL) X = X₀`` on the edges of triangles.
 
-    X falls like exp(−r/√t) and leaves the range of floating-point numbers at about 600 mean edge lengths. What lies
+    X falls like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. What lies
     beyond is solved for again: X restricted to the faint edges satisfies the same equation with a right-hand side
     along their border, where X is still known well. Scaled up, that is the next right-hand side for the same factor,
     and the result is exact, not another front of waves.
@@ -55,36 +55,35 @@ class VectorHeat:
         return factorize(matrix, order=(2 * self.order[:, None] + np.arange(2)).ravel())
 
     @cached_property
-    def _loudest(self) -> float:
-        """Largest right-hand side whose solution stays in range: |X| is at most |X₀| over the smallest mass."""
+    def _smallest_mass(self) -> float:
+        """|X| is at most |X₀| divided by it."""
         mass = np.bincount(self.triangles.edges.of_faces.ravel(), np.repeat(self.triangles.face_areas / 3.0, 3))
-        return _LOUD * min(1.0, float(mass.min()))
+        return float(mass.min())
 
     def solve(self, sources: Sequence[NDArray[np.complex128]]) -> list[list[NDArray[np.complex128]]]:
         """X for each X₀, in stages: each is known up to a factor of its own, and NaN nearer than where it begins."""
         solved: list[list[NDArray[np.complex128]]] = []
         for begin in range(0, len(sources), _BATCH):
-            loud = [self._raised(vectors) for vectors in sources[begin : begin + _BATCH]]
-            together = self._solve(np.stack(loud, axis=1) if len(loud) > 1 else loud[0][:, None])
-            solved += [self._carried_on(start, near) for start, near in zip(loud, together.T, strict=True)]
+            starts = [self._raised(vectors) for vectors in sources[begin : begin + _BATCH]]
+            together = self._solve(np.stack(starts, axis=1))
+            solved += [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
         return solved
 
     def _carried_on(self, start: NDArray[np.complex128], near: NDArray[np.complex128]) -> list[NDArray[np.complex128]]:
         stages = [near]
-        faint = _size(near) < _FAINT
-        while faint.any():
+        unknown = np.ones(len(near), dtype=bool)
+        while True:
+            size = np.where(unknown, _size(stages[-1]), 0.0)
+            faint = unknown & (size < _FAINT * size.max())
+            if not faint.any() or faint.sum() == unknown.sum():
+                return stages
             border = self._at_border(stages[-1], faint, start)
             if not border.any():
-                break
+                return stages
             start = self._raised(border)
-            stage = self._solve(start[:, None])[:, 0]
-            stage[~faint] = np.nan
-            still = faint & (_size(stage) < _FAINT)
-            stages.append(stage)
-            if still.sum() == faint.sum():
-                break
-            faint = still
-        return stages
+            stages.append(self._solve(start[:, None])[:, 0])
+            stages[-1][~faint] = np.nan
+            unknown = faint
 
     def _at_border(
         self, vectors: NDArray[np.complex128], faint: NDArray[np.bool_], start: NDArray[np.complex128]
@@ -103,12 +102,12 @@ class VectorHeat:
         return np.where(near_border, forces, np.where(faint, start, 0))
 
     def _raised(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Scaled up as far as is safe, by a power of two."""
+        """Scaled by a power of two, so that the largest X is about one."""
         largest = _size(vectors).max(initial=0.0)
         if largest == 0:
             return vectors
-        steps = int(np.frexp(self._loudest)[1] - np.frexp(largest)[1])
-        half = steps // 2
+        steps = int(np.frexp(self._smallest_mass)[1] - np.frexp(largest)[1])
+        half = steps // 2  # one power of two of them all might overflow
         return vectors * 2.0**half * 2.0 ** (steps - half)
 
     def _solve(self, columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
