@@ -6,6 +6,7 @@ from .domains.digital_surface import DigitalSurface
 from .domains.grid import Grid
 from .domains.point_cloud import PointCloud
 from .domains.polygon_mesh import PolygonMesh
+from .domains.tet_mesh import TetMesh
 from .domains.triangle_mesh import TriangleMesh
 from .errors import (
     ConstraintError,
@@ -24,8 +25,10 @@ from .extensions.intrinsic_triangulation import IntrinsicTriangulation, intrinsi
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.piecewise import piecewise_distance
 from .extensions.sharpening import sharpen
+from .extensions.tetrahedralize import tetrahedralize
 from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField
+from .fields.tet_field import TetField
 from .fields.vertex_field import VertexField
 from .io import load_field, read, read_curves, save, write_curves
 from .lowering import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
@@ -33,6 +36,7 @@ from .lowering import grid as _grid  # noqa: F401  registers the lowering
 from .lowering import point_clouds as _point_clouds  # noqa: F401  registers the lowering
 from .lowering import polygons as _polygons  # noqa: F401  registers the lowering
 from .lowering import surface as _surface  # noqa: F401  registers the lowering
+from .lowering import tets as _tets  # noqa: F401  registers the lowering
 from .solver import SignedHeatSolver, signed_distance
 from .sources.curves import Curve, SurfacePoints
 
@@ -62,6 +66,8 @@ __all__ = [
     "Soft",
     "SourceError",
     "SurfacePoints",
+    "TetField",
+    "TetMesh",
     "TriangleMesh",
     "UnreachedWarning",
     "VertexField",
@@ -80,6 +86,7 @@ __all__ = [
     "sharpen",
     "shell",
     "signed_distance",
+    "tetrahedralize",
     "thicken",
     "write_curves",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -113,6 +114,18 @@ class TetMesh:
         corners = self.vertices[self.tets]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
+    @cached_property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) least and greatest coordinates of the vertices that tets use."""
+        used = self.vertices[np.unique(self.tets)]
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write to a ``.mesh``, ``.msh``, ``.vtu``, ``.vtk``, or ``.node`` and ``.ele`` file."""
+        from ..io.tets import write_tets
+
+        write_tets(self, path)
+
     @classmethod
     def from_meshio(cls, mesh: Any) -> TetMesh:
         """The tets of a `meshio.Mesh`; cells of other kinds are left behind.
@@ -128,12 +141,25 @@ class TetMesh:
             raise GeometryError(f"the mesh holds no tets, but {', '.join(kinds)}: convert it to tetrahedra first")
         return cls(mesh.points, np.concatenate(blocks))
 
-    def to_meshio(self, point_data: Any = None, cell_data: Any = None) -> Any:
-        """This mesh as a `meshio.Mesh`, with data at vertices and tets by name."""
+    def to_meshio(self, point_data: Any = None) -> Any:
+        """As a `meshio.Mesh`, with data at its vertices by name."""
         import meshio
 
-        cells = {name: [values] for name, values in (cell_data or {}).items()}
-        return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data, cell_data=cells)
+        return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data)
+
+    @classmethod
+    def from_pyvista(cls, grid: Any) -> TetMesh:
+        """The tets of a `pyvista.UnstructuredGrid`; cells of other kinds are left behind."""
+        tets = grid.cells_dict.get(10)  # VTK_TETRA
+        if tets is None:
+            raise GeometryError(f"the grid holds no tets among its {grid.n_cells} cells: triangulate it first")
+        return cls(grid.points, tets.astype(np.int64))
+
+    def to_pyvista(self) -> Any:
+        """As a `pyvista.UnstructuredGrid`."""
+        import pyvista
+
+        return pyvista.UnstructuredGrid({10: np.array(self.tets)}, np.array(self.vertices))
 
     def __repr__(self) -> str:
         return f"TetMesh({self.n_vertices} vertices, {self.n_tets} tets)"

@@ -13,13 +13,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..domains.point_cloud import PointCloud
-from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, MemoryLimitError
+from ..sources.area_elements import area_elements, extent
 
 LEAST_GRADING = 2.7
 """Below this, neighbouring leaves could differ by more than a factor of two: g/2 must exceed √3·¾."""
@@ -28,7 +26,7 @@ MOST_TETS = 50_000_000
 """More would need over 20 GB to build."""
 
 
-def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float = 0.25, grading: float = 3.0) -> TetMesh:
+def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float | None = None, grading: float = 3.0) -> TetMesh:
     """Fill a box around a shape with tets of good angles, graded from the shape outward.
 
     Parameters
@@ -37,8 +35,8 @@ def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float = 0.25, g
         Any shape, however broken.
     resolution : int
         Number of lattice cells along the longest side of the shape's box, at the shape.
-    padding : float
-        Room to leave on every side, as a fraction of the longest side. The box is rounded up to whole coarse cells.
+    padding : float, optional
+        Room on every side, or a little more, in the units of the shape; by default a fifth of its longest side.
     grading : float
         A cell is no larger than its distance from the shape divided by `grading`; 2.7 or more. ``inf`` gives a
         uniform lattice.
@@ -52,6 +50,8 @@ def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float = 0.25, g
     ------
     GeometryError
         If the shape has no extent, or a parameter is out of range.
+    SourceError
+        If it is not a shape in space.
     MemoryLimitError
         If the lattice would have more than 50 million tets.
 
@@ -63,22 +63,27 @@ def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float = 0.25, g
     >>> float(mesh.tet_volumes.min()) > 0
     True
     """
-    if resolution < 1 or not padding >= 0 or not grading >= LEAST_GRADING:
+    from scipy.spatial import cKDTree
+
+    lower, upper = extent(shape)
+    longest = float((upper - lower).max())
+    if len(lower) != 3 or not longest > 0:
+        raise GeometryError(f"{shape!r} has no extent in space of three dimensions to put a mesh around")
+    padding = longest / 5 if padding is None else padding
+    if resolution < 1 or not 0 <= padding < np.inf or not grading >= LEAST_GRADING:
         raise GeometryError(
             f"resolution must be at least 1, padding at least 0 and grading at least {LEAST_GRADING}, not "
             f"{resolution}, {padding} and {grading}"
         )
-    lower, upper = bounding_box(shape)
-    longest = float((upper - lower).max())
     spacing = longest / resolution
     samples = cKDTree(sample_points(shape, spacing))
-    lower, extent = lower - padding * longest, upper - lower + 2 * padding * longest
-    depth = int(np.clip(np.floor(np.log2(np.maximum(extent.max() / spacing / 4, 1))), 0, 16))
+    lower, sides = lower - padding, upper - lower + 2 * padding
+    depth = int(np.clip(np.floor(np.log2(np.maximum(sides.max() / spacing / 4, 1))), 0, 16))
     if np.isinf(grading):
         depth = 0
     coarse = spacing * 2**depth
-    counts = np.maximum(np.ceil(extent / coarse - 1e-9).astype(np.int64), 1)
-    origin = lower - (counts * coarse - extent) / 2
+    counts = np.maximum(np.ceil(sides / coarse - 1e-9).astype(np.int64), 1)
+    origin = lower - (counts * coarse - sides) / 2
     if counts.prod() * 12 > MOST_TETS:
         raise MemoryLimitError(f"the lattice would start from {counts.tolist()} cells: lower the resolution")
     corners, sizes = _octree(samples, origin, spacing, counts, depth, grading)
@@ -86,38 +91,11 @@ def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float = 0.25, g
     return TetMesh(origin + points * (spacing / 2), tets)
 
 
-def bounding_box(shape: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower and upper corner of the part of a shape that its faces use.
-
-    Raises
-    ------
-    GeometryError
-        If it is not a shape in space, or a single point.
-    """
-    match shape:
-        case TriangleMesh():
-            used = shape.vertices[np.unique(shape.faces)]
-        case PolygonMesh():
-            used = shape.vertices[np.unique(shape.corners)]
-        case PointCloud() if shape.points.shape[1] == 3:
-            used = shape.points
-        case _:
-            raise GeometryError(f"{shape!r} is not a shape in space: use a TriangleMesh, PolygonMesh or PointCloud")
-    lower, upper = used.min(axis=0), used.max(axis=0)
-    if not (upper > lower).any():
-        raise GeometryError("the shape is a single point: it has no extent to put a mesh around")
-    return lower, upper
-
-
 def sample_points(shape: Any, spacing: float) -> NDArray[np.float64]:
     """Points on a shape, so dense that no point of it is farther than `spacing` from one of them."""
     if isinstance(shape, PointCloud):
         return shape.points
-    if isinstance(shape, PolygonMesh):
-        center = shape.polygon_centroids[shape.corner_polygons]
-        triangles = np.stack([shape.vertices[shape.corners], shape.vertices[shape.next_corners], center], axis=1)
-    else:
-        triangles = shape.vertices[shape.faces]
+    triangles = area_elements(shape).corners
     sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
     pieces = np.maximum(np.ceil(sides / spacing), 1).astype(np.int64)
     found = []
@@ -130,7 +108,7 @@ def sample_points(shape: Any, spacing: float) -> NDArray[np.float64]:
 
 
 def _octree(
-    samples: cKDTree, origin: NDArray, spacing: float, counts: NDArray, depth: int, grading: float
+    samples: Any, origin: NDArray, spacing: float, counts: NDArray, depth: int, grading: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Lower corners and sizes of the leaves, in half cells of the finest level; neighbours differ by at most two.
 

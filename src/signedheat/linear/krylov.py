@@ -69,9 +69,9 @@ class IncompleteCholesky:
     def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> NDArray[np.float64]:
         """Solve for one right-hand side (n,) or several (n, k), as one system.
 
-        Stops once ``‖r‖ ≤ relative · ‖b‖`` or once, in every row, ``|r_i| ≤ componentwise · A_ii |x_i|``: the second keeps
-        solutions right that fall by hundreds of orders of magnitude. In `order` by distance from where b is not zero,
-        errors travel outward with the solution and shrink with it.
+        Stops once ``‖r‖ ≤ relative · ‖b‖``, or once ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row: the second
+        keeps solutions right that fall by hundreds of orders of magnitude. In `order` by distance from where b is not
+        zero, errors travel outward with the solution and shrink with it.
         """
         b = np.asarray(rhs, dtype=np.float64)
         x = np.zeros((self.n, b[0].size))
@@ -98,7 +98,7 @@ def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArra
 
     Examples
     --------
-    >>> chain = sparse.diags([[1, 1, 0], [1, 1, 1, 1], [1, 1, 0]], [-1, 0, 1], format="csr")
+    >>> chain = sparse.csr_matrix([[1, 1, 0], [1, 1, 1], [0, 1, 1]])
     >>> outward_order(chain, np.array([1]))
     array([1, 0, 2])
     """

@@ -17,8 +17,11 @@ from scipy import sparse
 FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corners of the face opposite each corner, counter-clockwise seen from outside."""
 
-THINNEST = 1e-9
-"""Least volume, over the cube of the longest edge, with which a tet enters a stiffness matrix."""
+THIN = 1e-2
+"""Volume, over the cube of the longest edge, below which a tet counts less; 0.118 for a regular one."""
+
+TIE = 1e-4
+"""Strength of the ties that hold the faces and vertices of flat tets together, where nothing else does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,32 +136,52 @@ class Tetrahedra:
         return np.sqrt(np.max(squares, axis=0))
 
     @cached_property
-    def safe_volumes(self) -> NDArray[np.float64]:
-        """(m,) volumes kept from zero, so that a flat tet ties its faces together instead of tearing them apart."""
-        least = np.maximum(THINNEST * self.longest_edges**3, 1e-15 * np.abs(self.volumes).mean())
-        return np.maximum(self.volumes, least)
+    def thickness(self) -> NDArray[np.float64]:
+        """(m,) volume over the cube of the longest edge; zero for tets that are a single point."""
+        cubes = self.longest_edges**3
+        return np.maximum(self.volumes, 0) / np.where(cubes > 0, cubes, 1)
+
+    @cached_property
+    def stiffness_factors(self) -> NDArray[np.float64]:
+        """(m,) w / |T|, where thin tets count with w < 1 in every term of their own.
+
+        Any positive weights leave the equations consistent. These keep the stiffness of flat tets bounded.
+        """
+        thick = self.thickness >= THIN
+        cubes = np.where(self.longest_edges > 0, self.longest_edges, 1) ** 3
+        return 1 / np.where(thick, np.maximum(self.volumes, np.finfo(float).tiny), THIN * cubes)
+
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        """(m,) w: one, less for thin tets, zero for flat ones."""
+        return np.minimum(self.thickness / THIN, 1)
+
+    @cached_property
+    def ties(self) -> NDArray[np.float64]:
+        """(m,) stiffness of a tie between any two faces, or vertices, of a thin tet: it has next to none of its own."""
+        return TIE * (1 - self.weights) * np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
 
     def face_mass(self, faces: FaceTable) -> NDArray[np.float64]:
         """(f,) M of Eq. 12, lumped: a quarter of the volume at each face."""
-        quarter = np.repeat(self.safe_volumes / 4, 4)
+        quarter = np.repeat(self.weights * self.volumes / 4, 4)
         return np.bincount(faces.of_tets.ravel(), weights=quarter, minlength=len(faces.vertices))
 
     def face_laplacian(self, faces: FaceTable) -> sparse.csr_matrix:
         """(f, f) Crouzeix–Raviart Laplacian: L_ab = Σ_T N_a·N_b / |T|, which is −(3/2) |e| cot θ between two faces."""
-        return _assemble(self.area_vectors, 1 / self.safe_volumes, faces.of_tets, len(faces.vertices))
+        return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.of_tets, len(faces.vertices))
 
     def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
         """(n, n) cotan Laplacian: C_ij = Σ_T N_i·N_j / (9|T|), which is −(1/6) |e| cot θ between two vertices."""
-        return _assemble(self.area_vectors, 1 / (9 * self.safe_volumes), corners, n)
+        return _assemble(self.area_vectors, self.stiffness_factors / 9, self.ties, corners, n)
 
     def divergence(self, directions: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
         """(n,) b of Eq. 13: ∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T for one vector Y per tet."""
-        parts = np.einsum("mki,mi->mk", self.area_vectors, directions) / -3
+        parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.weights / -3)[:, None]
         return np.bincount(corners.ravel(), weights=parts.ravel(), minlength=n)
 
     def gradients(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m, 3) gradient of the linear interpolant of (m, 4) corner values; zero on flat tets."""
-        flat = self.volumes <= THINNEST * self.longest_edges**3
+        flat = self.thickness < 1e-10
         sums = np.einsum("mki,mk->mi", self.area_vectors, corner_values)
         return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
 
@@ -176,12 +199,16 @@ def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> ND
 
 
 def _assemble(
-    vectors: NDArray[np.float64], factors: NDArray[np.float64], ids: NDArray[np.int64], n: int
+    vectors: NDArray[np.float64],
+    factors: NDArray[np.float64],
+    ties: NDArray[np.float64],
+    ids: NDArray[np.int64],
+    n: int,
 ) -> sparse.csr_matrix:
-    """Σ_T factor · N_a·N_b at the entry (ids of a, ids of b)."""
+    """Σ_T factor · N_a·N_b at the entry (ids of a, ids of b), and the ties."""
     indptr, columns = _pattern(ids, n)
     data = np.zeros(len(columns))
-    _accumulate(vectors, factors, ids, indptr, columns, data)
+    _accumulate(vectors, factors, ties, ids, indptr, columns, data)
     return sparse.csr_matrix((data, columns, indptr), shape=(n, n))
 
 
@@ -225,7 +252,7 @@ def _pattern(ids, n):
 
 
 @njit(cache=True)
-def _accumulate(vectors, factors, ids, indptr, columns, data):
+def _accumulate(vectors, factors, ties, ids, indptr, columns, data):
     for t in range(len(ids)):
         for a in range(4):
             row = ids[t, a]
@@ -234,4 +261,4 @@ def _accumulate(vectors, factors, ids, indptr, columns, data):
                 for i in range(3):
                     value += vectors[t, a, i] * vectors[t, b, i]
                 k = indptr[row] + np.searchsorted(columns[indptr[row] : indptr[row + 1]], ids[t, b])
-                data[k] += factors[t] * value
+                data[k] += factors[t] * value + ties[t] * (3.0 if a == b else -1.0)

@@ -1,0 +1,119 @@
+"""Level sets in tet meshes, as closed manifold surfaces: marching tetrahedra with the boundary as lid."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..domains.tet_mesh import TetMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import OutsideError
+from ..operators.tetrahedral import tet_faces
+
+CLEARANCE = 1e-3
+"""Crossings keep this fraction of an edge from its ends, so that no two vertices of a surface coincide."""
+
+# Corners in an even order with those below the level first, and below how many of them are: by the bits of the mask.
+_ORDERS = np.zeros((16, 4), dtype=np.int64)
+_COUNTS = np.array([bin(mask).count("1") for mask in range(16)])
+_PAIRS = {(0, 1): (2, 3), (0, 2): (3, 1), (0, 3): (1, 2), (1, 2): (0, 3), (1, 3): (2, 0), (2, 3): (0, 1)}
+for _k, _order in enumerate([(0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)]):
+    _ORDERS[1 << _k] = _ORDERS[15 - (1 << _k)] = _order
+for (_i, _j), _rest in _PAIRS.items():
+    _ORDERS[(1 << _i) | (1 << _j)] = (_i, _j, *_rest)
+
+# Triangles between crossings, each given by the two corners (in that order) of the edge that it lies on.
+_CUTS = {
+    1: [[(0, 1), (0, 2), (0, 3)]],
+    2: [[(0, 2), (0, 3), (1, 3)], [(0, 2), (1, 3), (1, 2)]],
+    3: [[(0, 1), (0, 3), (0, 2)]],
+}
+# The part of a boundary face below the level, whose corner (k, k) is the vertex itself.
+_LIDS = {
+    1: [[(0, 0), (0, 1), (0, 2)]],
+    2: [[(0, 0), (1, 1), (1, 2)], [(0, 0), (1, 2), (2, 0)]],
+    3: [[(0, 0), (1, 1), (2, 2)]],
+}
+
+
+def closed_level_set(mesh: TetMesh, values: NDArray[np.float64], level: float) -> TriangleMesh:
+    """The surface between the vertices below a level and the others, facing the others.
+
+    Where it meets the boundary of the mesh it is closed along the boundary, on the side below the level. Tets with NaN
+    count as outside the mesh.
+
+    Raises
+    ------
+    OutsideError
+        If the values do not take the level.
+    """
+    tets = mesh.tets[~np.isnan(values[mesh.tets]).any(axis=1)]
+    below = values < level
+    used = below[tets]
+    if not used.any() or used.all():
+        low, high = np.nanmin(values), np.nanmax(values)
+        raise OutsideError(
+            f"level {level:g} is outside the values of the tet mesh, {low:g} to {high:g}: choose another level or a "
+            "larger mesh"
+        )
+    keys = _triangles(tets, used, mesh.n_vertices, _CUTS)
+    faces = tet_faces(tets)
+    walls = faces.vertices[faces.tet_counts == 1]
+    if below[walls].any() and not below[walls].all():
+        keys = np.concatenate([keys, _triangles(walls, below[walls], mesh.n_vertices, _LIDS)])
+    crossings, triangles = np.unique(keys, return_inverse=True)
+    low, high = crossings // mesh.n_vertices, crossings % mesh.n_vertices
+    rise = values[high] - values[low]
+    along = np.clip((level - values[low]) / np.where(rise != 0, rise, 1), CLEARANCE, 1 - CLEARANCE)
+    positions = mesh.vertices[low] + along[:, None] * (mesh.vertices[high] - mesh.vertices[low])
+    return manifold(positions, triangles.reshape(-1, 3))
+
+
+def _triangles(
+    elements: NDArray[np.int64], below: NDArray[np.bool_], n: int, table: dict[int, list]
+) -> NDArray[np.int64]:
+    """(k, 3) triangles whose corners are ``smaller · n + larger`` vertex id of the edge that they lie on."""
+    corners = elements.shape[1]
+    masks = below @ (1 << np.arange(corners))
+    if corners == 4:
+        orders, counts = _ORDERS, _COUNTS
+    else:
+        orders = np.array([[0, 1, 2], [0, 1, 2], [1, 2, 0], [0, 1, 2], [2, 0, 1], [2, 0, 1], [1, 2, 0], [0, 1, 2]])
+        counts = _COUNTS[:8]
+    found = []
+    for count, triangles in table.items():
+        chosen = counts[masks] == count
+        ordered = np.take_along_axis(elements[chosen], orders[masks[chosen]], axis=1)
+        for triangle in triangles:
+            ends = [(ordered[:, a], ordered[:, b]) for a, b in triangle]
+            found.append(np.stack([np.minimum(a, b) * n + np.maximum(a, b) for a, b in ends], axis=1))
+    return np.concatenate(found)
+
+
+def manifold(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> TriangleMesh:
+    """A closed oriented surface with its vertices and edges split wherever it touches itself.
+
+    Every halfedge is paired with one that runs the other way; corners that meet across a pair are one vertex.
+
+    Examples
+    --------
+    >>> tet = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+    >>> two = np.concatenate([tet, np.where(tet > 0, tet + 3, 0)])  # sharing vertex 0
+    >>> manifold(np.zeros((7, 3)), two).n_vertices
+    8
+    """
+    m = len(triangles)
+    tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    after = np.roll(np.arange(3 * m).reshape(m, 3), -1, axis=1).ravel()  # the corner at the head of each halfedge
+    n = len(positions)
+    undirected = np.minimum(tails, heads) * n + np.maximum(tails, heads)
+    forward = np.flatnonzero(tails < heads)
+    backward = np.flatnonzero(tails > heads)
+    forward = forward[np.argsort(undirected[forward], kind="stable")]
+    backward = backward[np.argsort(undirected[backward], kind="stable")]
+    joins = np.concatenate([forward, after[forward]]), np.concatenate([after[backward], backward])
+    graph = sparse.coo_matrix((np.ones(len(joins[0]), dtype=np.int8), joins), shape=(3 * m, 3 * m))
+    _, vertex = sparse.csgraph.connected_components(graph, directed=False)
+    _, first = np.unique(vertex, return_index=True)
+    return TriangleMesh(positions[tails[first]], vertex.reshape(m, 3))

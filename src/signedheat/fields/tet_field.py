@@ -1,0 +1,220 @@
+"""Distance on a tet mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..discretization import Diagnostics
+from ..domains.tet_mesh import TetMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError, OutsideError
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+
+@dataclass(frozen=True, eq=False)
+class TetField:
+    """Signed distance at the vertices of a tet mesh, linear on every tet.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The domain.
+    values : (n_vertices,) float
+        φ at the vertices, in the units of the mesh. Positive on the side that the source normals point to, so negative
+        inside a shape with outward normals. NaN on parts of the mesh that no source is connected to.
+    diagnostics : Diagnostics
+        What happened on the way.
+
+    Raises
+    ------
+    GeometryError
+        If there is not one value per vertex.
+
+    Examples
+    --------
+    >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    >>> phi = TetField(mesh, [-0.5, 0.5, -0.5, -0.5])
+    >>> phi([[0.25, 0.25, 0.25], [-1.0, 0.0, 0.0]])
+    array([-0.25, -1.5 ])
+    >>> phi.gradient([[0.25, 0.25, 0.25]])
+    array([[1., 0., 0.]])
+    >>> phi.contour().n_faces
+    8
+    """
+
+    mesh: TetMesh
+    values: NDArray[np.float64]
+    diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+
+    def __post_init__(self) -> None:
+        values = np.ascontiguousarray(self.values, dtype=np.float64)
+        if values.shape != (self.mesh.n_vertices,):
+            raise GeometryError(f"values have shape {values.shape}, but the mesh has {self.mesh.n_vertices} vertices")
+        object.__setattr__(self, "values", values)
+
+    @property
+    def domain(self) -> TetMesh:
+        """The mesh."""
+        return self.mesh
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        """φ at points in space, linear within every tet.
+
+        Outside the mesh φ continues straight from the nearest point of its boundary, along the gradient there.
+
+        Parameters
+        ----------
+        points : (n, 3) or (3,) float
+            Positions, in the units of the mesh.
+
+        Returns
+        -------
+        (n,) float, or one float
+            Signed distances; NaN where the nearest tet holds a vertex without a value.
+        """
+        points = _checked(points)
+        corners, weights, away = self._place(points.reshape(-1, 3))
+        values = np.einsum("pk,pk->p", weights, self.values[corners])
+        outside = np.flatnonzero(away.any(axis=1))
+        if len(outside):
+            slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
+            values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
+        return values if points.ndim == 2 else values[0]
+
+    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+        """∇φ at points in space: volume-weighted means at the vertices, interpolated.
+
+        Outside the mesh it is the gradient at the nearest point of its boundary.
+
+        Parameters
+        ----------
+        points : (n, 3) or (3,) float
+            Positions, in the units of the mesh.
+
+        Returns
+        -------
+        (n, 3) float
+            Gradients; of length about 1, since φ is a distance.
+        """
+        corners, weights, _ = self._place(_checked(points).reshape(-1, 3))
+        return np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
+
+    @property
+    def tet_gradients(self) -> NDArray[np.float64]:
+        """(m, 3) ∇φ on every tet, where it is constant."""
+        return self.mesh.geometry.gradients(self.values[self.mesh.tets])
+
+    def contour(self, level: float = 0.0) -> TriangleMesh:
+        """The surface φ = level: closed, manifold, normals pointing to greater φ.
+
+        Where the surface runs out of the mesh, it is closed along the mesh's boundary.
+
+        Parameters
+        ----------
+        level : float
+            In the units of the mesh.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the level anywhere in the mesh.
+        """
+        from .marching_tets import closed_level_set
+
+        return closed_level_set(self.mesh, self.values, level)
+
+    def offset(self, distance: float) -> TriangleMesh:
+        """The surface at a signed distance from the shape: `contour`, but refused where the mesh is too small for it.
+
+        Parameters
+        ----------
+        distance : float
+            Positive outwards, in the units of the mesh.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the value in the mesh, or its level set leaves the mesh although the shape does not.
+        """
+        walls = self.values[np.unique(self.mesh.boundary.faces)]
+        low, high = np.nanmin(walls), np.nanmax(walls)
+        bounded = low > 0 or high < 0
+        if bounded and low < distance < high:
+            limit = low if low > 0 else high
+            raise OutsideError(
+                f"the surface at distance {distance:g} leaves the tet mesh, which holds distances up to {limit:g}: "
+                f"use a mesh that reaches more than {abs(distance):g} beyond the shape"
+            )
+        return self.contour(distance)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write mesh and values to a ``.vtu``, ``.vtk`` or ``.msh`` file; `signedheat.load_field` reads it."""
+        from ..io.tets import save_tet_field
+
+        save_tet_field(self, path)
+
+    @cached_property
+    def _vertex_gradients(self) -> NDArray[np.float64]:
+        tets, n = self.mesh.tets, self.mesh.n_vertices
+        volumes = np.maximum(self.mesh.tet_volumes, 0)
+        gradients = self.tet_gradients
+        known = ~np.isnan(gradients).any(axis=1)
+        vertices = tets[known].ravel()
+        sums = np.stack(
+            [np.bincount(vertices, np.repeat((volumes * g)[known], 4), minlength=n) for g in gradients.T], axis=1
+        )
+        total = np.bincount(vertices, np.repeat(volumes[known], 4), minlength=n)
+        return np.where(total[:, None] > 0, sums / np.where(total > 0, total, 1)[:, None], np.nan)
+
+    @cached_property
+    def _planes(self) -> Any:
+        from ..sources.clipping import Planes
+
+        return Planes.of(self.mesh)
+
+    @cached_property
+    def _wall_tree(self) -> Any:
+        from ..operators.box_tree import BoxTree
+
+        corners = self.mesh.vertices[self.mesh.boundary.faces]
+        return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+
+    def _place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Vertices and weights that interpolate at each point or the nearest on the boundary, and the way from it."""
+        from ..operators.nearest import nearest_on_triangles
+        from ..sources.clipping import barycentric, locate
+
+        tets = locate(self.mesh, self._planes, points)
+        inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
+        corners = np.zeros((len(points), 4), dtype=np.int64)
+        weights, away = np.zeros((len(points), 4)), np.zeros((len(points), 3))
+        corners[inside] = self.mesh.tets[tets[inside]]
+        weights[inside] = barycentric(self.mesh, tets[inside], points[inside])
+        if len(outside):
+            walls = self.mesh.boundary
+            faces, coordinates = nearest_on_triangles(
+                walls.vertices[walls.faces], self._wall_tree, np.ascontiguousarray(points[outside])
+            )
+            corners[outside, :3], weights[outside, :3] = walls.faces[faces], coordinates
+            corners[outside, 3] = corners[outside, 0]
+            nearest = np.einsum("pk,pki->pi", coordinates, walls.vertices[walls.faces[faces]])
+            away[outside] = points[outside] - nearest
+        return corners, weights, away
+
+    def __repr__(self) -> str:
+        low, high = (float(f(self.values)) for f in (np.nanmin, np.nanmax))
+        return f"TetField({self.mesh!r}, values from {low:g} to {high:g})"
+
+
+def _checked(points: ArrayLike) -> NDArray[np.float64]:
+    array = np.asarray(points, dtype=np.float64)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3 or not np.isfinite(array).all():
+        raise GeometryError("points must be finite, with 3 coordinates each")
+    return array

@@ -1,0 +1,205 @@
+"""Tet meshes as a discretisation: one vector per face, one value per vertex (Sec. 8.1)."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..discretization import Diagnostics, discretize
+from ..domains.tet_mesh import TetMesh
+from ..errors import UnreachedWarning
+from ..fields.tet_field import TetField
+from ..linear import factorize, upper_triangle, whole
+from .direct_integration import DirectIntegration
+
+if TYPE_CHECKING:
+    from ..linear.krylov import IncompleteCholesky
+    from ..sources.clipping import Planes
+    from ..sources.tet_source import TetSource
+
+DIRECT_FACES = 20_000
+"""Up to this number of faces step 1 is factorised: that grows like n², conjugate gradients like n⁴ᐟ³."""
+
+DIRECT_VERTICES = 40_000
+"""Up to this number of vertices step 3 is factorised."""
+
+DIRECTION_ERROR = 1e-3
+"""Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
+
+FAINT = 1e-250
+"""Vectors below this fraction of the largest are computed anew, before they underflow."""
+
+
+@dataclass(frozen=True, eq=False)
+class TetDiscretization:
+    """A tet mesh as the three steps see it.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The domain.
+    direct : bool
+        Whether to factorise the system of step 1; it is solved by conjugate gradients otherwise.
+    """
+
+    mesh: TetMesh
+    direct: bool
+    _factors: dict[float, Any] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def planes(self) -> Planes:
+        """The planes of the faces, against which sources are clipped."""
+        from ..sources.clipping import Planes
+
+        return Planes.of(self.mesh)
+
+    @cached_property
+    def spacing(self) -> float:
+        """h: mean distance between the barycentres of two faces of a tet, a third of the edge between their corners."""
+        corners = self.mesh.vertices[self.mesh.tets]
+        pairs = [corners[:, a] - corners[:, b] for a in range(4) for b in range(a)]
+        return float(np.mean([np.linalg.norm(edge, axis=1).mean() for edge in pairs])) / 3
+
+    @cached_property
+    def unknowns(self) -> NDArray[np.int64]:
+        """(m, 4) unknown of φ at each corner.
+
+        Heat flows through faces. Parts of the mesh that touch in an edge or a vertex alone are separate domains, and a
+        vertex that they share is an unknown in each.
+        """
+        m, tets = self.mesh.n_tets, self.mesh.tets
+        of_tets = self.mesh.faces.of_tets.ravel()
+        through = sparse.coo_matrix((np.ones(4 * m, dtype=np.int8), (np.repeat(np.arange(m), 4), of_tets + m)))
+        size = m + len(self.mesh.faces.vertices)
+        through.resize(size, size)
+        n_parts, part = sparse.csgraph.connected_components(through, directed=False)
+        keys = tets * n_parts + part[:m, None]
+        return np.unique(keys, return_inverse=True)[1].reshape(m, 4)
+
+    @cached_property
+    def n_unknowns(self) -> int:
+        """Number of unknowns of φ."""
+        return int(self.unknowns.max()) + 1
+
+    @cached_property
+    def integration(self) -> DirectIntegration:
+        """Step 3."""
+        matrix = upper_triangle(self.mesh.geometry.vertex_laplacian(self.unknowns, self.n_unknowns))
+        if self.n_unknowns <= DIRECT_VERTICES:
+            return DirectIntegration(matrix)
+        return DirectIntegration(matrix, factorize=from_first, spring=100.0)
+
+    def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
+        """Tets hold sources in any position."""
+        return self, sources
+
+    def lower(self, sources: Sequence[Any], diffusion: float) -> TetSource:
+        """X₀ and the rows that average φ over the sources."""
+        from ..sources.tet_source import tet_source
+
+        return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
+
+    def diffuse(self, source: TetSource) -> list[NDArray[np.float64]]:
+        """Solve ``(M + tL) X = X₀``; one vector per face, in stages.
+
+        X falls like exp(−r/√t), and out of the range of floating-point numbers a few hundred faces away. On the faint
+        faces it satisfies the same equation with a right-hand side along their border: scaled up, that is the
+        next stage. Each is known up to a factor of its own, and NaN nearer than where it begins.
+        """
+        matrix, loads = self._heat_matrix(source.time), source.vectors
+        vectors = self._solve(matrix, source.time, loads)
+        stages, faint = [vectors], np.abs(vectors).max(axis=1) < FAINT
+        while faint.any():
+            forces = np.where(faint[:, None], loads, 0)
+            border = self._around(faint)
+            forces[border] += (matrix @ np.where(faint[:, None], vectors, 0))[border]
+            if not forces.any():
+                break
+            vectors = self._solve(matrix, source.time, forces)
+            still = faint & (np.abs(vectors).max(axis=1) < FAINT)
+            stages.append(np.where(faint[:, None], vectors, np.nan))
+            if still.sum() == faint.sum():
+                break
+            faint, loads = still, forces
+        return stages
+
+    def _solve(self, matrix: sparse.csr_matrix, time: float, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+        """X up to a factor."""
+        loads = loads / np.abs(loads).max()
+        if self.direct:
+            if time not in self._factors:
+                self._factors.clear()
+                self._factors[time] = factorize(matrix)
+            return self._factors[time].solve(loads)
+        from ..linear.krylov import IncompleteCholesky, outward_order
+
+        order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
+        return IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
+
+    def _around(self, faint: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Faces of the tets that have both kinds of faces."""
+        count = faint[self.mesh.faces.of_tets].sum(axis=1)
+        return np.unique(self.mesh.faces.of_tets[(count > 0) & (count < 4)])
+
+    def _heat_matrix(self, time: float) -> sparse.csr_matrix:
+        matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass(self.mesh.faces)
+        matrix.setdiag(matrix.diagonal() + mass)
+        return matrix
+
+    @cached_property
+    def _laplacian(self) -> sparse.csr_matrix:
+        return self.mesh.geometry.face_laplacian(self.mesh.faces)
+
+    def to_cells(self, stages: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+        """X at the tets: the mean of the four faces, in the last stage that knows them all."""
+        cells = stages[0][self.mesh.faces.of_tets].mean(axis=1)
+        for vectors in stages[1:]:
+            means = vectors[self.mesh.faces.of_tets].mean(axis=1)
+            cells = np.where(np.isnan(means), cells, means)
+        return cells
+
+    def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """b, the right-hand side of ``C φ = b``."""
+        return self.mesh.geometry.divergence(directions, self.unknowns, self.n_unknowns)
+
+    def field(self, values: NDArray[np.float64], source: TetSource, diagnostics: Diagnostics) -> TetField:
+        """φ at the vertices of the mesh."""
+        at_corners = values[self.unknowns].ravel()
+        known = np.flatnonzero(~np.isnan(at_corners))
+        vertices, n = self.mesh.tets.ravel()[known], self.mesh.n_vertices
+        counts = np.bincount(vertices, minlength=n)
+        sums = np.bincount(vertices, weights=at_corners[known], minlength=n)
+        at_vertices = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+        unreached = np.flatnonzero(np.isnan(at_vertices))
+        if len(known) < len(at_corners):
+            warnings.warn(
+                f"{(len(at_corners) - len(known)) // 4} of {self.mesh.n_tets} tets are not connected to any source "
+                "through faces: the distance there is NaN",
+                UnreachedWarning,
+                stacklevel=2,
+            )
+        notes = {**diagnostics.notes, **source.notes}
+        if len(self.mesh.reoriented):
+            notes["tets turned"] = len(self.mesh.reoriented)
+        return TetField(self.mesh, at_vertices, replace(diagnostics, unreached=unreached, notes=notes))
+
+
+def from_first(matrix: sparse.csr_matrix) -> IncompleteCholesky:
+    """Conjugate gradients on a matrix given by its upper triangle, in the order of its own graph from unknown 0."""
+    from ..linear.krylov import IncompleteCholesky, outward_order
+
+    full = whole(matrix)
+    _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
+    return IncompleteCholesky.of(full, outward_order(full, first))
+
+
+@discretize.register
+def _(domain: TetMesh) -> TetDiscretization:
+    return TetDiscretization(domain, direct=len(domain.faces.vertices) <= DIRECT_FACES)

@@ -1,0 +1,179 @@
+"""Shapes in space, lowered to a tet mesh: X₀ of Eq. 12, and the rows that average φ over the source."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..domains.tet_mesh import TetMesh
+from ..errors import SourceError
+from .area_elements import AreaElements, area_elements
+from .clipping import Pieces, Planes, barycentric, clip_triangles, locate
+
+WHOLE = 1 - 1e-6
+"""Fraction of a face that a source must cover for the face to count as part of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class TetSource:
+    """Sources lowered to a tet mesh.
+
+    Attributes
+    ----------
+    vectors : (f, 3) float
+        X₀ at the faces.
+    time : float
+        t of Eq. 12.
+    rows : (s, n) sparse
+        Row i averages φ over patch i of the source: what lies nearest to one vertex of the tets that it crosses.
+        Where the source follows faces of the mesh, the patch is the vertex itself.
+    weights : (s,) float
+        Area of each patch.
+    components, owners : (s,) int
+        Connected component, and source, that each patch lies on.
+    notes : mapping
+        What of the sources was lost outside the mesh.
+    """
+
+    vectors: NDArray[np.float64]
+    time: float
+    rows: sparse.csr_matrix
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    owners: NDArray[np.int64]
+    notes: Mapping[str, Any]
+
+
+def tet_source(
+    mesh: TetMesh,
+    planes: Planes,
+    unknowns: NDArray[np.int64],
+    sources: Sequence[Any],
+    diffusion: float,
+    spacing: float,
+) -> TetSource:
+    """Lower sources to a tet mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The domain.
+    planes : Planes
+        Of its faces.
+    unknowns : (m, 4) int
+        Unknown of φ at each corner of each tet.
+    sources : sequence of TriangleMesh, PolygonMesh or PointCloud
+        What distance is measured to, in any position. What lies outside the mesh is left out, and noted.
+    diffusion, spacing : float
+        τ and h in ``t = τ max(h, h_source)²``.
+
+    Raises
+    ------
+    SourceError
+        If a source is of another kind, lies outside the mesh, has no normals, or cancels itself.
+    """
+    vectors = np.zeros((len(mesh.faces.vertices), 3))
+    patches, notes, n_components, n_unknowns = [], {}, 0, int(unknowns.max()) + 1
+    for number, source in enumerate(sources):
+        elements = area_elements(source)
+        if elements.corners.shape[2] != 3:
+            raise SourceError(f"source {number} ({source!r}) does not lie in space of three dimensions, as tets do")
+        if not elements.vectors.any():
+            raise SourceError(f"source {number} ({source!r}) has no area at all: its faces are degenerate")
+        pieces = _cut(mesh, planes, elements)
+        if len(pieces.tets) == 0:
+            raise SourceError(
+                f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}: move it into "
+                "the mesh, or check that both have the same units"
+            )
+        outside = 1 - pieces.areas.sum() / elements.weights.sum()
+        if outside > 1e-9:
+            notes[f"source {number} outside the mesh"] = f"{100 * outside:.3g} % of its area, left out"
+        spacing = max(spacing, elements.spacing)
+        # X₀ = ∫ ψ N, exactly, since ψ is linear on each piece. On a face of the mesh ψ is one there, with mean zero
+        # on the others.
+        psi = 1 - 3 * pieces.barycentric
+        faces = mesh.faces.of_tets[pieces.tets]
+        for axis in range(3):
+            loads = psi * pieces.area_vectors[:, axis, None]
+            vectors[:, axis] += np.bincount(faces.ravel(), weights=loads.ravel(), minlength=len(vectors))
+        components = elements.components[pieces.parents] + n_components
+        patches.append((*_patches(mesh, unknowns, n_unknowns, pieces, components), number))
+        n_components = int(components.max()) + 1
+    if not np.abs(vectors).max() > 0:
+        raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
+    return TetSource(
+        vectors=vectors,
+        time=diffusion * spacing**2,
+        rows=sparse.vstack([rows for rows, *_ in patches], format="csr"),
+        weights=np.concatenate([weights for _, weights, *_ in patches]),
+        components=np.unique(np.concatenate([components for _, _, components, _ in patches]), return_inverse=True)[1],
+        owners=np.concatenate([np.full(len(weights), number) for _, weights, _, number in patches]),
+        notes=notes,
+    )
+
+
+def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> Pieces:
+    if elements.corners.shape[1] == 3:
+        pieces = clip_triangles(mesh, planes, elements.corners)
+        sizes = np.linalg.norm(elements.vectors, axis=1)
+        counted = elements.weights / np.where(sizes > 0, sizes, 1)  # −1 where a fan leaves its polygon
+        return replace(pieces, areas=pieces.areas * counted[pieces.parents])
+    tets = locate(mesh, planes, elements.corners[:, 0])
+    k = np.flatnonzero(tets >= 0)
+    centers = barycentric(mesh, tets[k], elements.corners[k, 0])
+    return Pieces(tets[k], k, elements.vectors[k], elements.weights[k], centers, np.full(len(k), -1))
+
+
+def _patches(
+    mesh: TetMesh, unknowns: NDArray[np.int64], n_unknowns: int, pieces: Pieces, components: NDArray[np.int64]
+) -> tuple[sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
+    """Rows, areas and components of the patches.
+
+    One row for each piece would say more than φ, linear on every tet, can obey but by being flat around the source.
+    """
+    corners = unknowns[pieces.tets]
+    conforming = _on_whole_faces(mesh, pieces, components)
+    k = np.flatnonzero(conforming)
+    of_face = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[pieces.in_face[k]]
+    at_vertices = corners[k[:, None], of_face].ravel()
+    inside = np.flatnonzero(~conforming)
+    nearest = corners[inside, pieces.barycentric[inside].argmax(axis=1)]
+
+    keys = np.concatenate([np.repeat(components[k], 3), components[inside]]) * n_unknowns
+    keys += np.concatenate([at_vertices, nearest])
+    areas = np.concatenate([np.repeat(pieces.areas[k] / 3, 3), pieces.areas[inside]])
+    found, patch = np.unique(keys, return_inverse=True)
+    weights = np.bincount(patch, weights=areas)
+    real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # and not fans that cancel outside a polygon
+    n_on = len(at_vertices)
+    columns = np.concatenate([at_vertices, corners[inside].ravel()])
+    entries = np.concatenate([areas[:n_on], (areas[n_on:, None] * pieces.barycentric[inside]).ravel()])
+    index = np.concatenate([patch[:n_on], np.repeat(patch[n_on:], 4)])
+    rows = sparse.csr_matrix(
+        (entries / np.where(real, weights, 1)[index], (index, columns)), shape=(len(found), n_unknowns)
+    )
+    rows.eliminate_zeros()
+    return rows[real], weights[real], found[real] // n_unknowns
+
+
+def _on_whole_faces(mesh: TetMesh, pieces: Pieces, components: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which pieces lie in faces that their component covers."""
+    on = pieces.in_face >= 0
+    covered = np.zeros(len(on), dtype=bool)
+    if on.any():
+        n_faces = len(mesh.faces.vertices)
+        face = mesh.faces.of_tets[pieces.tets[on], pieces.in_face[on]]
+        _, which = np.unique(components[on] * n_faces + face, return_inverse=True)
+        area = np.linalg.norm(mesh.geometry.area_vectors[pieces.tets[on], pieces.in_face[on]], axis=1)
+        covered[on] = np.bincount(which, weights=pieces.areas[on])[which] >= WHOLE * area
+    return covered
+
+
+def _box(mesh: TetMesh) -> str:
+    return " × ".join(f"[{a:.4g}, {b:.4g}]" for a, b in mesh.bounds.T)
