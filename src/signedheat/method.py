@@ -5,6 +5,7 @@ Diffuse the source normals for a short time; normalise; integrate.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,13 @@ from .discretization import Discretization, SourceTerm
 def diffuse(discretization: Discretization, source: SourceTerm) -> Any:
     """Step 1, Eq. 12: ``(M + tL) X = X₀``."""
     return discretization.diffuse(source)
+
+
+def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) -> Sequence[Any]:
+    """Step 1 for each of several sources; at once, where the discretisation can."""
+    if hasattr(discretization, "diffuse_many"):
+        return discretization.diffuse_many(sources)
+    return [diffuse(discretization, source) for source in sources]
 
 
 def normalize(discretization: Discretization, vectors: Any) -> NDArray[Any]:

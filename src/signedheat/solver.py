@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -15,9 +17,11 @@ import numpy as np
 from .constraints import Constraint, ZeroSet
 from .discretization import Diagnostics, Discretization, discretize
 from .errors import SourceError
-from .method import diffuse, integrate, normalize
+from .method import diffuse, diffuse_many, integrate, normalize
 
 logger = logging.getLogger("signedheat")
+
+_BATCH = 16  # sources diffused at a time
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done, from 0 to 1, and the name of the step that begins."""
@@ -105,6 +109,40 @@ class SignedHeatSolver:
             values = integrate(discretization, directions, source, constraint)
         diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time)
         return discretization.field(values, source, diagnostics)
+
+    def distance_many(self, sources: Sequence[Any], constraint: Constraint | None = None) -> list[Any]:
+        """Signed distance to each of several sources on its own; cheaper than one after the other.
+
+        Parameters
+        ----------
+        sources : sequence
+            Each entry is what `distance` takes.
+        constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
+            Imposed on every one; `ZeroSet` by default. `Free` shares most work.
+
+        Returns
+        -------
+        list of VertexField, GridField or TetField
+            What `distance` gives for each, up to rounding. Timings are those of each source's share.
+        """
+        constraint = ZeroSet() if constraint is None else constraint
+        fields: list[Any] = []
+        for begin in range(0, len(sources), _BATCH):
+            batch = []
+            for entry in sources[begin : begin + _BATCH]:
+                discretization, adapted = self.discretization.adapt(as_list(entry))
+                batch.append((discretization, discretization.lower(adapted, self.diffusion)))
+            for discretization, run in groupby(batch, key=itemgetter(0)):
+                lowered = [source for _, source in run]
+                stopwatch = Stopwatch(None, steps=1)
+                with stopwatch("diffuse"):
+                    solved = diffuse_many(discretization, lowered)
+                for source, vectors in zip(lowered, solved, strict=True):
+                    values = integrate(discretization, normalize(discretization, vectors), source, constraint)
+                    seconds = {"diffuse": stopwatch.seconds["diffuse"] / len(lowered)}
+                    diagnostics = Diagnostics(timings=seconds, time=source.time)
+                    fields.append(discretization.field(values, source, diagnostics))
+        return fields
 
 
 def as_list(sources: Any) -> list[Any]:

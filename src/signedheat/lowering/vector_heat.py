@@ -15,7 +15,6 @@ from ..operators.crouzeix_raviart import vector_heat_matrix
 from ..operators.laid_out_triangles import LaidOutTriangles
 
 _FAINT = 2.0**-800  # of the largest X: below, what underflows in the factor or on the way may be missing
-_BATCH = 16  # right-hand sides solved at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +61,9 @@ class VectorHeat:
 
     def solve(self, sources: Sequence[NDArray[np.complex128]]) -> list[list[NDArray[np.complex128]]]:
         """X for each X₀, in stages: each is known up to a factor of its own, and NaN nearer than where it begins."""
-        solved: list[list[NDArray[np.complex128]]] = []
-        for begin in range(0, len(sources), _BATCH):
-            starts = [self._raised(vectors) for vectors in sources[begin : begin + _BATCH]]
-            together = self._solve(np.stack(starts, axis=1))
-            solved += [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
-        return solved
+        starts = [self._raised(vectors) for vectors in sources]
+        together = self._solve(np.stack(starts, axis=1))
+        return [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
 
     def _carried_on(self, start: NDArray[np.complex128], near: NDArray[np.complex128]) -> list[NDArray[np.complex128]]:
         stages = [near]
