@@ -27,7 +27,7 @@ from ..operators.mollification import mollify
 from ..sources.carrying import Embedding, carry_pieces
 from ..sources.pieces import Pieces, in_pieces, pieces
 
-MARGIN = 1e-12
+MARGIN = 1e-14
 """Triangle inequalities hold at least by this fraction of the mean length; flat triangles are thickened to it."""
 
 LARGEST_ANGLE = 30.0

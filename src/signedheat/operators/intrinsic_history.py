@@ -127,5 +127,6 @@ def straight(
     owners = np.where(against, -1 - owners, owners)
     begin, finish = np.where(against[:, None], ends, starts), np.where(against[:, None], starts, ends)
     position = np.where(against, -1 - np.arange(count), np.arange(count))
+    vectors[:, 0] *= 2.0
     order = np.lexsort([position, owners])
     return Lines(owners[order], faces[order], begin[order], finish[order], vectors[order])
