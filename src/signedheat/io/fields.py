@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError
 from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
 from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
+from .tets import TET_FIELD_FORMATS, load_tet_field
 from .vtk_xml import read_vti, write_vti
 
 CONVENTION = (
@@ -75,18 +77,18 @@ def ensure_field_writable(path: PathLike) -> None:
         _openvdb(path)
 
 
-def load_field(path: PathLike) -> GridField:
+def load_field(path: PathLike) -> GridField | TetField:
     """Read a field that `save_field` wrote, exactly as it was: values and transform.
 
     Parameters
     ----------
     path : str or path
         A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file. Images of other programs will
-        do if their axes are x, y, z.
+        do if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file holds a field on tets.
 
     Returns
     -------
-    GridField
+    GridField or TetField
         The field; its diagnostics are empty.
 
     Raises
@@ -103,6 +105,8 @@ def load_field(path: PathLike) -> GridField:
     ...     bool((load_field(f"{folder}/phi.vti").values == phi.values).all())
     True
     """
+    if extension(path) in TET_FIELD_FORMATS:
+        return load_tet_field(path)
     if extension(path) not in _FORMATS:
         raise unknown_extension(path, _FORMATS, "a field")
     _, read = _FORMATS[extension(path)]

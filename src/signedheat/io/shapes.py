@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
 from .files import PathLike, extension, replacing, unknown_extension
 from .glb import read_glb
@@ -12,6 +13,8 @@ from .obj import read_obj, write_obj, write_pc
 from .off import read_off, write_off
 from .ply import read_ply, write_ply
 from .stl import read_stl, write_stl
+from .tets import MODULES as TET_FORMATS
+from .tets import read_tets, write_tets
 from .volumes import read_volume
 from .vtk_xml import read_vtp, write_vtp
 from .xyz import read_xyz, write_xyz
@@ -29,6 +32,7 @@ READERS: dict[str, Callable[[PathLike], Any]] = {
     ".vti": read_volume,
     ".vtp": read_vtp,
     ".xyz": read_xyz,
+    **dict.fromkeys(TET_FORMATS, read_tets),
 }
 
 WRITERS: dict[str, Callable[[Any, PathLike], bytes]] = {
@@ -50,7 +54,7 @@ def read(path: PathLike) -> Any:
     STL, OBJ, PLY, OFF, VTP and GLB hold surfaces; PLY, XYZ, PC, OBJ, OFF and VTP without faces hold points. Vertices
     and faces keep their number and order, whatever is wrong with them: nothing is merged, dropped, split or turned.
     In STL, which knows no vertices, corners with the same coordinates to the last bit are one vertex. NPY, NRRD and VTI
-    hold volumes of voxels, boolean or of zeros and ones.
+    hold volumes of voxels, boolean or of zeros and ones. MESH, MSH, VTU, VTK and TetGen's NODE with ELE hold tets.
 
     Parameters
     ----------
@@ -59,7 +63,7 @@ def read(path: PathLike) -> Any:
 
     Returns
     -------
-    TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
+    TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
         A triangle mesh if every face is a triangle, a polygon mesh if not, a point cloud if there is no face; of a
         volume, the boundary of its voxels.
 
@@ -95,7 +99,7 @@ def save(shape: Any, path: PathLike) -> None:
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh or PointCloud
+    shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh
         What to write.
     path : str or path
         Where to.
@@ -105,6 +109,8 @@ def save(shape: Any, path: PathLike) -> None:
     FileFormatError
         If the format is unknown, cannot hold this kind of shape, or the file cannot be written.
     """
+    if isinstance(shape, TetMesh):
+        return write_tets(shape, path)
     writer = WRITERS.get(extension(path))
     if writer is None:
         raise unknown_extension(path, WRITERS, "a shape")
