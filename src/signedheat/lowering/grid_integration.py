@@ -130,7 +130,7 @@ def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray
 
     touched = np.unique(source.rows.indices)
     change = np.zeros(source.grid.n_nodes)
-    change[touched] = lsqr(source.rows[:, touched], values, atol=1e-13, btol=1e-13, iter_lim=20000)[0]
+    change[touched] = lsqr(source.rows[:, touched], values, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
     return change
 
 

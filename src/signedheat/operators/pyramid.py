@@ -27,8 +27,12 @@ MARGIN = 3
 """Lines at the rim of the band that take their values from the coarser level."""
 COARSEST = 32
 """A grid with no more nodes than this along any axis is not coarsened."""
+FEW = 4
+"""Axes with no more nodes than this are not halved."""
 ROUNDS = 2
-"""How often each combination of directions is swept."""
+"""How often each combination of directions is swept within a band."""
+ROUNDS_EVERYWHERE = 12
+"""The same on the coarsest grid, where paths from the source are longer, and sweeps cost nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +76,7 @@ class Level:
     inside : (l₀, l₁, l₂, stretches) bool, or None
         Stretches whose values hold; elsewhere the coarser level's do.
     factors : (4,) int
-        Cells of this grid per cell of the next coarser one, along each axis.
+        What `coarsening` says of the next coarser grid.
     """
 
     vectors: NDArray[np.float32] | None
@@ -106,13 +110,24 @@ def diffuse_on_pyramid(sources: NodeSources, time: Callable[[float], float], fin
 
 
 def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(4,) 2 along the axes that the next coarser grid halves, else 1: the finest axes first, down to a small grid."""
+    """(4,) cells per cell of the next coarser grid: 2 along its finest axes, more than an axis has to make it one node.
+
+    An axis is made one node where it has few and its whole length is below the spacing along the others.
+
+    Examples
+    --------
+    >>> coarsening((1, 64, 64, 3), np.array([0.0, 1.0, 1.0, 0.5])).tolist()
+    [1, 2, 2, 4]
+    """
     counts = np.array(shape)
-    if counts.max() <= COARSEST:
-        return np.ones(4, dtype=np.int64)
-    wide = counts > 4
-    least = steps[wide].min()
-    return np.where(wide & (steps < 1.5 * least), 2, 1)
+    factors = np.ones(4, dtype=np.int64)
+    wide = counts > FEW
+    if counts.max() > COARSEST:
+        least = steps[wide].min()
+        factors[wide & (steps < 1.5 * least)] = 2
+        short = (counts > 1) & ~wide & ((counts - 1) * steps <= least)
+        factors[short] = counts[short] + 1
+    return factors
 
 
 def _diffuse_level(
@@ -127,7 +142,7 @@ def _diffuse_level(
         width = np.ceil(BAND * np.sqrt(ratios)).astype(int)
         active = _dilated(sources.touched, width)
         inside = _dilated(sources.touched, np.maximum(width - MARGIN, 0))
-    vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, ROUNDS)
+    vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, ROUNDS_EVERYWHERE if last else ROUNDS)
     return Level(vectors, inside, factors)
 
 
@@ -143,8 +158,10 @@ def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bo
 
 
 def _restricted(sources: NodeSources, factors: NDArray[np.int64]) -> NodeSources:
-    shape = tuple(int(n // 2 + 1) if f == 2 else int(n) for n, f in zip(sources.shape, factors, strict=True))
-    coarse = NodeSources.empty(shape, sources.steps * factors)
+    counts = np.array(sources.shape)
+    shape = np.where(factors == 2, counts // 2 + 1, np.where(factors == 1, counts, 1))
+    steps = np.where(shape > 1, sources.steps * factors, 0.0)
+    coarse = NodeSources.empty(tuple(int(n) for n in shape), steps)
     _restrict(sources.sums, sources.touched, factors, coarse.sums, coarse.touched)
     return coarse
 
@@ -227,7 +244,7 @@ def _restrict(sums, touched, factors, coarse, coarse_touched):
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
 def _interpolate(coarse, factors, out, axis, start, stop):
-    """Values of a coarser grid at all nodes, linear along every axis that was coarsened."""
+    """Values of a coarser grid at all nodes, linear along every axis that was halved."""
     _, n0, n1, n2, n = out.shape
     row = np.empty(coarse.shape[4], dtype=np.float32)
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
@@ -251,6 +268,8 @@ def _interpolate(coarse, factors, out, axis, start, stop):
                     into = out[q, i, j, k]
                     if factors[3] == 1:
                         into[:] = row
+                    elif factors[3] > 2:
+                        into[:] = row[0]
                     else:
                         for m in range((n + 1) // 2):
                             into[2 * m] = row[m]

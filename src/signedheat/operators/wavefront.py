@@ -27,7 +27,7 @@ def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int
     A tile is (begin, end, step) for each of the first three axes of `shape`.
     """
     steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
-    size = [max(1, min(32, -(-n // 8))) for n in shape[1:3]]
+    size = [max(8, min(32, -(-n // 8))) for n in shape[1:3]]
     with ThreadPoolExecutor(n_threads()) as pool:
         for direction in list(product(*steps)) * rounds:
             for plane in range(shape[0])[:: direction[0]]:
