@@ -52,10 +52,8 @@ class Pieces:
 
     @property
     def fits(self) -> bool:
-        """Whether the triangles can hold it: oriented, or on edges and vertices alone."""
-        if len(self.ends) == 0:
-            return bool((self.nodes.kinds == VERTEX).all())
-        return self.oriented or bool((self.nodes.kinds == VERTEX).all() and (self.edges >= 0).all())
+        """Whether the triangles can hold it: all but unoriented curves that leave the edges."""
+        return self.oriented or bool((self.nodes.kinds[self.ends] == VERTEX).all() and (self.edges >= 0).all())
 
 
 @singledispatch

@@ -15,7 +15,7 @@ from ..errors import SourceError
 from ..operators.laid_out_triangles import LaidOutTriangles
 from .free_ends import free_end_arcs
 from .pieces import Pieces, in_pieces, rows_of
-from .places import FACE, VERTEX, chained, distinct
+from .places import FACE, VERTEX, Places, chained, distinct, places_at, star
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +67,8 @@ def surface_source(
     triangles : LaidOutTriangles
         The surface; face ids of the sources refer to it.
     sources : sequence of Curve, SurfacePoints, Pieces or sequences of them
-        What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges and
-        points must lie at vertices (`embedding.embed` brings them there).
+        What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges
+        (`embedding.embed` brings them there).
     diffusion : float
         τ in ``t = τ h²``.
     spacing : float
@@ -94,10 +94,15 @@ def surface_source(
     if not parts or not all(groups):
         raise SourceError("there is no source: pass at least one curve or point, and no empty lists")
     if not all(part.fits for part in parts):
-        raise SourceError("points and unoriented curves inside faces must be embedded in the triangles first")
+        raise SourceError("unoriented curves inside faces must be embedded in the triangles first")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
     vectors += unoriented_vectors(triangles, parts, spacing)
-    vectors += spacing * point_vectors(triangles, [p for p in parts if len(p.ends) == 0])
+    points = [p.nodes for p in parts if len(p.ends) == 0]
+    if points:
+        nodes = chained(points)
+        at_vertex = nodes.kinds == VERTEX
+        vectors += spacing * vertex_point_vectors(triangles, nodes.elements[at_vertex])
+        vectors += np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
 
     components = connected(parts)
     outside = np.concatenate([p.nodes.kinds != FACE for p in parts])
@@ -156,15 +161,11 @@ def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces], spa
     return sums + from_faces(triangles, faces, arcs)
 
 
-def point_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> NDArray[np.complex128]:
+def vertex_point_vectors(triangles: LaidOutTriangles, vertices: NDArray[np.int64]) -> NDArray[np.complex128]:
     """App. A.1, Eq. 19: round vertex i, the corner of angle α gets i d (1 − e^{iα}) / Θ.
 
     d is the direction of the first edge that leaves the corner, counter-clockwise, and Θ the total angle at the vertex.
     """
-    sums = np.zeros(triangles.n_edges, dtype=np.complex128)
-    if not parts:
-        return sums
-    vertices = np.concatenate([p.nodes.elements for p in parts])
     marked = np.zeros(triangles.n_vertices, dtype=bool)
     marked[vertices] = True
     faces, corners = np.nonzero(marked[triangles.corner_vertices])
@@ -175,6 +176,26 @@ def point_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> NDArr
     total = np.bincount(owners, weights=angles, minlength=triangles.n_vertices)[owners]
     round_corner = 1j * (leaving / np.abs(leaving)) * (1 - np.exp(1j * angles)) / total
     return from_faces(triangles, faces, round_corner)
+
+
+def inner_point_vectors(triangles: LaidOutTriangles, places: Places) -> NDArray[np.complex128]:
+    """Points on edges and inside faces: −∇δ tested with the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
+
+    Diffused, this is minus the gradient of the heat kernel, which points away from p in all directions alike, whatever
+    the shape of the faces: on each, ``Σ_e ∇ψ_e = 0`` and ``Σ_e ∇ψ_e x_eᵀ`` is the identity. ∇ψ_e, constant on faces, is
+    averaged over those around each vertex and interpolated at p. A point at a vertex of equilateral triangles weighs
+    √3 h times what Eq. 19 gives it.
+    """
+    corner = np.argwhere(places.barycentric > 0)
+    vertices = triangles.corner_vertices[places.faces[corner[:, 0]], corner[:, 1]]
+    which, faces = star(triangles, places_at(triangles, vertices))
+    areas = triangles.face_areas[faces]
+    share = areas / np.bincount(which, areas, len(vertices))[which]
+    share = share * places.barycentric[corner[:, 0], corner[:, 1]][which]
+    outward = -1j * triangles.edge_vectors[faces] * (share / areas)[:, None]
+    turned = np.conj(triangles.edge_directions[faces]) * outward
+    turned = np.where(triangles.reflected[faces], np.conj(turned), turned)
+    return scatter(triangles.n_edges, triangles.edges.of_faces[faces], turned)
 
 
 def in_frames(

@@ -179,27 +179,40 @@ def other_way(edge_of, forward, around, left, entered, tails, heads, bend, point
         first -= 1
     while last + 1 < len(left) and (tails[last + 1] == point or heads[last + 1] == point):
         last += 1
-    goal = entered[last] // 3
-    new_left, new_entered = left[:first], entered[:first]
-    h, at_tail = left[first], tails[first] == point
-    for _ in range(len(sides)):
-        # the other side of this face at the vertex
-        h = h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
-        at_tail = not at_tail
+    goal, h, at_tail = entered[last] // 3, left[first], tails[first] == point
+    # turn round the vertex in all ways there are, breadth first: sides through which faces are left, and entered
+    out, into, before = [turned(h, at_tail)], [h], [-1]
+    tail_there = [not at_tail]
+    k = 0
+    while k < len(out):
+        h = out[k]
         e = edge_of[h]
-        if begin[e + 1] - begin[e] != 2:
-            break
-        across = sides[begin[e]] if sides[begin[e]] != h else sides[begin[e] + 1]
-        new_left.append(h)
-        new_entered.append(across)
-        if forward[h] != forward[across]:
-            at_tail = not at_tail
-        h = across
-        if h // 3 == goal:
-            return new_left + left[last + 1 :], new_entered + entered[last + 1 :]
-        if h // 3 == left[first] // 3:
-            break
+        for across in sides[begin[e] : begin[e + 1]]:
+            if across // 3 == h // 3 or across in into or across in left[first : last + 1]:
+                continue
+            if across // 3 == goal:
+                new_left, new_entered = [h], [across]
+                while before[k] >= 0:
+                    new_entered.append(into[k])
+                    k = before[k]
+                    new_left.append(out[k])
+                return (
+                    left[:first] + new_left[::-1] + left[last + 1 :],
+                    entered[:first] + new_entered[::-1] + entered[last + 1 :],
+                )
+            at_tail = tail_there[k] == (forward[h] == forward[across])
+            out.append(turned(across, at_tail))
+            into.append(across)
+            before.append(k)
+            tail_there.append(not at_tail)
+        k += 1
     return left[:0], entered[:0]
+
+
+@njit(cache=True)
+def turned(h, at_tail):
+    """The other side of a face at the tail of a side, or at its head."""
+    return h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
 
 
 @njit(cache=True)
