@@ -101,10 +101,13 @@ class PointCloud(Exchangeable, Surface):
 
     @cached_property
     def representatives(self) -> NDArray[np.int64]:
-        """(n,) first point at the same place as each point."""
-        order = np.lexsort(self.points.T[::-1])
+        """(n,) first point at the same place as each point, to a ten-millionth of the size of the cloud."""
+        lower, upper = self.bounds
+        cell = 1e-7 * max(float((upper - lower).max()), np.finfo(float).tiny)
+        cells = np.rint((self.points - lower) / cell)
+        order = np.lexsort(cells.T[::-1])
         first = np.ones(self.n_points, dtype=bool)
-        first[1:] = (self.points[order[1:]] != self.points[order[:-1]]).any(axis=1)
+        first[1:] = (cells[order[1:]] != cells[order[:-1]]).any(axis=1)
         owner = np.empty(self.n_points, dtype=np.int64)
         owner[order] = order[first][np.cumsum(first) - 1]  # lexsort is stable: the first of each is its least id
         return frozen(owner)

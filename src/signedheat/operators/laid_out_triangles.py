@@ -85,6 +85,13 @@ class LaidOutTriangles:
         """(m, 3) lengths of `edge_vectors`."""
         return np.abs(self.edge_vectors)
 
+    @property
+    def agree_on_lengths(self) -> bool:
+        """Whether all faces of every edge give it the same length; flattened voxel faces do not."""
+        of_edges = np.empty(self.n_edges)
+        of_edges[self.edges.of_faces] = self.edge_lengths
+        return bool(np.allclose(of_edges[self.edges.of_faces], self.edge_lengths, rtol=1e-6, atol=0))
+
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
         """(m,) areas."""

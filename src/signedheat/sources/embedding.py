@@ -344,7 +344,12 @@ def places_of(
 
 
 def flipped(triangles: LaidOutTriangles, union: Union, is_new: NDArray[np.bool_]) -> tuple[LaidOutTriangles, Union]:
-    """Flip edges of new faces to Delaunay, but for those that carry a piece or bound a face with one inside."""
+    """Flip edges of new faces to Delaunay, but for those that carry a piece or bound a face with one inside.
+
+    Where faces do not agree on the lengths of their edges, none can be flipped.
+    """
+    if not triangles.agree_on_lengths:
+        return triangles, union
     on_edge = union.edges >= 0
     fixed = np.ones(triangles.n_edges, dtype=bool)
     fixed[triangles.edges.of_faces[is_new]] = False
