@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import potpourri3d as pp3d
 import pytest
 from surface_cases import book, flipped, laid_out, positions, sphere, square
 
 import signedheat as sh
-from signedheat.method import normalize
 from signedheat.sources.embedding import embed
 from signedheat.sources.pieces import in_pieces, pieces
 from signedheat.sources.places import locate
@@ -58,14 +55,6 @@ def test_oriented_curves_across_faces_match_the_published_code():
     ref = peer_solver.compute_distance([[*nodes, nodes[0]]], level_set_constraint="None")
     phi = sh.SignedHeatSolver(mesh).distance(curve, sh.Free()).values
     assert np.abs(phi - ref).max() < 1e-10 * np.ptp(ref)
-
-    # the published soft constraint counts nodes instead of lengths, the first of a closed curve twice
-    ref = peer_solver.compute_distance([[*nodes, nodes[0]]], [], [], False, "Soft", 10.0)
-    discretization = sh.SignedHeatSolver(mesh).discretization
-    source = discretization.lower([curve], 1.0)
-    flux = discretization.divergence(normalize(discretization, discretization.diffuse(source)))
-    counted = replace(source, weights=np.where(np.arange(len(source.weights)) == 0, 2.0, 1.0))
-    assert np.abs(discretization.integration.penalize(flux, counted, 10.0) - ref).max() < 1e-9 * np.ptp(ref)
 
 
 def test_points_match_the_published_code():
