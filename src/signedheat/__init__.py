@@ -6,6 +6,7 @@ from .domains.digital_surface import DigitalSurface
 from .domains.grid import Grid
 from .domains.point_cloud import PointCloud
 from .domains.polygon_mesh import PolygonMesh
+from .domains.polyline import Polyline
 from .domains.tet_mesh import TetMesh
 from .domains.triangle_mesh import TriangleMesh
 from .errors import (
@@ -38,6 +39,7 @@ from .lowering import polygons as _polygons  # noqa: F401  registers the lowerin
 from .lowering import surface as _surface  # noqa: F401  registers the lowering
 from .lowering import tets as _tets  # noqa: F401  registers the lowering
 from .solver import SignedHeatSolver, signed_distance
+from .sources import polylines as _polylines  # noqa: F401  registers the source
 from .sources.curves import Curve, SurfacePoints
 
 __version__ = "0.1.0"
@@ -61,6 +63,7 @@ __all__ = [
     "PiecewiseField",
     "PointCloud",
     "PolygonMesh",
+    "Polyline",
     "SignedHeatError",
     "SignedHeatSolver",
     "Soft",

@@ -1,0 +1,92 @@
+"""Polylines in the plane: what distance is measured to on a grid of two dimensions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError
+from .validation import finite_rows
+
+
+@dataclass(frozen=True, eq=False)
+class Polyline:
+    """Points in the plane, joined in order by straight segments. φ is positive to the left.
+
+    So a closed polyline that runs clockwise has φ < 0 inside, like a shape whose normals point outwards.
+
+    Parameters
+    ----------
+    points : (n, 2) float
+        Positions. Points may coincide and segments may cross one another.
+    closed : bool
+        Whether a last segment leads back to the first point, which is not repeated: where it is, it counts once.
+
+    Raises
+    ------
+    GeometryError
+        If a coordinate is NaN or infinite, or the points are fewer than two or all the same.
+
+    Examples
+    --------
+    >>> square = Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
+    >>> square.length, square.signed_area
+    (4.0, -1.0)
+    """
+
+    points: NDArray[np.float64]
+    closed: bool
+
+    def __init__(self, points: ArrayLike, closed: bool = False) -> None:
+        positions = finite_rows(points, "points", 2)
+        if closed and len(positions) > 2 and (positions[0] == positions[-1]).all():
+            positions = finite_rows(positions[:-1], "points", 2)
+        if len(positions) < 2:
+            raise GeometryError(f"a polyline needs at least 2 points, not {len(positions)}")
+        if (positions == positions[0]).all():
+            raise GeometryError(f"the polyline has no length: its {len(positions)} points are the same")
+        object.__setattr__(self, "points", positions)
+        object.__setattr__(self, "closed", bool(closed))
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 2) lower and upper corner of the box around the points."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
+    @cached_property
+    def segments(self) -> NDArray[np.float64]:
+        """(m, 2, 2) both ends of every segment."""
+        ends = np.roll(self.points, -1, axis=0)
+        count = self.n_points if self.closed else self.n_points - 1
+        return np.stack([self.points[:count], ends[:count]], axis=1)
+
+    @cached_property
+    def segment_lengths(self) -> NDArray[np.float64]:
+        """(m,) lengths."""
+        return np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
+
+    @property
+    def length(self) -> float:
+        """Sum of the lengths of all segments."""
+        return float(self.segment_lengths.sum())
+
+    @property
+    def signed_area(self) -> float:
+        """Area around which a closed polyline runs, positive where it runs counter-clockwise."""
+        x, y = np.moveaxis(self.segments - self.points[0], -1, 0)
+        return float(0.5 * (x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
+
+    def reversed(self) -> Polyline:
+        """The same points in opposite order, so that φ changes its sign."""
+        return Polyline(self.points[::-1], self.closed)
+
+    def __repr__(self) -> str:
+        return f"Polyline({self.n_points} points, {'closed' if self.closed else 'open'})"
