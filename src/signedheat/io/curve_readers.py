@@ -121,6 +121,8 @@ def strands(path: PathLike, kind: str, nodes: list[Node], segments: Sequence[tup
         raise FileFormatError(
             f"{path}: segment {list(bad[0])} names a node that does not exist: there are {len(nodes)}"
         )
+    if not len(segments):
+        return []
     consecutive = [(k, k + 1) for k in range(len(nodes) - 1)]
     if list(segments) in (consecutive, [*consecutive, (len(nodes) - 1, 0)]):
         order = [*range(len(nodes))] + [0] * (len(segments) == len(nodes))

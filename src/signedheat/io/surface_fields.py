@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -49,9 +50,9 @@ def load_vertex_field(path: PathLike) -> VertexField:
             domain = PointCloud(vertices, arrays.get("normals"))
     except KeyError as error:
         raise FileFormatError(f"{path}: {error}: a field on a surface has values and vertices") from error
-    except (ValueError, OSError, EOFError) as error:
-        if isinstance(error, FileFormatError):
-            raise
+    except FileFormatError:
+        raise
+    except (ValueError, OSError, EOFError, BadZipFile) as error:
         raise FileFormatError(f"{path}: it is no .npz file, or is damaged ({error}): write it again") from error
     if values.shape != (len(vertices),):
         raise FileFormatError(f"{path}: {values.shape} values for {len(vertices)} vertices: the file is damaged")
