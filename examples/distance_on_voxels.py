@@ -1,0 +1,37 @@
+"""A ball of voxels: with corrected normals the staircase measures as the smooth sphere does, as it is, far too long."""
+
+from pathlib import Path
+
+import numpy as np
+
+import signedheat as sh
+from signedheat import surface_pictures
+
+EXPECTED = (0.0, 0.01)
+"""Error at the pole with corrected normals, as a part of the distance."""
+
+
+def main(folder: Path) -> float:
+    """Write a picture; return the relative error at the pole."""
+    index = np.stack(np.indices((60, 60, 60)), axis=-1)
+    volume = np.linalg.norm(index - [29.4, 29.6, 29.3], axis=-1) < 27
+    axis = np.array([0.3, 0.2, 0.9]) / np.linalg.norm([0.3, 0.2, 0.9])
+
+    errors = []
+    for radius in (None, 0.0):  # corrected normals, and each face's own
+        surface = sh.DigitalSurface(volume, spacing=1 / 27, radius=radius)
+        center = np.array([29.4, 29.6, 29.3]) / 27
+        along = (surface.vertices - center) @ axis / np.linalg.norm(surface.vertices - center, axis=1)
+        circle = surface.level_set(along, 0.3)
+
+        phi = sh.SignedHeatSolver(surface).distance(circle)
+
+        errors.append(float(phi.values[np.argmax(along)] / (np.pi / 2 - np.arcsin(0.3)) - 1))
+        if radius is None:
+            surface_pictures.save_surface(phi, folder / "distance_on_voxels.png", circle)
+    print(f"error with corrected normals {errors[0]:+.2%}, without {errors[1]:+.2%}")
+    return errors[0]
+
+
+if __name__ == "__main__":
+    main(Path("."))
