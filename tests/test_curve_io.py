@@ -127,7 +127,8 @@ def test_damaged_text_is_refused_with_file_and_line(content, error, message, tmp
         ("[]", sh.FileFormatError),
         ('{"groups": [{"kind": "curve", "nodes": [], "segments": []}]}', sh.FileFormatError),
         (
-            '{"groups": [{"kind": "signed_curve", "nodes": [{"v": [0, 15], "w": [0.5, 0.5]}], "segments": []}]}',
+            '{"groups": [{"kind": "signed_curve", "segments": [[0, 1]], '
+            '"nodes": [{"v": [0, 15], "w": [0.5, 0.5]}, {"v": [1], "w": [1]}]}]}',
             sh.SourceError,
         ),
         (
