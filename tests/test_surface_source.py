@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import potpourri3d as pp3d
 import pytest
-from surface_cases import book, flipped, laid_out, positions, sphere, square
+from surface_cases import band, book, flipped, laid_out, positions, sphere, square
 
 import signedheat as sh
 from signedheat.sources.embedding import embed
@@ -275,3 +275,47 @@ def test_an_oriented_curve_that_meets_an_embedded_one_is_the_same_curve():
     assert together.diagnostics.notes["vertices added for sources"] > 10  # the whole curve was embedded
     left = mesh.vertices[:, 0] < 0
     assert np.abs(together.values - alone)[left].max() < 0.06
+
+
+@pytest.mark.parametrize("mesh", [band(40, 6, twisted=True), sphere(3)], ids=["Moebius strip", "sphere"])
+def test_faces_turned_over_change_nothing_for_embedded_curves_and_points(mesh):
+    centers = mesh.vertices[mesh.faces].mean(axis=1)
+    near = centers[np.argsort(np.linalg.norm(centers - centers[17], axis=1))]
+    unoriented, oriented = mesh.polyline(near[[0, 40, 90]], oriented=False), mesh.polyline(near[[20, 60]])
+    step, up = np.diff(positions(mesh, oriented), axis=0), mesh.face_area_vectors[oriented.faces[:-1]]
+    left = np.cross(up / np.linalg.norm(up, axis=1, keepdims=True), step)
+
+    def found(m):
+        def moved(source):
+            corners = (mesh.faces[source.faces][:, None] == m.faces[source.faces][:, :, None]).argmax(axis=2)
+            return np.take_along_axis(source.barycentric, corners, axis=1)
+
+        solver = sh.SignedHeatSolver(m)
+        curve = sh.Curve(unoriented.faces, moved(unoriented), oriented=False)
+        across = sh.Curve(oriented.faces, moved(oriented), normals=left)
+        points = sh.SurfacePoints(oriented.faces[3:5], moved(oriented)[3:5])
+        return [solver.distance(sources).values for sources in (curve, [curve, across], points)]
+
+    reference = found(mesh)
+    for seed in (0, 1):
+        for ours, phi in zip(found(flipped(mesh, 0.4, seed)), reference, strict=True):
+            assert np.abs(ours - phi).max() < 1e-11
+
+
+def test_moving_scaling_and_renumbering_change_nothing():
+    mesh = square(14, 0.25)
+    line = mesh.polyline([[-0.7, -0.61, 0], [0.5, 0.43, 0]], oriented=False)
+    loop = mesh.level_set(np.hypot(mesh.vertices[:, 0] - 0.3, mesh.vertices[:, 1] + 0.4), 0.35)[0]
+    reference = sh.SignedHeatSolver(mesh).distance([line, loop]).values
+    rng = np.random.default_rng(0)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    moved = sh.TriangleMesh(7 * mesh.vertices @ turn.T + [3, -5, 2], mesh.faces)
+    assert np.abs(sh.SignedHeatSolver(moved).distance([line, loop]).values / 7 - reference).max() < 1e-9
+
+    vertices, faces = rng.permutation(mesh.n_vertices), rng.permutation(mesh.n_faces)
+    new_vertex, new_face = np.argsort(vertices), np.argsort(faces)
+    shuffled = sh.TriangleMesh(mesh.vertices[vertices], new_vertex[mesh.faces][faces])
+    sources = [sh.Curve(new_face[c.faces], c.barycentric, c.closed, c.oriented) for c in (line, loop)]
+    phi = sh.SignedHeatSolver(shuffled).distance(sources).values
+    assert np.abs(phi[new_vertex] - reference).max() < 1e-9
