@@ -27,6 +27,7 @@ from .extensions.morphology import closing, dilate, erode, opening, shell, thick
 from .extensions.piecewise import piecewise_distance
 from .extensions.sharpening import sharpen
 from .extensions.tetrahedralize import tetrahedralize
+from .extensions.vertex_sharpening import Convex, Geodesic
 from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField
 from .fields.tet_field import TetField
@@ -46,6 +47,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ConstraintError",
+    "Convex",
     "Curve",
     "Diagnostics",
     "DigitalSurface",
@@ -53,6 +55,7 @@ __all__ = [
     "FactorizationError",
     "FileFormatError",
     "Free",
+    "Geodesic",
     "GeometryError",
     "Grid",
     "GridField",

@@ -12,12 +12,16 @@ def sharpen(field: Any, **options: Any) -> Any:
 
     On grids: the distance of every node to the zero set of the field, second order, with the field's signs.
 
+    On surfaces: the same along straight lines across the faces (`Geodesic`, the default), exact on the polyhedron up to
+    ``tolerance``; or ``method=Convex()``, which is less accurate but mends wrong signs. Where the curve is smooth and
+    the triangles are good, as for a circle at ``t = h²``, there is little to gain but in the largest errors.
+
     Parameters
     ----------
     field : GridField or VertexField
         What `signed_distance` or `SignedHeatSolver.distance` returned.
     **options
-        Those of the kind of field.
+        Those of the kind of field; on surfaces `method` and `progress`.
 
     Returns
     -------
@@ -28,7 +32,7 @@ def sharpen(field: Any, **options: Any) -> Any:
     TypeError
         If this kind of field cannot be sharpened.
     OutsideError
-        If a grid field has one sign everywhere.
+        If a field has one sign everywhere.
 
     Examples
     --------
