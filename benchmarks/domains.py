@@ -1,0 +1,177 @@
+"""Every surface domain beside its peer, on shapes with a known answer: time, memory, error, in one run.
+
+    python benchmarks/domains.py [--sizes 4000 16000 64000]
+
+Polygons and points: potpourri3d. Voxels have no peer: without corrected normals is the comparison. Every measurement
+runs in a process of its own, so that its peak memory is its own; numba kernels are compiled before any clock starts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+import domain_cases as cases
+
+HEIGHT = 0.3
+TILT = np.array([0.3, 0.2, 0.9]) / np.linalg.norm([0.3, 0.2, 0.9])
+
+
+def globe(size: int) -> tuple:
+    """Sphere in quads; the parallel nearest to 30° north; distance to it."""
+    n = 6 * round(np.sqrt(size / 2) / 6)
+    vertices, polygons = cases.globe(n)
+    ring = np.arange(2 * n) + (n // 3 - 1) * 2 * n
+    return vertices, polygons, ring, np.arcsin(np.clip(vertices[:, 2], -1, 1)) - np.pi / 6
+
+
+def brick_plate(size: int) -> tuple:
+    """Plate of hexagons with jitter; a line of edges along x, which stays straight; distance to it."""
+    n = 2 * round(np.sqrt(size) / 2)
+    vertices, polygons = cases.bricks(n)
+    ids = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    move = np.random.default_rng(0).uniform(-0.2, 0.2, (n + 1, n + 1, 2)) * 2 / n
+    move[[0, -1]] = move[:, [0, n // 2, -1]] = 0
+    vertices[:, :2] += move.reshape(-1, 2)
+    return vertices, polygons, ids[:, n // 2], vertices[:, 1]
+
+
+def sphere_cloud(size: int) -> tuple:
+    """Noisy spiral on the sphere with a circle of points in it."""
+    ring = cases.parallel(int(np.sqrt(size)), HEIGHT)
+    points = cases.sphere_points(size)
+    away = np.abs(np.arcsin(points[:, 2]) - np.arcsin(HEIGHT)) > 1.0 / np.sqrt(size)
+    points = np.concatenate([ring, points[away]])
+    return points, points.copy(), np.arange(len(ring)), np.arcsin(points[:, 2]) - np.arcsin(HEIGHT)
+
+
+def cylinder_cloud(size: int) -> tuple:
+    """Independent random points on an open cylinder with a circle of points among them."""
+    rng = np.random.default_rng(0)
+    angle, z = 2 * np.pi * rng.random(size), 4 * rng.random(size) - 2
+    keep = np.abs(z - 0.2) > 0.8 / np.sqrt(size)
+    ring = np.linspace(0, 2 * np.pi, int(0.8 * np.sqrt(size)), endpoint=False)
+    angle, z = np.concatenate([ring, angle[keep]]), np.concatenate([np.full(len(ring), 0.2), z[keep]])
+    normals = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    return normals + [0, 0, 1] * z[:, None], normals, np.arange(len(ring)), z - 0.2
+
+
+def plane_cloud(size: int) -> tuple:
+    """Independent random points on a square with a circle of points among them."""
+    rng = np.random.default_rng(0)
+    points = np.column_stack([2 * rng.random((size, 2)) - 1, np.zeros(size)])
+    points = points[np.abs(np.linalg.norm(points, axis=1) - 0.5) > 0.8 / np.sqrt(size)]
+    angle = np.linspace(0, 2 * np.pi, int(0.7 * np.sqrt(size)), endpoint=False)
+    ring = 0.5 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    points = np.concatenate([ring, points])
+    normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    return points, normals, np.arange(len(ring)), 0.5 - np.linalg.norm(points, axis=1)
+
+
+POLYGONS = {"sphere of quads": globe, "plate of hexagons": brick_plate}
+CLOUDS = {"sphere": sphere_cloud, "open cylinder": cylinder_cloud, "plane": plane_cloud}
+
+
+def measured(program: str, kind: str, name: str, size: int) -> dict:
+    """One measurement, in this process."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    if kind == "voxels":
+        n = round(np.sqrt(size / 5.0))
+        volume, spacing, first = cases.ball(n)
+        import signedheat as sh
+
+        def run():
+            surface = sh.DigitalSurface(volume, spacing, first, radius=None if program == "ours" else 0.0)
+            unit = surface.vertices / np.linalg.norm(surface.vertices, axis=1, keepdims=True)
+            exact = np.arcsin(np.clip(unit @ TILT, -1, 1)) - np.arcsin(HEIGHT)
+            source = surface.level_set(exact)
+            begin = time.perf_counter()
+            return sh.SignedHeatSolver(surface).distance(source).values, exact, begin
+    else:
+        vertices, about, ring, exact = (POLYGONS if kind == "polygons" else CLOUDS)[name](size)
+        closed = kind == "points" or "sphere" in name
+
+        def run():
+            begin = time.perf_counter()
+            if program == "ours":
+                import signedheat as sh
+
+                domain = sh.PolygonMesh(vertices, about) if kind == "polygons" else sh.PointCloud(vertices, about)
+                return sh.SignedHeatSolver(domain).distance(domain.path(ring, closed=closed)).values, exact, begin
+            import potpourri3d
+
+            nodes = [int(i) for i in ring] + [int(ring[0])] * closed
+            if kind == "polygons":
+                phi = potpourri3d.PolygonMeshHeatSolver(vertices, about).compute_signed_distance([nodes])
+            else:
+                phi = potpourri3d.PointCloudHeatSolver(vertices).compute_signed_distance([nodes], about)
+            phi = np.asarray(phi)
+            return (phi if (phi * exact).sum() > 0 else -phi), exact, begin
+
+    if program == "ours" or kind == "voxels":
+        warm(kind)
+    phi, exact, begin = run()
+    seconds = time.perf_counter() - begin
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {
+        "vertices": len(phi),
+        "seconds": seconds,
+        "megabytes": (peak - before) / 1024,
+        "error": cases.error(phi, exact),
+    }
+
+
+def warm(kind: str) -> None:
+    """Load every kernel, on something small."""
+    import signedheat as sh
+
+    if kind == "polygons":
+        domain = sh.PolygonMesh(*cases.globe(6))
+    elif kind == "points":
+        domain = sh.PointCloud(cases.sphere_points(200))
+    else:
+        domain = sh.DigitalSurface(*cases.ball(6))
+    positions = domain.points if kind == "points" else domain.vertices
+    sh.SignedHeatSolver(domain).distance(domain.level_set(positions[:, 2], 0.1))
+
+
+def in_process_of_its_own(*arguments: str) -> dict:
+    """The same measurement in a fresh interpreter."""
+    output = subprocess.run(
+        [sys.executable, __file__, "--one", *arguments], capture_output=True, text=True, check=False
+    )
+    if output.returncode:
+        raise SystemExit(output.stderr)
+    return json.loads(output.stdout.splitlines()[-1])
+
+
+def main() -> None:
+    """Print one line per case, with ratios (below 1: ours is better)."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", type=int, nargs="+", default=[4000, 16000, 64000])
+    parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.one:
+        program, kind, name, size = arguments.one
+        print(json.dumps(measured(program, kind, name, int(size))))
+        return
+    print(f"{'case':32}{'vertices':>9} | {'ours s':>7}{'MB':>7}{'ε':>9} | {'peer s':>7}{'MB':>7}{'ε':>9} | ratios s, ε")
+    table = [("polygons", n) for n in POLYGONS] + [("points", n) for n in CLOUDS] + [("voxels", "ball (raw as peer)")]
+    for kind, name in table:
+        for size in arguments.sizes:
+            ours, peer = (in_process_of_its_own(p, kind, name, str(size)) for p in ("ours", "peer"))
+            columns = [f"{r['seconds']:7.2f}{r['megabytes']:7.0f}{r['error']:9.1e}" for r in (ours, peer)]
+            ratio = f"{ours['seconds'] / peer['seconds']:.2f}, {ours['error'] / max(peer['error'], 1e-15):.3f}"
+            print(f"{kind + ': ' + name:32}{ours['vertices']:9} | {columns[0]} | {columns[1]} | {ratio}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
