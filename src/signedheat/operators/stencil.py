@@ -73,7 +73,8 @@ def solve_poisson(
     for axis_values in eigenvalues[1:]:
         inner = np.add.outer(inner, axis_values)
     with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(lambda row, value: _divide(row, inner + value), transformed, eigenvalues[0]))
+        rows = [transformed[k : k + 1] for k in range(len(transformed))]  # views, in one dimension too
+        list(pool.map(lambda row, value: _divide(row, inner + value), rows, eigenvalues[0]))
     return idctn(transformed, type=2, overwrite_x=True, workers=workers)
 
 
