@@ -91,3 +91,20 @@ def test_info_says_what_lies_where(tmp_path, capsys):
     assert third["kind"] == "points"
     assert main(["info", str(tmp_path / "flat.ply"), str(tmp_path / "curves.json")]) == 0
     assert "1 segments share no face: 1" in capsys.readouterr().out
+
+
+def test_fields_on_surfaces_can_be_contoured_viewed_and_told_about(files, capsys):
+    field = str(files / "phi.npz")
+    assert main(["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", field, "--quiet"]) == 0
+    assert isinstance(sh.load_field(field), sh.VertexField)
+    assert main(["contour", field, "0.3", "-o", str(files / "line.json")]) == 0
+    phi = sh.load_field(field)
+    for curve in sh.read_curves(files / "line.json", phi.domain):
+        assert phi(curve) == pytest.approx(0.3)
+    assert main(["contour", field, "0.3", "-o", str(files / "line.stl")]) == 1
+    assert main(["contour", field, "99", "-o", str(files / "line.obj")]) == 1
+    capsys.readouterr()
+    assert main(["info", field, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["kind"] == "VertexField"
+    assert main(["view", field, "-o", str(files / "view.png")]) == 0
+    assert (files / "view.png").stat().st_size > 20_000

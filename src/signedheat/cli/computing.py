@@ -73,13 +73,19 @@ def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
         return sharpen(field)
 
 
-def describe(field: GridField) -> dict[str, Any]:
+def describe(field: Any) -> dict[str, Any]:
     """A field in numbers, for ``--json``."""
+    if isinstance(field, GridField):
+        where = {
+            "origin": field.grid.origin.tolist(),
+            "spacing": field.grid.spacing.tolist(),
+            "shape": list(field.grid.shape),
+        }
+    else:
+        where = {"n_vertices": len(field.values)}
     return {
-        "origin": field.grid.origin.tolist(),
-        "spacing": field.grid.spacing.tolist(),
-        "shape": list(field.grid.shape),
-        "minimum": float(np.min(field.values)),
-        "maximum": float(np.max(field.values)),
+        **where,
+        "minimum": float(np.nanmin(field.values)),
+        "maximum": float(np.nanmax(field.values)),
         "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
     }

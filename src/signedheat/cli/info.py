@@ -41,7 +41,8 @@ def add_to(commands: Any) -> None:
 def run(arguments: Namespace) -> Summary:
     """Inspect a shape or a field."""
     if extension(arguments.file) in FIELD_FORMATS:
-        summary = {"file": arguments.file, "kind": "GridField", **describe(load_field(arguments.file))}
+        field = load_field(arguments.file)
+        summary = {"file": arguments.file, "kind": type(field).__name__, **describe(field)}
         del summary["seconds"]
         return summary, _table(summary)
     shape = read(arguments.file)

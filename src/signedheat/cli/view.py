@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
+from ..fields.vertex_field import VertexField
 from ..io import FIELD_FORMATS, ensure_writable, load_field, read
 from ..io.files import extension
 from ..viewing import PICTURE_FORMATS, save_scene, save_slices
@@ -31,5 +32,10 @@ def run(arguments: Namespace) -> Summary:
     is_field = extension(arguments.file) in FIELD_FORMATS
     thing = load_field(arguments.file) if is_field else read(arguments.file)
     with naming(arguments.file):
-        (save_slices if is_field else save_scene)(thing, arguments.output)
+        if isinstance(thing, VertexField):
+            from ..surface_pictures import save_surface
+
+            save_surface(thing, arguments.output)
+        else:
+            (save_slices if is_field else save_scene)(thing, arguments.output)
     return {"input": arguments.file, "output": arguments.output}, arguments.output

@@ -17,7 +17,9 @@ from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
+from ..fields.vertex_field import VertexField
 from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
+from .surface_fields import is_vertex_field, load_vertex_field
 from .tets import TET_FIELD_FORMATS, load_tet_field
 from .vtk_xml import read_vti, write_vti
 
@@ -77,18 +79,19 @@ def ensure_field_writable(path: PathLike) -> None:
         _openvdb(path)
 
 
-def load_field(path: PathLike) -> GridField | TetField:
+def load_field(path: PathLike) -> GridField | TetField | VertexField:
     """Read a field that `save_field` wrote, exactly as it was: values and transform.
 
     Parameters
     ----------
     path : str or path
         A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file. Images of other programs will
-        do if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file holds a field on tets.
+        do if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file holds a field on tets; a
+        ``.npz`` file with vertices a field on a surface.
 
     Returns
     -------
-    GridField or TetField
+    GridField, TetField or VertexField
         The field; its diagnostics are empty.
 
     Raises
@@ -107,6 +110,8 @@ def load_field(path: PathLike) -> GridField | TetField:
     """
     if extension(path) in TET_FIELD_FORMATS:
         return load_tet_field(path)
+    if is_vertex_field(path):
+        return load_vertex_field(path)
     if extension(path) not in _FORMATS:
         raise unknown_extension(path, _FORMATS, "a field")
     _, read = _FORMATS[extension(path)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile, is_zipfile
 
 import numpy as np
 
@@ -57,6 +57,14 @@ def load_vertex_field(path: PathLike) -> VertexField:
     if values.shape != (len(vertices),):
         raise FileFormatError(f"{path}: {values.shape} values for {len(vertices)} vertices: the file is damaged")
     return VertexField(domain, values)
+
+
+def is_vertex_field(path: PathLike) -> bool:
+    """Whether a file holds what `load_vertex_field` reads."""
+    if extension(path) != ".npz" or not is_zipfile(path):
+        return False
+    with ZipFile(path) as file:
+        return {"values.npy", "vertices.npy"} <= set(file.namelist())
 
 
 def write_npz(field: VertexField) -> bytes:
