@@ -124,7 +124,8 @@ def _(shape: PointCloud) -> AreaElements:
         )
     areas = point_areas(shape.points) if shape.areas is None else shape.areas
     components = np.zeros(shape.n_points, dtype=np.int64)
-    spacing = float(np.mean(areas)) ** (1.0 / max(shape.points.shape[1] - 1, 1))
+    sides = shape.points.shape[1] - 1  # on a line a point is a whole boundary, with no gap to the next
+    spacing = float(np.mean(areas)) ** (1.0 / sides) if sides else 0.0
     return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
 
 
