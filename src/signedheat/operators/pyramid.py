@@ -30,7 +30,7 @@ COARSEST = 32
 FEW = 4
 """Axes with no more nodes than this are not halved."""
 ROUNDS = 2
-"""How often each combination of directions is swept within a band."""
+"""How often each combination of directions is swept within a band, if nothing else is asked for."""
 ROUNDS_EVERYWHERE = 12
 """The same on the coarsest grid, where paths from the source are longer, and sweeps cost nothing."""
 
@@ -84,7 +84,9 @@ class Level:
     factors: NDArray[np.int64]
 
 
-def diffuse_on_pyramid(sources: NodeSources, time: Callable[[float], float], finest: int = 0) -> list[Level]:
+def diffuse_on_pyramid(
+    sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = ROUNDS
+) -> list[Level]:
     """Solve ``(1 − tΔ) X = B`` on every level, from `finest` (0: the grid of the sources) to the coarsest.
 
     Parameters
@@ -95,13 +97,15 @@ def diffuse_on_pyramid(sources: NodeSources, time: Callable[[float], float], fin
         Diffusion time t on a grid of a given mean spacing.
     finest : int
         Levels to leave out, where a coarser answer will do.
+    rounds : int
+        How often each combination of directions is swept within a band.
     """
     levels = []
     while True:
         factors = coarsening(sources.shape, sources.steps)
         last = not (factors > 1).any()
         if len(levels) >= finest or last:
-            levels.append(_diffuse_level(sources, time, factors, last))
+            levels.append(_diffuse_level(sources, time, factors, ROUNDS_EVERYWHERE if last else rounds, last))
         else:
             levels.append(Level(None, None, factors))
         if last:
@@ -131,7 +135,11 @@ def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np
 
 
 def _diffuse_level(
-    sources: NodeSources, time: Callable[[float], float], factors: NDArray[np.int64], last: bool
+    sources: NodeSources,
+    time: Callable[[float], float],
+    factors: NDArray[np.int64],
+    rounds: int,
+    last: bool,
 ) -> Level:
     real = sources.steps > 0
     t = time(float(sources.steps[real].mean()))
@@ -142,7 +150,7 @@ def _diffuse_level(
         width = np.ceil(BAND * np.sqrt(ratios)).astype(int)
         active = _dilated(sources.touched, width)
         inside = _dilated(sources.touched, np.maximum(width - MARGIN, 0))
-    vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, ROUNDS_EVERYWHERE if last else ROUNDS)
+    vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, rounds)
     return Level(vectors, inside, factors)
 
 

@@ -83,6 +83,7 @@ def _sweep_tile(vectors, sources, touched, active, shape, ratios, pivots, tile):
     """Update the lines of one tile in order: four components side by side."""
     n0, n1, n2, n = shape
     row = np.empty(4 * n, dtype=np.float32)
+    none = np.zeros(4 * n, dtype=np.float32)  # beyond the walls
     # stretches at the rim of the active ones have no neighbours beyond: their inflow from there is zero
     for i in range(tile[0], tile[1], tile[2]):
         for j in range(tile[3], tile[4], tile[5]):
@@ -100,25 +101,21 @@ def _sweep_tile(vectors, sources, touched, active, shape, ratios, pivots, tile):
                         stretch += 1
                     begin, end = first * STRETCH, min(stretch * STRETCH, n)
                     # what flows in from the lines around, and the source
-                    row[4 * begin : 4 * end] = np.float32(0)
+                    low, high = vectors[here - n2] if j > 0 else none, vectors[here + n2] if j < n1 - 1 else none
+                    left, right = vectors[here - 1] if k > 0 else none, vectors[here + 1] if k < n2 - 1 else none
+                    for m in range(4 * begin, 4 * end):
+                        row[m] = ratios[1] * (low[m] + high[m]) + ratios[2] * (left[m] + right[m])
+                    if n0 > 1:
+                        below, above = (
+                            vectors[here - n1 * n2] if i > 0 else none,
+                            vectors[here + n1 * n2] if i < n0 - 1 else none,
+                        )
+                        for m in range(4 * begin, 4 * end):
+                            row[m] += ratios[0] * (below[m] + above[m])
                     for s in range(first, stretch):
                         if touched[here, s]:
                             for m in range(4 * STRETCH * s, min(4 * STRETCH * (s + 1), 4 * n)):
-                                row[m] = sources[here, m]
-                    for side in range(6):
-                        axis, step = side >> 1, 2 * (side & 1) - 1
-                        a, b, c = i, j, k
-                        if axis == 0:
-                            a += step
-                        elif axis == 1:
-                            b += step
-                        else:
-                            c += step
-                        if 0 <= a < n0 and 0 <= b < n1 and 0 <= c < n2:
-                            ratio = ratios[axis]
-                            line = vectors[(a * n1 + b) * n2 + c]
-                            for m in range(4 * begin, 4 * end):
-                                row[m] += ratio * line[m]
+                                row[m] += sources[here, m]
                     # elimination and substitution
                     x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
                     along = ratios[3]

@@ -15,6 +15,9 @@ import numpy as np
 
 from ..parallel import n_threads
 
+SMALL = 100_000
+"""Grids of fewer nodes are not worth a second thread."""
+
 
 def padded_shape(shape: tuple[int, ...]) -> tuple[int, int, int, int]:
     """Shape with axes of one node in front, to make four."""
@@ -27,13 +30,15 @@ def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int
     A tile is (begin, end, step) for each of the first three axes of `shape`.
     """
     steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
-    size = [max(8, min(32, -(-n // 8))) for n in shape[1:3]]
+    small = np.prod(shape) < SMALL
+    size = [n if small else max(8, min(32, -(-n // 8))) for n in shape[1:3]]
     with ThreadPoolExecutor(n_threads()) as pool:
+        each = map if small else pool.map
         for direction in list(product(*steps)) * rounds:
             for plane in range(shape[0])[:: direction[0]]:
                 for wave in wavefronts(shape[1:3], size, direction[1:]):
                     tiles = [np.array([plane, plane + direction[0], direction[0], *tile]) for tile in wave]
-                    list(pool.map(lambda tile: kernel(*arguments, tile), tiles))
+                    list(each(lambda tile: kernel(*arguments, tile), tiles))
 
 
 def wavefronts(shape: tuple[int, ...], size: list[int], direction: tuple[int, ...]) -> list[list[list[int]]]:

@@ -1,0 +1,196 @@
+"""Distance on grids: seconds per step beside one cosine transform of that size, memory, error, and what others take.
+
+    python benchmarks/grid.py [64 128 256 …] [--peers]
+
+Each size runs in a process of its own, so that its peak memory is its own. With ``--peers`` the same job is done by
+libigl (signed distance by fast winding numbers at every node), MeshLib (general offset) and signedheat3d, where they
+are installed; they are not needed otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import signedheat as sh
+
+HALF = 1.6
+OFFSET = 0.2
+REPEATS = 3
+
+
+def sphere(n_vertices: int, missing: float = 0.0) -> sh.TriangleMesh:
+    """The unit sphere, without the faces within round holes that make up a fraction of it."""
+    from scipy.spatial import ConvexHull
+
+    i = np.arange(n_vertices) + 0.5
+    z, angle = 1 - 2 * i / n_vertices, np.pi * (1 + 5**0.5) * i
+    points = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], axis=1)
+    faces = ConvexHull(points).simplices.astype(np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    spots = np.random.default_rng(7).normal(size=(60, 3))
+    spots /= np.linalg.norm(spots, axis=1)[:, None]
+    nearness = (points[faces].mean(axis=1) @ spots.T).max(axis=1)
+    return sh.TriangleMesh(points, faces[nearness <= np.quantile(nearness, 1 - missing)])
+
+
+def box(n: int) -> sh.Grid:
+    return sh.Grid([-HALF] * 3, 2 * HALF / (n - 1), (n, n, n))
+
+
+def relative_error(values: np.ndarray, exact: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((values - exact) ** 2)) / (exact.max() - exact.min()))
+
+
+def best(job: Callable[[], Any]) -> tuple[float, Any]:
+    """Least wall-clock seconds of a few runs, and the last result."""
+    seconds = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        result = job()
+        seconds.append(time.perf_counter() - begin)
+    return min(seconds), result
+
+
+def peak_bytes() -> int:
+    """Peak resident memory of this process, where the system tells it."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def measure(n: int) -> dict[str, Any]:
+    """One size: distance, sharpening and offset, on the sphere of about 20k faces."""
+    from scipy.fft import dctn
+
+    shape, grid = sphere(10_000), box(n)
+    sh.sharpen(sh.signed_distance(shape, box(36))).offset(OFFSET)  # compile
+    before = peak_bytes()
+    totals, fields = [], []
+    transform, peak = np.inf, 0
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        field = sh.signed_distance(shape, grid)
+        totals.append(time.perf_counter() - begin)
+        fields.append(field.diagnostics.timings)
+        peak = peak or peak_bytes()  # of the first run alone
+        if n <= 256:
+            values = np.ones(grid.shape)
+            transform = min(transform, best(lambda values=values: dctn(values, workers=-1))[0])
+    steps = {step: min(timings[step] for timings in fields) for step in fields[0]}
+    sharpening, sharpened = best(lambda: sh.sharpen(field))
+    contouring, _ = best(lambda: sharpened.offset(OFFSET))
+    exact = np.linalg.norm(grid.points, axis=-1) - 1 if n <= 256 else None
+    return {
+        "n": n,
+        "steps": steps,
+        "total": min(totals),
+        "transform": transform,
+        "sharpen": sharpening,
+        "offset": contouring,
+        "bytes per node": (peak - before) / grid.n_nodes,
+        "peak": peak,
+        "plain": None if exact is None else relative_error(field.values, exact),
+        "sharpened": None if exact is None else relative_error(sharpened.values, exact),
+    }
+
+
+def report(n: int) -> None:
+    output = subprocess.run([sys.executable, __file__, "--measure", str(n)], check=True, capture_output=True, text=True)
+    row = json.loads(output.stdout.splitlines()[-1])
+    steps = "  ".join(f"{step} {1000 * seconds:.0f}" for step, seconds in row["steps"].items())
+    print(f"{n}³  total {row['total']:.3f} s = {row['total'] / row['transform']:.1f} dctn of {row['transform']:.4f} s")
+    print(f"     steps in ms: {steps};  then sharpen {1000 * row['sharpen']:.0f}, offset {1000 * row['offset']:.0f}")
+    print(f"     peak {row['peak'] / 1e9:.2f} GB, {row['bytes per node']:.0f} bytes per node beyond the libraries")
+    if row["plain"] is not None:
+        print(f"     ε plain {100 * row['plain']:.4f} %, sharpened {100 * row['sharpened']:.4f} %", flush=True)
+
+
+def peers(n: int) -> None:
+    """The same job, whole and broken, beside other programs."""
+    grid = box(n)
+    exact = np.linalg.norm(grid.points, axis=-1) - 1
+    for name, shape in (("sphere, 82k faces", sphere(41_000)), ("sphere, 35 % missing", sphere(10_000, 0.35))):
+        print(f"{name}, {n}³")
+        seconds, field = best(lambda shape=shape: sh.sharpen(sh.signed_distance(shape, grid)))
+        contouring, surface = best(lambda field=field: field.offset(OFFSET))
+        radius = np.abs(np.linalg.norm(surface.vertices, axis=1) - 1 - OFFSET).max()
+        print(
+            f"  signedheat     {seconds:7.2f} s  ε {relative_error(field.values, exact):.5f}   offset included "
+            f"{seconds + contouring:.2f} s, radius off by {radius:.4f}",
+            flush=True,
+        )
+        for peer in (libigl, meshlib, signedheat3d):
+            try:
+                print("  " + peer(shape, grid, exact, seconds), flush=True)
+            except ImportError:
+                print(f"  {peer.__name__:14s} not installed")
+
+
+def libigl(shape: sh.TriangleMesh, grid: sh.Grid, exact: np.ndarray, ours: float) -> str:
+    import igl
+
+    points = grid.points.reshape(-1, 3)
+    begin = time.perf_counter()
+    kind = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
+    values = igl.signed_distance(points, np.array(shape.vertices), np.array(shape.faces), kind)[0]
+    seconds = time.perf_counter() - begin
+    error = relative_error(np.asarray(values).reshape(grid.shape), exact)
+    return f"libigl         {seconds:7.2f} s  ε {error:.5f}   {seconds / ours:.1f} times ours"
+
+
+def meshlib(shape: sh.TriangleMesh, grid: sh.Grid, exact: np.ndarray, ours: float) -> str:
+    from meshlib import mrmeshnumpy, mrmeshpy
+
+    mesh = mrmeshnumpy.meshFromFacesVerts(np.array(shape.faces, dtype=np.int32), np.array(shape.vertices))
+    settings = mrmeshpy.GeneralOffsetParameters()
+    settings.voxelSize = float(grid.spacing[0])
+    settings.signDetectionMode = mrmeshpy.SignDetectionMode.HoleWindingRule
+    begin = time.perf_counter()
+    surface = mrmeshpy.generalOffsetMesh(mesh, OFFSET, settings)
+    seconds = time.perf_counter() - begin
+    radius = np.linalg.norm(mrmeshnumpy.getNumpyVerts(surface), axis=1)
+    off = np.abs(radius - 1 - OFFSET).max()
+    return f"MeshLib        {seconds:7.2f} s  (offset)   {seconds / ours:.1f} times ours, radius off by {off:.4f}"
+
+
+def signedheat3d(shape: sh.TriangleMesh, grid: sh.Grid, exact: np.ndarray, ours: float) -> str:
+    import signedheat3d as peer
+
+    solver = peer.SignedHeatGridSolver()
+    begin = time.perf_counter()
+    values = solver.compute_distance_to_mesh(np.array(shape.vertices), shape.faces.tolist())
+    seconds = time.perf_counter() - begin
+    return (
+        f"signedheat3d   {seconds:7.2f} s  {np.size(values)} nodes of its own choice   {seconds / ours:.1f} times ours"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("sizes", nargs="*", type=int, default=[64, 128, 256], help="nodes along each axis")
+    parser.add_argument("--peers", action="store_true", help="compare with libigl, MeshLib and signedheat3d at 128³")
+    parser.add_argument("--measure", type=int, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.measure:
+        print(json.dumps(measure(options.measure)))
+        return
+    for n in options.sizes:
+        report(n)
+    if options.peers:
+        peers(128)
+
+
+if __name__ == "__main__":
+    main()
