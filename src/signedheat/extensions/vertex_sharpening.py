@@ -67,14 +67,16 @@ class Geodesic:
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
         from ..operators.exact_geodesics import distance_to_zero_line
 
-        if not np.nanmin(values) < 0 < np.nanmax(values):
-            raise OutsideError(
-                "the field has one sign everywhere, hence no zero set to measure from: "
-                "a source without sides cannot be sharpened this way; use method=Convex()"
-            )
         distance, n_windows = distance_to_zero_line(surface.triangles, values, self.tolerance)
+        if not np.isfinite(distance).any():
+            raise OutsideError(
+                "the field has one sign everywhere, hence no zero set to measure from: use method=Convex(), "
+                "which measures from the source"
+            )
         distance = np.where(np.isfinite(distance), distance, np.abs(values))
-        return np.where(np.isnan(values), np.nan, np.copysign(distance, values)), {"windows": n_windows}
+        signed = np.where(np.isnan(values), np.nan, np.copysign(distance, values))
+        refuse_unless_on_zero_line(source, values, signed, surface.spacing)
+        return signed, {"windows": n_windows}
 
 
 @dataclass(frozen=True)
@@ -160,15 +162,10 @@ def _(field: VertexField, method: Method | None = None, progress: Progress | Non
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
         raise TypeError(f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface")
-    unknowns = values = np.asarray(field.values)
-    if surface.restriction is not None:
-        n = surface.triangles.n_vertices if surface.prolongation is None else surface.prolongation.shape[1]
-        unknowns = np.full(n, np.nan)
-        unknowns[surface.restriction] = values
-    on_triangles = unknowns if surface.prolongation is None else surface.prolongation @ unknowns
-    new, notes = method.sharpened(surface, on_triangles, field.source, progress)
-    before, after = (slope_error(surface.triangles, v) for v in (on_triangles, new))
-    result = new[: len(unknowns)] if surface.restriction is None else new[surface.restriction]
+    old = at_triangles(surface, field)
+    new, notes = method.sharpened(surface, old, field.source, progress)
+    before, after = slope_error(surface.triangles, old), slope_error(surface.triangles, new)
+    values = new if surface.restriction is None else new[surface.restriction]
     if progress is not None:
         progress(1.0, "done")
     diagnostics = replace(
@@ -176,7 +173,33 @@ def _(field: VertexField, method: Method | None = None, progress: Progress | Non
         timings={**field.diagnostics.timings, "sharpen": time.perf_counter() - begin},
         notes={**field.diagnostics.notes, "slope_error_before": before, "slope_error_after": after, **notes},
     )
-    return replace(field, values=result, diagnostics=diagnostics)
+    return replace(field, values=values, diagnostics=diagnostics)
+
+
+def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[np.float64]:
+    """Values at the vertices of the surface's triangles; averages at those that the domain does not have."""
+    n = surface.triangles.n_vertices
+    if surface.restriction is None:
+        return np.asarray(field.values)
+    values = field.domain.on_triangulation(field.values)
+    if len(values) != n:
+        values = np.full(n, np.nan)
+        values[surface.restriction] = field.values
+    return values
+
+
+def refuse_unless_on_zero_line(source: Any, old: NDArray[np.float64], new: NDArray[np.float64], spacing: float) -> None:
+    """A source without sides, inside faces, leaves no zero line behind, and would be forgotten."""
+    rows = getattr(source, "rows", None)
+    if rows is None or rows.shape[1] != len(old):
+        return
+    away = np.abs(rows @ new) > np.abs(rows @ old) + 4.0 * spacing
+    share = source.weights[away].sum() / source.weights.sum()
+    if share > 0.02:
+        raise SourceError(
+            f"{100 * share:.0f} % of the source is off the zero set of the field, as sources without sides may be: "
+            "distance from the zero set would miss it; use method=Convex()"
+        )
 
 
 def slopes(triangles: LaidOutTriangles, values: NDArray[np.float64]) -> NDArray[np.complex128]:

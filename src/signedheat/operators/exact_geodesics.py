@@ -69,14 +69,22 @@ def distance_to_zero_line(
         corners,
         first_corner,
         bends_light(triangles),
-        cleared(values, 1e-7 * float(lengths.mean())),
+        cleared(triangles, values, 1e-7 * float(lengths.mean())),
         tolerance,
     )
 
 
-def cleared(values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
-    """Values kept away from zero, so that the line crosses edges and no vertices."""
-    return np.where(np.abs(values) < least, np.where(values < 0, -least, least), values)
+def cleared(triangles: LaidOutTriangles, values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+    """Values kept away from zero, so that the line crosses edges and no vertices.
+
+    A vertex with zero gets the sign that its neighbours have less of: where both sides of a source have the same sign,
+    the line runs round it.
+    """
+    near = np.abs(values) < least
+    known = np.where(near | np.isnan(values), 0.0, np.sign(values))
+    tail, head = triangles.edges.vertices.T
+    around = np.bincount(tail, known[head], len(values)) + np.bincount(head, known[tail], len(values))
+    return np.where(near, np.where(around > 0, -least, least), values)
 
 
 def bends_light(triangles: LaidOutTriangles) -> NDArray[np.bool_]:
