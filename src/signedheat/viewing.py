@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from .domains.point_cloud import PointCloud
 from .domains.polygon_mesh import PolygonMesh
 from .domains.triangle_mesh import TriangleMesh
+from .errors import GeometryError
 from .fields.grid_field import GridField
 from .io.files import PathLike, ensure_writable, extension, replacing
 
@@ -27,16 +29,18 @@ AXES = "xyz"
 def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Sequence[float] = ()) -> None:
     """Three orthogonal slices through a field, with isolines and the cross-section of the shape it came from.
 
-    Blue is inside, orange outside; the black line is φ = 0; red is the shape.
+    Blue is inside, orange outside; the black line is φ = 0; red is the shape. Of a field in the plane, one picture;
+    solid nodes are grey.
 
     Parameters
     ----------
     field : GridField
-        A field in three dimensions.
+        A field in two or three dimensions.
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
     shape : TriangleMesh, PolygonMesh or PointCloud, optional
-        What the field is a distance to. The slices go through the middle of its bounds, or of the grid.
+        What the field is a distance to. The slices go through the middle of its bounds, or of the grid. In the plane,
+        a `Polyline` or a sequence of them.
     levels : sequence of float
         Further levels to draw, heavier than the isolines.
 
@@ -44,8 +48,17 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
     ------
     FileFormatError
         If the picture cannot be written.
+    GeometryError
+        If the field has one dimension, or more than three.
     """
     ensure_writable(path, PICTURE_FORMATS, "a picture")
+    if field.grid.dimension not in (2, 3):
+        raise GeometryError(f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}")
+    if field.grid.dimension == 2:
+        sides = field.grid.upper - field.grid.origin
+        figure = new_figure(*(7.5 * sides / sides.max() + [1.6, 0.6]))
+        draw_plane(field, figure.add_subplot(), shape, levels)
+        return _write(figure, path)
     figure = new_figure(13.2, 4.6)
     axes = [figure.add_subplot(1, 3, k + 1) for k in range(3)]
     draw_slices(field, axes, shape, levels)
@@ -74,6 +87,43 @@ def draw_slices(
     across: Sequence[int] = (2, 1, 0),
 ) -> None:
     """Draw one slice into each of some axes of a figure; `across` says which coordinate is constant on it."""
+    look = _look(field)
+    middle = _middle(field, shape)
+    for panel, normal in zip(axes, across, strict=True):
+        horizontal, vertical = (axis for axis in range(3) if axis != normal)
+        u, v = field.grid.axes[horizontal], field.grid.axes[vertical]
+        image = _draw_panel(panel, u, v, _slice(field, normal, middle[normal]), look, levels)
+        _draw_section(panel, shape, normal, middle[normal], float(field.grid.spacing[normal]))
+        panel.set(xlabel=AXES[horizontal], ylabel=AXES[vertical])
+        panel.set_title(f"{AXES[normal]} = {middle[normal]:.4g}", fontsize=10)
+    _add_color_bar(image, axes, look)
+
+
+def draw_plane(field: GridField, axes: Axes, shape: Any = None, levels: Sequence[float] = ()) -> None:
+    """Draw a field in the plane into axes; polylines, or points, in red."""
+    look = _look(field)
+    image = _draw_panel(axes, *field.grid.axes, field.values, look, levels)
+    for line in shape if isinstance(shape, Sequence) else [] if shape is None else [shape]:
+        if isinstance(line, PointCloud):
+            axes.scatter(*line.points.T, s=6, c="#d4145a", linewidths=0, zorder=3)
+        else:
+            points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
+            axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
+    axes.set(xlabel=AXES[0], ylabel=AXES[1])
+    _add_color_bar(image, [axes], look)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """Colours and isolines, the same in all panels of a picture."""
+
+    norm: Any
+    colors: Any
+    step: float
+    isolines: NDArray[np.float64]
+
+
+def _look(field: GridField) -> _Look:
     from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
 
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
@@ -82,25 +132,36 @@ def draw_slices(
     colors = LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
     step = _round_step((high - low) / 16)
     isolines = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
-    middle = _middle(field, shape)
-    for panel, normal in zip(axes, across, strict=True):
-        horizontal, vertical = (axis for axis in range(3) if axis != normal)
-        u, v = field.grid.axes[horizontal], field.grid.axes[vertical]
-        values = _slice(field, normal, middle[normal])
-        image = panel.pcolormesh(u, v, values.T, cmap=colors, norm=norm, shading="gouraud", rasterized=True)
-        panel.contour(
-            u, v, values.T, isolines[np.abs(isolines) > 0.5 * step], colors="#20303c", linewidths=0.35, alpha=0.7
-        )
-        panel.contour(u, v, values.T, [0.0], colors="black", linewidths=1.3)
-        for level in levels:
-            panel.contour(u, v, values.T, [level], colors="#1b6e3c", linewidths=1.3)
-        _draw_section(panel, shape, normal, middle[normal], float(field.grid.spacing[normal]))
-        panel.set(aspect="equal", xlabel=AXES[horizontal], ylabel=AXES[vertical], xlim=u[[0, -1]], ylim=v[[0, -1]])
-        panel.set_title(f"{AXES[normal]} = {middle[normal]:.4g}", fontsize=10)
-        panel.tick_params(labelsize=8)
-        for spine in panel.spines.values():
-            spine.set_visible(False)
-    panel.figure.colorbar(image, ax=list(axes), shrink=0.85, pad=0.015, label=f"signed distance, a line every {step:g}")
+    return _Look(norm, colors, step, isolines[np.abs(isolines) > 0.5 * step])
+
+
+def _draw_panel(
+    panel: Axes, u: NDArray, v: NDArray, values: NDArray[np.float64], look: _Look, levels: Sequence[float]
+) -> Any:
+    """Values on a plane, indexed [u, v], as colours and isolines; what a colour bar needs comes back."""
+    shown = np.ma.masked_invalid(values.T)
+    shading = "nearest" if shown.mask.any() else "gouraud"
+    image = panel.pcolormesh(u, v, shown, cmap=look.colors, norm=look.norm, shading=shading, rasterized=True)
+    panel.set_facecolor("#b9b9b9")
+    low, high = float(shown.min()), float(shown.max())
+    isolines = look.isolines[(look.isolines > low) & (look.isolines < high)]
+    for lines, color, width, alpha in (
+        (isolines, "#20303c", 0.35, 0.7),
+        ([0.0], "black", 1.3, 1.0),
+        *(([level], "#1b6e3c", 1.3, 1.0) for level in levels),
+    ):
+        if any(low < line < high for line in lines):
+            panel.contour(u, v, shown, lines, colors=color, linewidths=width, alpha=alpha)
+    panel.set(aspect="equal", xlim=u[[0, -1]], ylim=v[[0, -1]])
+    panel.tick_params(labelsize=8)
+    for spine in panel.spines.values():
+        spine.set_visible(False)
+    return image
+
+
+def _add_color_bar(image: Any, axes: Sequence[Axes], look: _Look) -> None:
+    label = f"signed distance, a line every {look.step:g}"
+    axes[0].figure.colorbar(image, ax=list(axes), shrink=0.85, pad=0.015, label=label)
 
 
 def draw_shape(shape: Any, axes: Any, view: tuple[float, float] = (18, -58), max_faces: int = 200_000) -> None:

@@ -51,6 +51,45 @@ class Polyline:
         object.__setattr__(self, "points", positions)
         object.__setattr__(self, "closed", bool(closed))
 
+    @classmethod
+    def from_mask(cls, mask: ArrayLike, origin: ArrayLike = (0.0, 0.0), spacing: ArrayLike = 1.0) -> list[Polyline]:
+        """The boundaries of what is True in a boolean image, φ < 0 inside.
+
+        Lines run halfway between nodes that differ. An image whose rows run downwards is brought to this order of axes
+        by ``image[::-1].T``.
+
+        Parameters
+        ----------
+        mask : (nx, ny) bool
+            ``mask[i, j]`` at ``origin + (i, j) * spacing``, as on a `Grid`; outside the image nothing is True.
+        origin, spacing : (2,) float
+            Those of the grid, if it is one.
+
+        Raises
+        ------
+        GeometryError
+            If the mask is not a boolean image, or nothing in it is True.
+
+        Examples
+        --------
+        >>> [dot] = Polyline.from_mask([[False, False], [False, True]])
+        >>> dot.points.tolist(), dot.closed
+        ([[1.0, 1.5], [1.5, 1.0], [1.0, 0.5], [0.5, 1.0]], True)
+        """
+        from ..fields.contouring import level_lines
+        from .grid import Grid
+
+        inside = np.asarray(mask)
+        if inside.ndim != 2 or inside.dtype != np.bool_ or not inside.any():
+            raise GeometryError(
+                f"a mask is a boolean image with something True in it, not {inside.dtype} of shape {inside.shape}: "
+                "compare the image with a threshold first"
+            )
+        steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), 2)
+        padded = np.pad(inside, 1)
+        grid = Grid(np.asarray(origin, dtype=np.float64) - steps, steps, padded.shape)
+        return level_lines(grid, 0.5 - padded, 0.0)
+
     @property
     def n_points(self) -> int:
         """Number of points."""

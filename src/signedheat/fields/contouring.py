@@ -1,4 +1,4 @@
-"""Level sets on grids, as surfaces fit for machines that want them closed and manifold."""
+"""Level sets on grids: surfaces fit for machines that want them closed and manifold; lines in the plane."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.grid import Grid
+from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
 
@@ -20,11 +21,40 @@ def closed_surface(grid: Grid, values: NDArray[np.float64], level: float) -> Tri
     from skimage.measure import marching_cubes
 
     if grid.dimension != 3:
-        raise GeometryError(f"surfaces are contoured on grids of 3 dimensions, and this one has {grid.dimension}")
+        raise GeometryError(f"fields are contoured in 2 and 3 dimensions, and this grid has {grid.dimension}")
+    if not np.isfinite(values).all():
+        raise GeometryError("values that are not finite, as those of solid nodes, have no closed contour in space")
+    height = heights_above(grid, values, level)
+    shift = 0
+    if wall_signs(height) == {True, False}:
+        height, shift = capped(height), 1
+    vertices, faces, _, _ = marching_cubes(height, 0.0, gradient_direction="descent")
+    vertices = grid.origin + (vertices.astype(np.float64) - shift) * grid.spacing
+    return TriangleMesh(vertices, faces)
+
+
+def level_lines(grid: Grid, values: NDArray[np.float64], level: float) -> list[Polyline]:
+    """Marching squares: greater values to the left, closed where they do not end at the box or at NaN.
+
+    Examples
+    --------
+    >>> grid = Grid((0, 0), 1.0, (4, 3))
+    >>> [line] = level_lines(grid, grid.points[..., 0], 1.5)
+    >>> line.points.tolist()
+    [[1.5, 2.0], [1.5, 1.0], [1.5, 0.0]]
+    """
+    from skimage.measure import find_contours
+
+    lines = find_contours(heights_above(grid, values, level), 0.0, positive_orientation="high")
+    closed = [len(line) > 3 and bool((line[0] == line[-1]).all()) for line in lines]
+    return [Polyline(grid.origin + at * grid.spacing, end) for at, end in zip(lines, closed, strict=True)]
+
+
+def heights_above(grid: Grid, values: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    """Values less the level, which some must reach and none comes closer to than `CLEARANCE`."""
     height = values - level
-    low, high = float(height.min()), float(height.max())
-    if not (np.isfinite(low) and np.isfinite(high)):
-        raise GeometryError("values that are not finite have no contour")
+    known = height[np.isfinite(height)]
+    low, high = float(known.min(initial=np.inf)), float(known.max(initial=-np.inf))
     if not low < 0 < high:
         raise OutsideError(
             f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}: "
@@ -33,12 +63,7 @@ def closed_surface(grid: Grid, values: NDArray[np.float64], level: float) -> Tri
     least = CLEARANCE * float(grid.spacing.min())
     height[(height >= 0) & (height < least)] = least
     height[(height < 0) & (height > -least)] = -least
-    shift = 0
-    if wall_signs(height) == {True, False}:
-        height, shift = capped(height), 1
-    vertices, faces, _, _ = marching_cubes(height, 0.0, gradient_direction="descent")
-    vertices = grid.origin + (vertices.astype(np.float64) - shift) * grid.spacing
-    return TriangleMesh(vertices, faces)
+    return height
 
 
 def wall_signs(height: NDArray[np.float64]) -> set[bool]:

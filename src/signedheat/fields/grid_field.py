@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..discretization import Diagnostics
 from ..domains.grid import Grid
+from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
 
@@ -27,7 +29,8 @@ class GridField:
         Where the nodes are.
     values : (*grid.shape) float
         φ at the nodes, in the units of the grid: ``values[i, j, k]`` at ``grid.points[i, j, k]``. Positive on the
-        side that the source normals point to, so negative inside a shape with outward normals.
+        side that the source normals point to, so negative inside a shape with outward normals. NaN at solid nodes, and
+        on parts of the grid that they cut off from every source.
     diagnostics : Diagnostics
         What happened on the way.
 
@@ -72,7 +75,7 @@ class GridField:
         Returns
         -------
         (n,) float, or one float
-            Signed distances.
+            Signed distances. Nodes without a value do not count; NaN where no node around has one.
         """
         points, inside = self._into_box(points)
         values = self._interpolate(inside)
@@ -101,11 +104,14 @@ class GridField:
         _, inside = self._into_box(points)
         return self._slopes(inside)
 
-    def contour(self, level: float = 0.0) -> TriangleMesh:
-        """The surface φ = level: closed, manifold, normals pointing to greater φ.
+    def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]:
+        """Where φ = level.
 
-        Where the surface runs out of the grid, as it does for an open shape whose completion has no end, it is closed
-        along the box of the grid (1 % of a cell outside it).
+        In space, a surface: closed, manifold, normals pointing to greater φ. Where it runs out of the grid, as it does
+        for an open shape whose completion has no end, it is closed along the box of the grid (1 % of a cell outside).
+
+        In the plane, polylines, one for each connected line: greater φ to the left, closed where they close; they end
+        at the box of the grid, and at nodes without a value.
 
         Parameters
         ----------
@@ -114,21 +120,22 @@ class GridField:
 
         Returns
         -------
-        TriangleMesh
+        TriangleMesh, or list of Polyline
 
         Raises
         ------
         OutsideError
             If φ does not take the level anywhere on the grid.
         GeometryError
-            If the grid is not three-dimensional, or values are NaN.
+            If the grid has neither 2 nor 3 dimensions, or, in space, values are NaN.
         """
-        from .contouring import closed_surface
+        from .contouring import closed_surface, level_lines
 
-        return closed_surface(self.grid, self.values, level)
+        contoured = level_lines if self.grid.dimension == 2 else closed_surface
+        return contoured(self.grid, self.values, level)
 
-    def offset(self, distance: float) -> TriangleMesh:
-        """The surface at a signed distance from the shape: `contour`, but refused where the grid is too small for it.
+    def offset(self, distance: float) -> TriangleMesh | list[Polyline]:
+        """What lies at a signed distance from the shape: `contour`, but refused where the grid is too small for it.
 
         Parameters
         ----------
@@ -146,7 +153,7 @@ class GridField:
         if bounded and walls[0] < distance < walls[1]:
             limit = walls[0] if walls[0] > 0 else walls[1]
             raise OutsideError(
-                f"the surface at distance {distance:g} leaves the grid, which holds distances up to {limit:g}: "
+                f"what lies at distance {distance:g} leaves the grid, which holds distances up to {limit:g}: "
                 f"use a padding of more than {abs(distance):g}"
             )
         return self.contour(distance)
@@ -160,7 +167,8 @@ class GridField:
     def _wall_range(self) -> tuple[float, float]:
         """Least and greatest φ on the walls of the box."""
         walls = [side for axis in range(self.grid.dimension) for side in self._walls(axis)]
-        return min(float(w.min()) for w in walls), max(float(w.max()) for w in walls)
+        values = np.concatenate([wall.ravel() for wall in walls])
+        return float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
 
     def _walls(self, axis: int) -> list[NDArray[np.float64]]:
         return [self.values.take(end, axis=axis) for end in (0, -1)]
@@ -174,8 +182,18 @@ class GridField:
     def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         from scipy.ndimage import map_coordinates
 
-        index = (points - self.grid.origin) / self.grid.spacing
-        return map_coordinates(self.values, index.T, order=1, mode="nearest")
+        index = ((points - self.grid.origin) / self.grid.spacing).T
+        if self._known is None:
+            return map_coordinates(self.values, index, order=1, mode="nearest")
+        sums = map_coordinates(np.where(self._known, self.values, 0.0), index, order=1, mode="nearest")
+        weights = map_coordinates(self._known.astype(np.float64), index, order=1, mode="nearest")
+        return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
+
+    @cached_property
+    def _known(self) -> NDArray[np.bool_] | None:
+        """Nodes with a value, or nothing where all have one."""
+        known = ~np.isnan(self.values)
+        return None if known.all() else known
 
     def _slopes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Differences of the interpolant one cell apart to either side: those of the nodes, interpolated."""
@@ -189,7 +207,7 @@ class GridField:
         return slopes
 
     def __repr__(self) -> str:
-        low, high = (float(v) for v in (self.values.min(), self.values.max()))
+        low, high = (float(v) for v in (np.nanmin(self.values), np.nanmax(self.values)))
         return f"GridField({self.grid!r}, values from {low:g} to {high:g})"
 
     def __reduce__(self) -> tuple[Any, ...]:
