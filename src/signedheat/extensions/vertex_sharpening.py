@@ -191,8 +191,13 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
 def refuse_unless_on_zero_line(source: Any, old: NDArray[np.float64], new: NDArray[np.float64], spacing: float) -> None:
     """A source without sides, inside faces, leaves no zero line behind, and would be forgotten."""
     rows = getattr(source, "rows", None)
-    if rows is None or rows.shape[1] != len(old):
+    if rows is None:
         return
+    if rows.shape[1] != len(old):
+        raise SourceError(
+            "a source without sides lies inside faces, where vertices do not see it, and distance from the zero set "
+            "would miss it: put it on edges and vertices, or solve on `intrinsic_delaunay(mesh, keep=source)`"
+        )
     away = np.abs(rows @ new) > np.abs(rows @ old) + 4.0 * spacing
     share = source.weights[away].sum() / source.weights.sum()
     if share > 0.02:
