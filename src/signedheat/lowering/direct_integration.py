@@ -26,8 +26,6 @@ class DirectIntegration:
     ----------
     stiffness : (n, n) sparse
         Upper triangle of C, as `upper_triangle` makes it; a constant on each connected part is its kernel.
-    prolongation : (m, n) sparse, optional
-        Where sources speak of m vertices of which only n are unknowns, the others being averages of them.
     factorize : callable
         Makes what solves a system from its upper triangle; anything with a ``solve`` will do.
     spring : float
@@ -36,7 +34,6 @@ class DirectIntegration:
     """
 
     stiffness: sparse.csr_matrix
-    prolongation: sparse.csr_matrix | None = None
     factorize: Callable[[sparse.csr_matrix], Factor] = factorize
     spring: float = 1e7
     _last: list[Any] = field(default_factory=list, repr=False)
@@ -62,7 +59,7 @@ class DirectIntegration:
         connected part of the domain stays free, and is chosen by the mean.
         """
         pinned = getattr(source, "pinned", slice(None))
-        rows, values = self.rows(source)[pinned], levels.values[pinned]
+        rows, values = source.rows[pinned], levels.values[pinned]
         if levels.groups is None:
             fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
             return self._reached(fitted[:, 0], rows)
@@ -88,12 +85,8 @@ class DirectIntegration:
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
         """``(C + λ Aᵀ W A) φ = b``."""
-        rows = self.rows(source)
+        rows = source.rows
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
-
-    def rows(self, source: SourceTerm) -> sparse.csr_matrix:
-        """A, on the unknowns."""
-        return source.rows if self.prolongation is None else sparse.csr_matrix(source.rows @ self.prolongation)
 
     def _interpolate(
         self, rows: sparse.csr_matrix, forces: NDArray[np.float64], levels: NDArray[np.float64]
@@ -146,7 +139,7 @@ class DirectIntegration:
 
     def _centered(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
         """The weighted mean over the samples of each part made zero; NaN where a part has none."""
-        rows = self.rows(source)
+        rows = source.rows
         part, n_parts = self._part_of(rows), len(self._first_vertices)
         weight = np.bincount(part, source.weights, n_parts)
         mean = np.full(n_parts, np.nan)

@@ -16,7 +16,7 @@ from ..discretization import Diagnostics, discretize
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, UnreachedWarning
 from ..fields.vertex_field import VertexField
-from ..linear import elimination_order, factorize, upper_triangle, whole
+from ..linear import elimination_order, factorize
 from ..operators.cotan import cotan_matrix, divergence
 from ..operators.laid_out_triangles import LaidOutTriangles
 from ..operators.mollification import mollify
@@ -34,11 +34,8 @@ class SurfaceDiscretization:
         What fields are reported on.
     triangles : LaidOutTriangles
         What the method runs on.
-    prolongation : (n_vertices of the triangles, n_unknowns) sparse, optional
-        P, where only some vertices of the triangles are unknowns of φ and the others averages of them: step 3 then
-        has ``Pᵀ C P`` and ``Pᵀ b`` (Sec. 8).
     restriction : (n,) int, optional
-        Unknown of φ that belongs to each vertex of the domain, where the triangles have more vertices than it.
+        Vertex of the triangles that stands for each vertex of the domain, where they are not the same.
     bring : callable, optional
         Takes a source on the domain to the same source on the triangles, where their faces are not the domain's.
     spacing : float, optional
@@ -49,7 +46,6 @@ class SurfaceDiscretization:
 
     domain: Any
     triangles: LaidOutTriangles
-    prolongation: sparse.csr_matrix | None = None
     restriction: NDArray[np.int64] | None = None
     bring: Callable[[Any], Any] | None = None
     spacing: float | None = None
@@ -65,10 +61,7 @@ class SurfaceDiscretization:
     @cached_property
     def integration(self) -> DirectIntegration:
         """Step 3."""
-        if self.prolongation is None:
-            return DirectIntegration(self.stiffness, factorize=partial(factorize, order=self.vertex_order))
-        stiffness = upper_triangle(self.prolongation.T @ whole(self.stiffness) @ self.prolongation)
-        return DirectIntegration(stiffness, self.prolongation)
+        return DirectIntegration(self.stiffness, factorize=partial(factorize, order=self.vertex_order))
 
     @cached_property
     def stiffness(self) -> sparse.csr_matrix:
@@ -95,14 +88,10 @@ class SurfaceDiscretization:
     def _cut_into(self, triangles: LaidOutTriangles) -> SurfaceDiscretization:
         """The same surface in more triangles, whose first vertices are those of this."""
         added = triangles.n_vertices - self.triangles.n_vertices
-        n_unknowns = self.triangles.n_vertices if self.prolongation is None else self.prolongation.shape[1]
         return replace(
             self,
             triangles=triangles,
-            prolongation=None
-            if self.prolongation is None
-            else sparse.block_diag([self.prolongation, sparse.identity(added)], format="csr"),
-            restriction=np.arange(n_unknowns) if self.restriction is None else self.restriction,
+            restriction=np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction,
             bring=None,
             notes={**self.notes, "vertices added for sources": added},
             _heats={},
@@ -137,8 +126,7 @@ class SurfaceDiscretization:
 
     def divergence(self, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
         """b, the right-hand side of ``C φ = b``."""
-        flux = divergence(self.triangles, directions)
-        return flux if self.prolongation is None else self.prolongation.T @ flux
+        return divergence(self.triangles, directions)
 
     def field(self, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> VertexField:
         """φ at the vertices of the domain."""
