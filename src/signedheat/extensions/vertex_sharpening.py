@@ -189,21 +189,21 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
 
 
 def refuse_unless_on_zero_line(source: Any, old: NDArray[np.float64], new: NDArray[np.float64], spacing: float) -> None:
-    """A source without sides, inside faces, leaves no zero line behind, and would be forgotten."""
+    """A source without sides, inside faces, may leave no zero line behind, and would be forgotten."""
     rows = getattr(source, "rows", None)
-    if rows is None:
+    if rows is None or (rows.shape[1] != len(old) and source.oriented):
         return
-    if rows.shape[1] != len(old):
+    missed = np.ones(1, dtype=bool)
+    if rows.shape[1] == len(old):
+        away = np.abs(rows @ new) > np.abs(rows @ old) + 4.0 * spacing
+        whole = np.bincount(source.owners, source.weights)
+        missed = np.bincount(source.owners, source.weights * away) > 0.5 * whole
+        lone = np.bincount(source.owners) == 1
+        missed |= lone & (np.bincount(source.owners, np.diff(rows.indptr) > 1) > 0)
+    if missed.any():
         raise SourceError(
-            "a source without sides lies inside faces, where vertices do not see it, and distance from the zero set "
-            "would miss it: put it on edges and vertices, or solve on `intrinsic_delaunay(mesh, keep=source)`"
-        )
-    away = np.abs(rows @ new) > np.abs(rows @ old) + 4.0 * spacing
-    share = source.weights[away].sum() / source.weights.sum()
-    if share > 0.02:
-        raise SourceError(
-            f"{100 * share:.0f} % of the source is off the zero set of the field, as sources without sides may be: "
-            "distance from the zero set would miss it; use method=Convex()"
+            f"source {int(np.argmax(missed))} is off the zero set of the field, as sources without sides may be inside "
+            "faces: put it on edges and vertices, or use method=Convex(), which measures from the source"
         )
 
 
