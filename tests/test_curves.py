@@ -11,6 +11,7 @@ from surface_cases import band, book, flipped, laid_out, positions, sphere, squa
 import signedheat as sh
 from signedheat.sources.pieces import pieces
 from signedheat.sources.places import EDGE, FACE, VERTEX, distinct, locate
+from signedheat.sources.projection import closest_points
 
 
 def through_every_face(mesh, faces, weights):
@@ -262,3 +263,20 @@ def test_reversing_a_curve_turns_the_sign():
     curve = mesh.polyline([[-0.6, -0.5, 0], [0.1, 0.3, 0], [0.7, 0.2, 0]])
     forward, backward = (sh.SignedHeatSolver(mesh).distance(c).values for c in (curve, curve.reversed()))
     assert np.abs(forward + backward).max() < 1e-13
+
+
+def test_closest_points_are_closest():
+    rng = np.random.default_rng(0)
+    corners = rng.normal(size=(40, 3, 3))
+    corners[5] = corners[5, 0]  # a point
+    corners[6, 2] = 0.3 * corners[6, 0] + 0.7 * corners[6, 1]  # a segment
+    mesh = sh.TriangleMesh(corners.reshape(-1, 3), np.arange(120).reshape(-1, 3))
+    points = rng.normal(size=(200, 3)) * 2
+    faces, weights, distances = closest_points(mesh, points)
+    assert (weights >= 0).all() and np.abs(weights.sum(axis=1) - 1).max() < 1e-12
+    u, v = np.meshgrid(np.linspace(0, 1, 60), np.linspace(0, 1, 60))
+    inside = u + v <= 1
+    grid = np.stack([1 - u - v, u, v], axis=-1)[inside]
+    samples = np.einsum("sk,fkj->fsj", grid, corners).reshape(-1, 3)
+    sampled = np.array([np.linalg.norm(samples - p, axis=1).min() for p in points])
+    assert (distances <= sampled + 1e-12).all() and np.abs(distances - sampled).max() < 0.03

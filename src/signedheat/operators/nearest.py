@@ -29,69 +29,81 @@ def nearest_on_triangles(
 def _nearest(triangles, bounds, items, points):
     found = np.zeros(len(points), dtype=np.int64)
     weights = np.zeros((len(points), 3))
-    stack = np.empty(128, dtype=np.int64)
-    trial = np.empty(3)
+    stack, gaps = np.empty(128, dtype=np.int64), np.empty(128)
     leaves = len(bounds) // 2
     for p in range(len(points)):
-        best = np.inf
-        depth = 1
-        stack[0] = 1
+        x, y, z = points[p]
+        best, u, v, w = _place(triangles[found[p - 1] if p else 0], x, y, z)  # the next point is often nearby
+        found[p] = found[p - 1] if p else 0
+        depth, stack[0], gaps[0] = 1, 1, 0.0
         while depth > 0:
             depth -= 1
             node = stack[depth]
-            if _box_distance(bounds[node], points[p]) >= best:
+            if gaps[depth] >= best:
                 continue
             if node < leaves:
-                left, right = 2 * node, 2 * node + 1
-                if _box_distance(bounds[left], points[p]) > _box_distance(bounds[right], points[p]):
-                    left, right = right, left
-                stack[depth] = right
-                stack[depth + 1] = left
-                depth += 2
+                near, far = 2 * node, 2 * node + 1
+                gap, other = _box_distance(bounds[near], x, y, z), _box_distance(bounds[far], x, y, z)
+                if gap > other:
+                    near, far, gap, other = far, near, other, gap
+                if other < best:
+                    stack[depth], gaps[depth] = far, other
+                    depth += 1
+                if gap < best:
+                    stack[depth], gaps[depth] = near, gap
+                    depth += 1
                 continue
             for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
                 if items[k] >= 0:
-                    distance = _place(triangles[items[k]], points[p], trial)
+                    distance, a, b, c = _place(triangles[items[k]], x, y, z)
                     if distance < best:
-                        best = distance
+                        best, u, v, w = distance, a, b, c
                         found[p] = items[k]
-                        weights[p] = trial
+        weights[p, 0], weights[p, 1], weights[p, 2] = u, v, w
     return found, weights
 
 
 @njit(cache=True)
-def _box_distance(box, point):
-    total = 0.0
-    for i in range(3):
-        gap = max(box[i] - point[i], point[i] - box[3 + i], 0.0)
-        total += gap * gap
-    return total
+def _box_distance(box, x, y, z):
+    a = max(box[0] - x, x - box[3], 0.0)
+    b = max(box[1] - y, y - box[4], 0.0)
+    c = max(box[2] - z, z - box[5], 0.0)
+    return a * a + b * b + c * c
 
 
 @njit(cache=True)
-def _place(triangle, point, weights):
-    """Barycentric coordinates of the nearest place in a triangle; returns the squared distance.
+def _place(triangle, x, y, z):
+    """Squared distance of the nearest place in a triangle, and its barycentric coordinates.
 
-    Inside if the foot of the perpendicular is; on the nearest of the sides if not.
+    Inside if the foot of the perpendicular is; on the nearest of the sides if not. Numbers instead of arrays, because
+    arrays would be made anew for every triangle.
     """
-    best = np.inf
-    for i in range(3):
-        j = i + 1 if i < 2 else 0
-        side = triangle[j] - triangle[i]
-        length = (side * side).sum()
-        s = min(max((side * (point - triangle[i])).sum() / length, 0.0), 1.0) if length > 0.0 else 0.0
-        distance = ((point - triangle[i] - s * side) ** 2).sum()
-        if distance < best:
-            best = distance
-            weights[:] = 0.0
-            weights[i], weights[j] = 1.0 - s, s
-    normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
-    square = (normal * normal).sum()
+    ax, ay, az = triangle[0]
+    bx, by, bz = triangle[1, 0] - ax, triangle[1, 1] - ay, triangle[1, 2] - az
+    cx, cy, cz = triangle[2, 0] - ax, triangle[2, 1] - ay, triangle[2, 2] - az
+    px, py, pz = x - ax, y - ay, z - az
+    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    square = nx * nx + ny * ny + nz * nz
     if square > 0.0:
-        v = (normal * np.cross(point - triangle[0], triangle[2] - triangle[0])).sum() / square
-        w = (normal * np.cross(triangle[1] - triangle[0], point - triangle[0])).sum() / square
+        v = (nx * (py * cz - pz * cy) + ny * (pz * cx - px * cz) + nz * (px * cy - py * cx)) / square
+        w = (nx * (by * pz - bz * py) + ny * (bz * px - bx * pz) + nz * (bx * py - by * px)) / square
         if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
-            height = (normal * (point - triangle[0])).sum()
-            weights[0], weights[1], weights[2] = 1.0 - v - w, v, w
-            best = height * height / square
-    return best
+            height = nx * px + ny * py + nz * pz
+            return height * height / square, 1.0 - v - w, v, w
+    first, s = _on_side(px, py, pz, bx, by, bz)
+    second, t = _on_side(px - bx, py - by, pz - bz, cx - bx, cy - by, cz - bz)
+    third, r = _on_side(px - cx, py - cy, pz - cz, -cx, -cy, -cz)
+    if first <= second and first <= third:
+        return first, 1.0 - s, s, 0.0
+    if second <= third:
+        return second, 0.0, 1.0 - t, t
+    return third, r, 0.0, 1.0 - r
+
+
+@njit(cache=True)
+def _on_side(px, py, pz, dx, dy, dz):
+    """Squared distance of p from the segment from 0 to d, and the fraction of it at which the nearest place lies."""
+    length = dx * dx + dy * dy + dz * dz
+    s = min(max((px * dx + py * dy + pz * dz) / length, 0.0), 1.0) if length > 0.0 else 0.0
+    ex, ey, ez = px - s * dx, py - s * dy, pz - s * dz
+    return ex * ex + ey * ey + ez * ez, s

@@ -48,8 +48,10 @@ def closest_points(
     mesh: TriangleMesh, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Face, barycentric coordinates and distance of the point of a mesh closest to each point."""
-    from .projection_kernels import nearest_faces
+    from ..operators.nearest import nearest_on_triangles
 
     corners = mesh.vertices[mesh.faces]
     tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
-    return nearest_faces(corners, tree.bounds, tree.items, np.ascontiguousarray(points))
+    faces, weights = nearest_on_triangles(corners, tree, np.ascontiguousarray(points))
+    found = np.einsum("ik,ikj->ij", weights, corners[faces])
+    return faces, weights, np.linalg.norm(points - found, axis=1)
