@@ -272,7 +272,7 @@ def test_closest_points_are_closest():
     corners[6, 2] = 0.3 * corners[6, 0] + 0.7 * corners[6, 1]  # a segment
     mesh = sh.TriangleMesh(corners.reshape(-1, 3), np.arange(120).reshape(-1, 3))
     points = rng.normal(size=(200, 3)) * 2
-    faces, weights, distances = closest_points(mesh, points)
+    _, weights, distances = closest_points(mesh, points)
     assert (weights >= 0).all() and np.abs(weights.sum(axis=1) - 1).max() < 1e-12
     u, v = np.meshgrid(np.linspace(0, 1, 60), np.linspace(0, 1, 60))
     inside = u + v <= 1
