@@ -42,8 +42,8 @@ class DigitalSurface(Surface):
 
     Notes
     -----
-    Voxels may touch along edges, where they count as connected, and at corners. `vertices` are corners of voxels, and lie up to a voxel's
-    diagonal off the surface that was digitised.
+    Voxels may touch along edges, where they count as connected, and at corners. `vertices` are corners of voxels, and
+    lie up to a voxel's diagonal off the surface that was digitised.
 
     Examples
     --------
