@@ -246,17 +246,22 @@ def find_circumcenter(g, f):
     if not y[2] > 0.0:
         return LOST, f, 0.0, 0.0
     cx, cy = 0.5 * x[1], 0.5 * (x[2] * (x[2] - x[1]) / y[2] + y[2])
+    if not np.isfinite(cy):
+        return LOST, f, 0.0, 0.0
     sx, sy = x.sum() / 3.0, y.sum() / 3.0
     side, entry = 1, -1
     for _ in range(100000):
-        leaving, worst = -1, 0.0
+        leaving, worst, outside = -1, 0.0, 0.0
         area = cross(x[0], y[0], x[1], y[1], x[2], y[2])
         for k in range(3):
             l = (k + 1) % 3
             beyond = -cross(x[k], y[k], x[l], y[l], cx, cy) / area
             left, right = cross(sx, sy, cx, cy, x[k], y[k]), cross(sx, sy, cx, cy, x[l], y[l])
+            outside = max(outside, beyond)
             if k != entry and beyond > worst and left * right <= 0.0:
                 leaving, worst = k, beyond
+        if leaving < 0 and not outside < 1e-9:
+            return LOST, f, 0.0, 0.0
         if leaving < 0:
             break
         h = 3 * f + leaving
@@ -284,7 +289,7 @@ def encroached(g, agenda, f, px, py):
     x, y = np.zeros(3), np.zeros(3)
     x[1] = g.length[g.edge[3 * f]]
     x[2], y[2] = apex_position(g, 3 * f)
-    count = 0
+    count, visited = 0, 0
     for k in range(3):
         l = (k + 1) % 3
         halfedges[count] = 3 * f + k
@@ -300,7 +305,9 @@ def encroached(g, agenda, f, px, py):
             continue
         t = g.ring[h]
         n, d = tangent_at(g, preceding(t))
-        if dot * 2.0 * np.sqrt(n * d) + (d - n) * abs(cross(px, py, tx, ty, hx, hy)) >= 0.0 or count + 2 > len(ends):
+        in_circle = dot * 2.0 * np.sqrt(n * d) + (d - n) * abs(cross(px, py, tx, ty, hx, hy)) < 0.0
+        visited += 1
+        if not in_circle or count + 2 > len(ends) or visited > len(ends):
             continue
         ax, ay, turned = unfold(g, h, side, tx, ty, hx, hy)
         if turned == side:
@@ -368,6 +375,18 @@ def insert(g, agenda, f, px, py):
 
 
 @njit(cache=True)
+def folded_face(g, h):
+    """A face that has the edge of h twice, or −1."""
+    y = h
+    while True:
+        if g.edge[following(y)] == g.edge[h] or g.edge[preceding(y)] == g.edge[h]:
+            return y // 3
+        y = g.ring[y]
+        if y == h:
+            return -1
+
+
+@njit(cache=True)
 def split_segment(g, agenda, h, f, goal):
     """Split a segment that stands in the way of healing face f; False if there is no room for it.
 
@@ -381,11 +400,9 @@ def split_segment(g, agenda, h, f, goal):
     ring = ring_size(g, h)
     if not has_room(g, agenda, ring):
         return False
-    y = g.ring[h]
-    while y != h and y // 3 != h // 3:
-        y = g.ring[y]
-    if y != h:  # the face is folded on to itself along the segment
-        split_face(g, h // 3, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
+    folded = folded_face(g, h)
+    if folded >= 0:
+        split_face(g, folded, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
         agenda.on_segment[g.counts[2] - 1] = -1
     else:
         fraction = 0.5
