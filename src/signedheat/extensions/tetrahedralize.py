@@ -76,16 +76,16 @@ def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float | None = 
             f"{resolution}, {padding} and {grading}"
         )
     spacing = longest / resolution
-    samples = cKDTree(sample_points(shape, spacing))
     lower, sides = lower - padding, upper - lower + 2 * padding
     depth = int(np.clip(np.floor(np.log2(np.maximum(sides.max() / spacing / 4, 1))), 0, 16))
     if np.isinf(grading):
         depth = 0
     coarse = spacing * 2**depth
     counts = np.maximum(np.ceil(sides / coarse - 1e-9).astype(np.int64), 1)
+    area = 0.0 if isinstance(shape, PointCloud) else float(area_elements(shape).weights.sum())
+    _refuse_too_many(12 * max(float(counts.prod()), (2 * grading * area / spacing**2) if depth else 0.0))
     origin = lower - (counts * coarse - sides) / 2
-    if counts.prod() * 12 > MOST_TETS:
-        raise MemoryLimitError(f"the lattice would start from {counts.tolist()} cells: lower the resolution")
+    samples = cKDTree(sample_points(shape, spacing))
     corners, sizes = _octree(samples, origin, spacing, counts, depth, grading)
     points, tets = _join_leaves(corners, sizes, counts * 2 ** (depth + 1))
     return TetMesh(origin + points * (spacing / 2), tets)
@@ -107,6 +107,11 @@ def sample_points(shape: Any, spacing: float) -> NDArray[np.float64]:
     return np.concatenate(found)
 
 
+def _refuse_too_many(tets: float) -> None:
+    if tets > MOST_TETS:
+        raise MemoryLimitError(f"the lattice would have over {tets:,.0f} tets: lower the resolution")
+
+
 def _octree(
     samples: Any, origin: NDArray, spacing: float, counts: NDArray, depth: int, grading: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -126,10 +131,7 @@ def _octree(
         sizes.append(np.full(len(corners[-1]), size))
         size //= 2
         cells = (cells[split][:, None] + octants * size).reshape(-1, 3)
-        if len(cells) * 12 > MOST_TETS:
-            raise MemoryLimitError(
-                f"the lattice would have about {12 * len(cells):,} tets: lower the resolution, or raise it less"
-            )
+        _refuse_too_many(12 * len(cells))
     corners.append(cells)
     sizes.append(np.full(len(cells), size))
     return np.concatenate(corners), np.concatenate(sizes)

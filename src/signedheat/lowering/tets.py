@@ -17,7 +17,8 @@ from ..domains.tet_mesh import TetMesh
 from ..errors import UnreachedWarning
 from ..fields.tet_field import TetField
 from ..linear import factorize, upper_triangle, whole
-from .direct_integration import DirectIntegration
+from ..method import unit
+from .tet_integration import TetIntegration
 
 if TYPE_CHECKING:
     from ..linear.krylov import IncompleteCholesky
@@ -32,6 +33,9 @@ DIRECT_VERTICES = 40_000
 
 DIRECTION_ERROR = 1e-3
 """Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
+
+SPRINGS = 30.0
+"""Strength with which levels are imposed, over one edge length."""
 
 FAINT = 1e-250
 """Vectors below this fraction of the largest are computed anew, before they underflow."""
@@ -89,12 +93,13 @@ class TetDiscretization:
         return int(self.unknowns.max()) + 1
 
     @cached_property
-    def integration(self) -> DirectIntegration:
+    def integration(self) -> TetIntegration:
         """Step 3."""
         matrix = upper_triangle(self.mesh.geometry.vertex_laplacian(self.unknowns, self.n_unknowns))
+        strength = SPRINGS / (3 * self.spacing)
         if self.n_unknowns <= DIRECT_VERTICES:
-            return DirectIntegration(matrix)
-        return DirectIntegration(matrix, factorize=from_first, spring=100.0)
+            return TetIntegration(matrix, strength=strength)
+        return TetIntegration(matrix, factorize=from_first, spring=1e4, strength=strength)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
         """Tets hold sources in any position."""
@@ -106,33 +111,88 @@ class TetDiscretization:
 
         return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
 
-    def diffuse(self, source: TetSource) -> list[NDArray[np.float64]]:
-        """Solve ``(M + tL) X = X₀``; one vector per face, in stages.
+    def diffuse(self, source: TetSource) -> NDArray[np.float64]:
+        """Solve ``(M + tL) X = X₀``: one vector per face, averaged in the tets."""
+        if self._is_convex:
+            return self._in_tets(self._stages(source.time, source.vectors))[0]
+        loads = np.concatenate([source.vectors, source.strengths[:, None]], axis=1)
+        return self._bend(*self._in_tets(self._stages(source.time, loads)), source)
+
+    def _stages(self, time: float, loads: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
+        """X at the faces, in stages, each with the logarithm of the factor that it is to be multiplied by.
 
         X falls like exp(−r/√t), and out of the range of floating-point numbers a few hundred faces away. On the faint
-        faces it satisfies the same equation with a right-hand side along their border: scaled up, that is the
-        next stage. Each is known up to a factor of its own, and NaN nearer than where it begins.
+        faces it satisfies the same equation with a right-hand side along their border: scaled up, that is the next
+        stage. It is NaN nearer than where it begins.
         """
-        matrix, loads = self._heat_matrix(source.time), source.vectors
-        vectors = self._solve(matrix, source.time, loads)
-        stages, faint = [vectors], np.abs(vectors).max(axis=1) < FAINT
+        matrix, scale = self._heat_matrix(time), float(np.abs(loads).max())
+        vectors, factor = self._solve(matrix, time, loads / scale), np.log(scale)
+        stages, faint = [(vectors, factor)], np.abs(vectors).max(axis=1) < FAINT
         while faint.any():
-            forces = np.where(faint[:, None], loads, 0)
+            forces = np.where(faint[:, None], loads / scale, 0)
             border = self._around(faint)
             forces[border] += (matrix @ np.where(faint[:, None], vectors, 0))[border]
-            if not forces.any():
+            scale = float(np.abs(forces).max())
+            if scale == 0:
                 break
-            vectors = self._solve(matrix, source.time, forces)
+            loads, factor = forces, factor + np.log(scale)
+            vectors = self._solve(matrix, time, loads / scale)
             still = faint & (np.abs(vectors).max(axis=1) < FAINT)
-            stages.append(np.where(faint[:, None], vectors, np.nan))
+            stages.append((np.where(faint[:, None], vectors, np.nan), factor))
             if still.sum() == faint.sum():
                 break
-            faint, loads = still, forces
+            faint = still
         return stages
 
+    def _in_tets(
+        self, stages: list[tuple[NDArray[np.float64], float]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Means of X, multiples of the gradient of its last column, and logarithms of the factors of both.
+
+        They are those of the last stage that knows all four faces of a tet.
+        """
+        of_tets = self.mesh.faces.of_tets
+        means, gradients, factors = None, None, np.full(self.mesh.n_tets, -np.inf)
+        for vectors, factor in stages:
+            of_faces = vectors[of_tets]
+            known = ~np.isnan(of_faces[..., 0]).any(axis=1)
+            if means is None:
+                means, gradients = np.zeros((self.mesh.n_tets, vectors.shape[1])), np.zeros((self.mesh.n_tets, 3))
+            means[known] = of_faces[known].mean(axis=1)
+            slopes = np.einsum("mki,mk->mi", self.mesh.geometry.area_vectors[known], of_faces[known, :, -1])
+            gradients[known], factors[known] = slopes, factor
+        return means, gradients, factors
+
+    def _bend(
+        self,
+        means: NDArray[np.float64],
+        gradients: NDArray[np.float64],
+        factors: NDArray[np.float64],
+        source: TetSource,
+    ) -> NDArray[np.float64]:
+        """X at the tets, turned where it has come round a corner.
+
+        In flat space diffusion carries vectors along without turning them. Where the straight line to the source leaves
+        the domain, the shortest way to it is bent, and its direction is that in which undirected heat falls
+        (Crane et al. 2013). The side it is on is the one from which that heat has come.
+        """
+        from scipy.spatial import cKDTree
+
+        from ..operators.visibility import tet_neighbors, uphill_roots, visible
+
+        planes, centers = self.planes, self.mesh.tet_barycenters
+        nearest = source.centers[cKDTree(source.centers).query(centers)[1]]
+        neighbors = tet_neighbors(self.mesh.faces)
+        ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
+        straight = visible(*ends, neighbors, self.mesh.faces.of_tets, planes.normals, planes.offsets, planes.signs)
+        vectors, strengths = means[:, :3], means[:, 3]
+        with np.errstate(divide="ignore"):
+            heights = np.log(np.maximum(strengths, 0)) + factors
+        roots = uphill_roots(heights, neighbors, straight)
+        side = -np.sign(np.einsum("mi,mi->m", unit(vectors), gradients))[roots]
+        return np.where(straight[:, None], vectors, -side[:, None] * gradients)
+
     def _solve(self, matrix: sparse.csr_matrix, time: float, loads: NDArray[np.float64]) -> NDArray[np.float64]:
-        """X up to a factor."""
-        loads = loads / np.abs(loads).max()
         if self.direct:
             if time not in self._factors:
                 self._factors.clear()
@@ -157,13 +217,17 @@ class TetDiscretization:
     def _laplacian(self) -> sparse.csr_matrix:
         return self.mesh.geometry.face_laplacian(self.mesh.faces)
 
-    def to_cells(self, stages: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-        """X at the tets: the mean of the four faces, in the last stage that knows them all."""
-        cells = stages[0][self.mesh.faces.of_tets].mean(axis=1)
-        for vectors in stages[1:]:
-            means = vectors[self.mesh.faces.of_tets].mean(axis=1)
-            cells = np.where(np.isnan(means), cells, means)
-        return cells
+    def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """X at the tets, where it is already."""
+        return vectors
+
+    @cached_property
+    def _is_convex(self) -> bool:
+        """Whether the mesh fills its convex hull."""
+        from scipy.spatial import ConvexHull
+
+        hull = ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
+        return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
         """b, the right-hand side of ``C φ = b``."""

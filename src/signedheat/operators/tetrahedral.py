@@ -20,8 +20,8 @@ FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 THIN = 1e-2
 """Volume, over the cube of the longest edge, below which a tet counts less; 0.118 for a regular one."""
 
-TIE = 1e-4
-"""Strength of the ties that hold the faces and vertices of flat tets together, where nothing else does."""
+FLAT = 1e-6
+"""Volume, over the cube of the longest edge, below which a tet is as good as flat."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,8 +158,9 @@ class Tetrahedra:
 
     @cached_property
     def ties(self) -> NDArray[np.float64]:
-        """(m,) stiffness of a tie between any two faces, or vertices, of a thin tet: it has next to none of its own."""
-        return TIE * (1 - self.weights) * np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
+        """(m,) stiffness of a tie between any two faces of a flat tet: it has next to none of its own."""
+        lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
+        return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
 
     def face_mass(self, faces: FaceTable) -> NDArray[np.float64]:
         """(f,) M of Eq. 12, lumped: a quarter of the volume at each face."""
@@ -167,12 +168,18 @@ class Tetrahedra:
         return np.bincount(faces.of_tets.ravel(), weights=quarter, minlength=len(faces.vertices))
 
     def face_laplacian(self, faces: FaceTable) -> sparse.csr_matrix:
-        """(f, f) Crouzeix–Raviart Laplacian: L_ab = Σ_T N_a·N_b / |T|, which is −(3/2) |e| cot θ between two faces."""
+        """(f, f) Crouzeix–Raviart Laplacian: L_ab = Σ_T N_a·N_b / |T|, which is −(3/2) |e| cot θ between two faces.
+
+        The faces of flat tets are tied to each other besides: directions then pass through them unharmed.
+        """
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.of_tets, len(faces.vertices))
 
     def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
-        """(n, n) cotan Laplacian: C_ij = Σ_T N_i·N_j / (9|T|), which is −(1/6) |e| cot θ between two vertices."""
-        return _assemble(self.area_vectors, self.stiffness_factors / 9, self.ties, corners, n)
+        """(n, n) cotan Laplacian: C_ij = Σ_T N_i·N_j / (9|T|), which is −(1/6) |e| cot θ between two vertices.
+
+        The vertices of flat tets are tied to each other, loosely, besides, since some have no other tets.
+        """
+        return _assemble(self.area_vectors, self.stiffness_factors / 9, 1e-4 * self.ties, corners, n)
 
     def divergence(self, directions: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
         """(n,) b of Eq. 13: ∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T for one vector Y per tet."""

@@ -27,6 +27,10 @@ class TetSource:
     ----------
     vectors : (f, 3) float
         X₀ at the faces.
+    strengths : (f,) float
+        The same for areas without direction: what an unsigned distance starts from.
+    centers : (p, 3) float
+        Points on the source, one for each piece of it.
     time : float
         t of Eq. 12.
     rows : (s, n) sparse
@@ -41,6 +45,8 @@ class TetSource:
     """
 
     vectors: NDArray[np.float64]
+    strengths: NDArray[np.float64]
+    centers: NDArray[np.float64]
     time: float
     rows: sparse.csr_matrix
     weights: NDArray[np.float64]
@@ -77,8 +83,8 @@ def tet_source(
     SourceError
         If a source is of another kind, lies outside the mesh, has no normals, or cancels itself.
     """
-    vectors = np.zeros((len(mesh.faces.vertices), 3))
-    patches, notes, n_components, n_unknowns = [], {}, 0, int(unknowns.max()) + 1
+    loads = np.zeros((len(mesh.faces.vertices), 4))
+    patches, centers, notes, n_components, n_unknowns = [], [], {}, 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):
         elements = area_elements(source)
         if elements.corners.shape[2] != 3:
@@ -95,20 +101,23 @@ def tet_source(
         if outside > 1e-9:
             notes[f"source {number} outside the mesh"] = f"{100 * outside:.3g} % of its area, left out"
         spacing = max(spacing, elements.spacing)
-        # X₀ = ∫ ψ N, exactly, since ψ is linear on each piece. On a face of the mesh ψ is one there, with mean zero
-        # on the others.
-        psi = 1 - 3 * pieces.barycentric
+        # X₀ = ∫ ψ N, without the parts where ψ is negative: they would send out waves of the wrong sign. On a face of
+        # the mesh ψ is one there, and zero on the others.
+        psi = np.maximum(1 - 3 * pieces.barycentric, 0)
+        psi /= psi.sum(axis=1, keepdims=True)
         faces = mesh.faces.of_tets[pieces.tets]
-        for axis in range(3):
-            loads = psi * pieces.area_vectors[:, axis, None]
-            vectors[:, axis] += np.bincount(faces.ravel(), weights=loads.ravel(), minlength=len(vectors))
+        for column, values in enumerate([*pieces.area_vectors.T, pieces.areas]):
+            loads[:, column] += np.bincount(faces.ravel(), (psi * values[:, None]).ravel(), len(loads))
+        centers.append(np.einsum("pk,pki->pi", pieces.barycentric, mesh.vertices[mesh.tets[pieces.tets]]))
         components = elements.components[pieces.parents] + n_components
         patches.append((*_patches(mesh, unknowns, n_unknowns, pieces, components), number))
         n_components = int(components.max()) + 1
-    if not np.abs(vectors).max() > 0:
+    if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
         raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
     return TetSource(
-        vectors=vectors,
+        vectors=loads[:, :3],
+        strengths=loads[:, 3],
+        centers=np.concatenate(centers),
         time=diffusion * spacing**2,
         rows=sparse.vstack([rows for rows, *_ in patches], format="csr"),
         weights=np.concatenate([weights for _, weights, *_ in patches]),
