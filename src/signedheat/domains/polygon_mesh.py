@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..operators.virtual_refinement import VirtualRefinement, virtual_refinement
 from .exchange import Exchangeable
-from .surface import Surface
+from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
@@ -129,7 +129,8 @@ class PolygonMesh(Exchangeable, Surface):
         return self.refinement.prolongation @ values
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        return face_mask[self.refinement.face_polygons] if face_mask.shape == (self.n_polygons,) else face_mask
+        check_mask(face_mask, self.n_polygons)
+        return face_mask[self.refinement.face_polygons]
 
     def __repr__(self) -> str:
         return f"PolygonMesh({self.n_vertices} vertices, {self.n_polygons} polygons)"

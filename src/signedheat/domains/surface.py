@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import SourceError
 from ..sources.curves import Curve, SurfacePoints
 
 if TYPE_CHECKING:
@@ -198,4 +199,13 @@ class Surface:
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Faces of `triangulation` that belong to faces of the domain."""
+        check_mask(face_mask, self.triangulation.n_faces)
         return face_mask
+
+
+def check_mask(face_mask: NDArray[np.bool_], n_faces: int) -> None:
+    """Refuse what is not one boolean per face."""
+    if face_mask.shape != (n_faces,) or face_mask.dtype != bool:
+        raise SourceError(
+            f"a region needs one boolean per face, {n_faces} in all, not {face_mask.dtype} of shape {face_mask.shape}"
+        )

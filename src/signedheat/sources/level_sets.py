@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..errors import SourceError
 from .chains import chains
@@ -77,11 +77,8 @@ def gradients(mesh: TriangleMesh, values: NDArray[np.float64], faces: NDArray[np
     return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
 
 
-def region_boundary(mesh: TriangleMesh, face_mask: ArrayLike) -> list[Curve]:
+def region_boundary(mesh: TriangleMesh, mask: NDArray[np.bool_]) -> list[Curve]:
     """Edges between faces in a region and faces outside, with the region to the left."""
-    mask = np.asarray(face_mask)
-    if mask.shape != (mesh.n_faces,) or mask.dtype != bool:
-        raise SourceError(f"a region needs one boolean per face: {mesh.n_faces}, not {mask.dtype} {mask.shape}")
     inside = np.bincount(mesh.edges.of_faces.ravel(), np.repeat(mask, 3), len(mesh.edges.vertices))
     between = (inside > 0) & (inside < mesh.edges.face_counts)
     return along_sides(mesh, between[mesh.edges.of_faces] & mask[:, None])
