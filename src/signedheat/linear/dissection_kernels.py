@@ -28,13 +28,23 @@ def dissect(starts, neighbors, leaf):
         while True:
             for p in range(begin, end):
                 level[order[p]] = -1
-            reached = _levels(starts, neighbors, region, here, seed, level, queue)
+            reached = _levels(starts, neighbors, region, here, seed, level, queue, 0)
             last = level[queue[reached - 1]]
             if last <= depth or reached < end - begin:
                 break
             depth, seed = last, queue[reached - 1]
-        if reached < end - begin:  # several parts: one of them, and the rest
-            regions = _split(order, begin, end, level, -1, region, regions, stack)
+        if reached < end - begin:  # several parts
+            first = 0
+            for p in range(begin, end + 1):
+                if first < reached:  # a part is complete
+                    for q in range(first, reached):
+                        region[queue[q]] = regions
+                    regions += 1
+                    stack.append((begin + first, begin + reached))
+                    first = reached
+                if p < end and level[order[p]] < 0:
+                    reached = _levels(starts, neighbors, region, here, order[p], level, queue, first)
+            order[begin:end] = queue[: end - begin]
             continue
         last = level[queue[reached - 1]]
         if last < 2:
@@ -78,11 +88,11 @@ def dissect(starts, neighbors, leaf):
 
 
 @njit(cache=True)
-def _levels(starts, neighbors, region, here, seed, level, queue):
-    """Breadth-first search within a region; the number of unknowns reached."""
+def _levels(starts, neighbors, region, here, seed, level, queue, begin):
+    """Breadth-first search within a region, into the queue from `begin` on; where the queue then ends."""
     level[seed] = 0
-    queue[0] = seed
-    head, tail = 0, 1
+    queue[begin] = seed
+    head, tail = begin, begin + 1
     while head < tail:
         i = queue[head]
         head += 1
@@ -93,25 +103,6 @@ def _levels(starts, neighbors, region, here, seed, level, queue):
                 queue[tail] = j
                 tail += 1
     return tail
-
-
-@njit(cache=True)
-def _split(order, begin, end, level, unreached, region, regions, stack):
-    """Part a region into what was reached and what was not."""
-    low, high = begin, end
-    while low < high:
-        if level[order[low]] != unreached:
-            low += 1
-        else:
-            high -= 1
-            order[low], order[high] = order[high], order[low]
-    for p in range(begin, low):
-        region[order[p]] = regions
-    for p in range(low, end):
-        region[order[p]] = regions + 1
-    stack.append((begin, low))
-    stack.append((low, end))
-    return regions + 2
 
 
 @njit(cache=True)

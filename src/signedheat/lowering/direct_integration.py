@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..discretization import Levels, SourceTerm
+from ..errors import ConstraintError
 from ..linear import Factor, factorize, upper_triangle, whole
 
 _MAX_ROUNDS = 12
+_MAX_INNER = 30
 _BATCH = 32  # right-hand sides solved at a time
 
 
@@ -35,7 +37,7 @@ class DirectIntegration:
 
     stiffness: sparse.csr_matrix
     factorize: Callable[[sparse.csr_matrix], Factor] = factorize
-    spring: float = 1e7
+    spring: float = 1e8
     _last: list[Any] = field(default_factory=list, repr=False)
 
     @cached_property
@@ -62,22 +64,24 @@ class DirectIntegration:
         rows, values = source.rows[pinned], levels.values[pinned]
         if levels.groups is None:
             fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
+            _refuse_contradictions(rows, values, fitted[:, 0])
             return self._reached(fitted[:, 0], rows)
         group = levels.groups[pinned]
-        part = self._part_of(rows)
-        free = np.ones(int(group.max()) + 1, dtype=bool)
-        free[group[np.unique(part, return_index=True)[1]]] = False
-        loads = sparse.csr_matrix((np.ones(len(group)), (np.arange(len(group)), group)))[:, np.flatnonzero(free)]
+        bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a sample alone is bound to nothing
+        rows, values, group = rows[bound], values[bound], np.unique(group[bound], return_inverse=True)[1]
+        fixed = group[np.unique(self._part_of(rows), return_index=True)[1]]
+        free = np.setdiff1d(group, fixed)
+        held = np.flatnonzero(np.isin(group, free))
+        entries = np.ones(len(held)), (held, np.searchsorted(free, group[held]))
+        loads = sparse.csr_matrix(entries, shape=(len(group), len(free)))
         _, pull = self._interpolate(rows, divergence[:, None], values[:, None])
-        constants = np.zeros(loads.shape[1])
-        if len(constants):
-            capacitance = np.empty((len(constants), len(constants)))
-            for begin in range(0, len(constants), _BATCH):
-                batch = slice(begin, begin + _BATCH)
-                lifted = loads[:, batch].toarray()
-                _, multipliers = self._interpolate(rows, np.zeros((len(divergence), lifted.shape[1])), lifted)
-                capacitance[:, batch] = loads.T @ multipliers
-            constants = np.linalg.solve(capacitance, -(loads.T @ pull[:, 0]))
+        capacitance = np.empty((len(free), len(free)))
+        for begin in range(0, len(free), _BATCH):
+            batch = slice(begin, begin + _BATCH)
+            lifted = loads[:, batch].toarray()
+            _, multipliers = self._interpolate(rows, np.zeros((len(divergence), lifted.shape[1])), lifted)
+            capacitance[:, batch] = loads.T @ multipliers
+        constants = np.linalg.lstsq(capacitance, -(loads.T @ pull[:, 0]))[0]
         fitted, _ = self._interpolate(rows, divergence[:, None], (values + loads @ constants)[:, None])
         return self._centered(fitted[:, 0], source)
 
@@ -95,22 +99,28 @@ class DirectIntegration:
 
         An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite however many rows repeat each other, and
         stiff springs leave two or three rounds to do. Every round starts from true residuals, which also mends what
-        the springs cost in accuracy.
+        the springs cost in accuracy. Rows that almost repeat each other give way slowly; where they do, conjugate
+        gradients find the displacements of the springs that close the gaps.
         """
         stiffness = whole(self.stiffness)
         spring = self.spring * self.stiffness.diagonal().max()
         factor = self._pulled_factor(rows, np.full(rows.shape[0], spring))
+
+        def pull(displacements: NDArray[np.float64]) -> NDArray[np.float64]:
+            return factor.solve(spring * (rows.T @ displacements))
+
         values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
-        gap, worst = levels, np.inf
+        gap, worst, slow = levels, np.inf, False
         for _ in range(_MAX_ROUNDS):
-            force = forces - stiffness @ values - rows.T @ multipliers
-            step = factor.solve(force + spring * (rows.T @ gap))
+            displacements = _conjugate_gradients(lambda d: rows @ pull(d), gap) if slow else gap
+            step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
             values += step
-            multipliers -= spring * (gap - rows @ step)
+            multipliers -= spring * (displacements - rows @ step)
             gap = levels - rows @ values
             previous, worst = worst, np.abs(gap).max(initial=0.0)
-            if worst <= 1e-14 * np.abs(values).max() or worst > 0.5 * previous:
+            if worst <= 1e-13 * np.abs(values).max():
                 break
+            slow = slow or worst > 0.1 * previous
         return values, multipliers
 
     def _pulled_factor(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
@@ -153,3 +163,35 @@ def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.
     diagonal = matrix.indptr[vertices]
     data[diagonal] += np.where(data[diagonal] > 0, data[diagonal], 1.0)
     return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def _conjugate_gradients(
+    operator: Callable[[NDArray[np.float64]], NDArray[np.float64]], rhs: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Each column solved for by itself, roughly: whoever asks repeats it on what remains."""
+    solution, residual = np.zeros_like(rhs), rhs.copy()
+    direction, size = residual.copy(), (residual**2).sum(axis=0)
+    goal = 1e-6 * size
+    for _ in range(_MAX_INNER):
+        image = operator(direction)
+        curvature = (direction * image).sum(axis=0)
+        active = (size > goal) & (curvature > 0)
+        if not active.any():
+            break
+        length = np.divide(size, curvature, out=np.zeros_like(size), where=active)
+        solution += length * direction
+        residual -= length * image
+        smaller = (residual**2).sum(axis=0)
+        direction = residual + np.divide(smaller, size, out=np.zeros_like(size), where=size > 0) * direction
+        size = smaller
+    return solution
+
+
+def _refuse_contradictions(rows: sparse.csr_matrix, levels: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    gap = np.abs(levels - rows @ values)
+    worst = int(gap.argmax())
+    if gap[worst] > 1e-4 * (np.abs(levels).max() + np.ptp(values)):
+        raise ConstraintError(
+            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: sources that meet or "
+            "cross need the same level"
+        )

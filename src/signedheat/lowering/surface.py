@@ -129,7 +129,8 @@ class SurfaceDiscretization:
         return divergence(self.triangles, directions)
 
     def field(self, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> VertexField:
-        """φ at the vertices of the domain."""
+        """φ at the vertices of the domain; NaN where nothing was diffused, beyond single vertices for instance."""
+        values = np.where(self._reached_by(source.vectors), values, np.nan)
         if self.restriction is not None:
             values = values[self.restriction]
         unreached = np.flatnonzero(np.isnan(values))
@@ -142,6 +143,17 @@ class SurfaceDiscretization:
             )
         diagnostics = replace(diagnostics, unreached=unreached, notes={**diagnostics.notes, **self.notes})
         return VertexField(self.domain, values, diagnostics, source)
+
+    def _reached_by(self, vectors: NDArray[np.complex128]) -> NDArray[np.bool_]:
+        """(n_vertices,) whether a vertex has a face on a part that holds vectors. Vectors only pass along edges."""
+        parts = self.triangles.face_parts
+        if not parts.any() or not vectors.any():
+            return np.ones(self.triangles.n_vertices, dtype=bool)
+        lit = np.zeros(self.triangles.n_faces, dtype=bool)
+        lit[parts[(vectors != 0)[self.triangles.edges.of_faces].any(axis=1)]] = True
+        reached = np.zeros(self.triangles.n_vertices, dtype=bool)
+        reached[self.triangles.corner_vertices[lit[parts]]] = True
+        return reached
 
 
 @discretize.register

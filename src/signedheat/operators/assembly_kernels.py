@@ -114,3 +114,28 @@ def add_fluxes(corners, positions, directions, n):
             opposite = positions[f, (k + 2) % 3] - positions[f, (k + 1) % 3]
             sums[corners[f, k]] += 0.5 * (opposite.real * directions[f].imag - opposite.imag * directions[f].real)
     return sums
+
+
+@njit(cache=True)
+def join_faces(of_faces, n_edges):
+    """Which connected part each face lies in, where faces are joined along edges only: its first face."""
+    leader = np.arange(len(of_faces))
+    last = np.full(n_edges, -1)
+    for f in range(len(of_faces)):
+        for k in range(3):
+            other = last[of_faces[f, k]]
+            last[of_faces[f, k]] = f
+            if other >= 0:
+                a, b = _root(leader, other), _root(leader, f)
+                leader[max(a, b)] = min(a, b)
+    for f in range(len(of_faces)):
+        leader[f] = _root(leader, f)
+    return leader
+
+
+@njit(cache=True)
+def _root(leader, f):
+    while leader[f] != f:
+        leader[f] = leader[leader[f]]
+        f = leader[f]
+    return f

@@ -128,6 +128,13 @@ class LaidOutTriangles:
         """Whether no frame is reflected: then the connection Laplacian is complex Hermitian."""
         return not self.reflected.any()
 
+    @cached_property
+    def face_parts(self) -> NDArray[np.int64]:
+        """(m,) part of the surface that each face lies in, named by its first face; parts may share vertices."""
+        from .assembly_kernels import join_faces
+
+        return join_faces(self.edges.of_faces, self.n_edges)
+
     def in_edge_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """(m, 3) or (m, 1) face-layout vectors as seen in the frame of each of the face's edges."""
         turned = np.conj(self.edge_directions) * vectors
