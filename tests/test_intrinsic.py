@@ -252,6 +252,15 @@ def test_small_angles_between_kept_curves_end_the_splitting():
     assert np.linalg.norm(tips, axis=2).min(axis=1).max() < 0.2  # all of them where the rays come together
 
 
+def test_faces_that_have_an_edge_twice_along_a_nonmanifold_edge():
+    corners = [[0, 0, 0], [1, 0, 0], [0.5, 0.05, 0], [0.5, 0.05, 1], [0.5, -0.04, 0.3]]
+    folded = sh.TriangleMesh(corners, [[0, 1, 0], [0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    better = sh.intrinsic_delaunay(folded, refine=True)
+    assert better.complete and np.isfinite(better.vertices).all()
+    areas = folded.face_areas.sum()
+    assert better.triangles.face_areas.sum() == pytest.approx(areas, abs=1e-6)
+
+
 def test_degenerate_faces_are_flipped_away():
     corners = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 0, 0], [1, 1, 0], [1, 1, 0]]
     faces = [[0, 1, 4], [0, 4, 5], [4, 1, 5], [1, 2, 5], [2, 3, 6], [3, 0, 6], [0, 5, 6], [5, 2, 6]]

@@ -9,9 +9,8 @@ miss, and what lay on an edge that stays lies on it exactly.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from .intrinsic_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, diamond, following
+from .intrinsic_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, diamond, following, kernel
 
 BEFORE = np.full((4, 3, 3), -1)
 """By kind, face of the step and corner: which of the four points is there before it."""
@@ -21,7 +20,7 @@ BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
 BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
 
 
-@njit(cache=True)
+@kernel
 def carry(steps, weights, forward, n_faces, faces, barycentric, vectors):
     """Carry points and vectors at them through a history, forward or backward; in place.
 
@@ -93,13 +92,13 @@ def carry(steps, weights, forward, n_faces, faces, barycentric, vectors):
             born -= 1
 
 
-@njit(cache=True)
+@kernel
 def swap_last(w):
     """Follow a face that is turned over."""
     w[1], w[2] = w[2], w[1]
 
 
-@njit(cache=True)
+@kernel
 def exchange(kind, c, forward, corners, start, new_corners, new_start, w, vectors):
     """Carry one point, and vectors at it, over one step; returns which of the step's new faces has it."""
     lead = 3 if kind == SPLIT_FACE else 2  # the points before it are on one side of the dependency
@@ -126,13 +125,13 @@ def exchange(kind, c, forward, corners, start, new_corners, new_start, w, vector
     return place
 
 
-@njit(cache=True, inline="always")
+@kernel
 def has(corners, l):
     """Whether a face has point l of a step."""
     return corners[0] == l or corners[1] == l or corners[2] == l
 
 
-@njit(cache=True)
+@kernel
 def shift(x, c, lead, gone, amount):
     """Move weights along the dependency until one is gone."""
     for l in range(4):
@@ -140,7 +139,7 @@ def shift(x, c, lead, gone, amount):
     x[gone] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def walk(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
     """Go straight from a point along the first of its vectors, or against it, up to its end; other vectors go along.
 
@@ -188,7 +187,7 @@ def walk(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends
     return n
 
 
-@njit(cache=True)
+@kernel
 def walk_both_ways(g, faces, barycentric, vectors, out_faces, out_starts, out_ends, out_vectors, owners):
     """`walk` half of the first vector both ways from every point; rows whose owner is −1 − p go against it."""
     n = 0

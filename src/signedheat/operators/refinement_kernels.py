@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from .intrinsic_kernels import (
@@ -18,6 +17,7 @@ from .intrinsic_kernels import (
     SPLIT_FACE,
     apex_position,
     following,
+    kernel,
     look_at,
     preceding,
     ring_size,
@@ -71,7 +71,7 @@ class Goal(NamedTuple):
     max_vertices: int
 
 
-@njit(cache=True)
+@kernel
 def refine(g, agenda, goal):
     """Insert vertices until no face that can be helped has a smaller angle than the goal."""
     while settle(g, agenda.stack, agenda.stacked):
@@ -90,7 +90,7 @@ def refine(g, agenda, goal):
     return GROW
 
 
-@njit(cache=True)
+@kernel
 def changed_faces(g, n):
     """The faces that step n of the history changed or made, some perhaps twice."""
     kind, first, second = g.steps[n, 0], g.steps[n, 1], g.steps[n, 2]
@@ -103,7 +103,7 @@ def changed_faces(g, n):
     return first, first, first
 
 
-@njit(cache=True)
+@kernel
 def is_thin(g, f, goal):
     """Whether the smallest angle of a face, opposite to its shortest side, is below the goal; and the side."""
     h = 3 * f
@@ -114,7 +114,7 @@ def is_thin(g, f, goal):
     return n < goal.angle * d, h
 
 
-@njit(cache=True)
+@kernel
 def list_face(g, agenda, f, goal):
     """Put a thin face on the lists."""
     thin, h = is_thin(g, f, goal)
@@ -128,14 +128,14 @@ def list_face(g, agenda, f, goal):
     agenda.listed[f] = True
 
 
-@njit(cache=True)
+@kernel
 def list_all(g, agenda, goal):
     """Put every thin face on the lists."""
     for f in range(g.counts[0]):
         list_face(g, agenda, f, goal)
 
 
-@njit(cache=True)
+@kernel
 def next_thin(g, agenda, goal):
     """The thin face of (nearly) the largest circumradius, or −1."""
     for place in range(N_BINS - 1, -1, -1):
@@ -148,7 +148,7 @@ def next_thin(g, agenda, goal):
     return -1
 
 
-@njit(cache=True)
+@kernel
 def improve(g, agenda, f, goal):
     """Insert one vertex for the sake of a thin face, if that can help; False if there is no room for it."""
     h = is_thin(g, f, goal)[1]
@@ -166,7 +166,7 @@ def improve(g, agenda, f, goal):
     return True
 
 
-@njit(cache=True)
+@kernel
 def is_hopeless(g, agenda, h):
     """Whether the small angle opposite to h is there for good: given with the surface, or with the segments."""
     corner = preceding(h)
@@ -183,7 +183,7 @@ def is_hopeless(g, agenda, h):
     return False
 
 
-@njit(cache=True)
+@kernel
 def is_needle(g, h, goal):
     """Whether the ends of h all but coincide, and no angle of the face exceeds 150°: thin, but harmless."""
     n, d = tangent_at(g, preceding(h))
@@ -192,7 +192,7 @@ def is_needle(g, h, goal):
     return n < goal.needle * d and n1 < 13.9 * d1 and n2 < 13.9 * d2
 
 
-@njit(cache=True)
+@kernel
 def sector(g, corner):
     """Angle around the tail of a halfedge from segment to segment, or all around, as far as it matters (up to π)."""
     n, d = tangent_at(g, corner)
@@ -210,7 +210,7 @@ def sector(g, corner):
     return total
 
 
-@njit(cache=True)
+@kernel
 def unfold(g, h, side, tx, ty, hx, hy):
     """Lay out the face on the other side of h, whose ends lie at t and h: its apex, and on which side its inside lies.
 
@@ -227,13 +227,13 @@ def unfold(g, h, side, tx, ty, hx, hy):
     return tx + x * ux - side * y * uy, ty + x * uy + side * y * ux, side
 
 
-@njit(cache=True)
+@kernel
 def cross(ax, ay, bx, by, cx, cy):
     """Twice the signed area of abc."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
-@njit(cache=True)
+@kernel
 def find_circumcenter(g, f):
     """Walk straight from a face's barycentre to its circumcentre.
 
@@ -282,7 +282,7 @@ def find_circumcenter(g, f):
     return INSIDE, f, px, py
 
 
-@njit(cache=True)
+@kernel
 def encroached(g, agenda, f, px, py):
     """A segment in whose diametral circle p lies and which p would see, or −1; p in the frame of face f."""
     ends, halfedges = agenda.room, agenda.halfedges
@@ -320,7 +320,7 @@ def encroached(g, agenda, f, px, py):
     return -1
 
 
-@njit(cache=True)
+@kernel
 def has_room(g, agenda, ring):
     """Whether a split of an edge with `ring` faces fits into the arrays (one of a face takes less)."""
     faces, edges, vertices, steps = g.counts[0], g.counts[1], g.counts[2], g.counts[3]
@@ -332,7 +332,7 @@ def has_room(g, agenda, ring):
     )
 
 
-@njit(cache=True)
+@kernel
 def look_around(g, agenda, step):
     """Put the edges of all faces that the steps from `step` on have changed on the stack."""
     for n in range(step, g.counts[3]):
@@ -341,7 +341,7 @@ def look_around(g, agenda, step):
                 look_at(g, agenda.stack, agenda.stacked, g.edge[3 * f + k])
 
 
-@njit(cache=True)
+@kernel
 def insert(g, agenda, f, px, py):
     """Put a vertex at p (in the frame of face f), or on the face's edge that it all but lies on."""
     step = g.counts[3]
@@ -374,7 +374,7 @@ def insert(g, agenda, f, px, py):
     look_around(g, agenda, step)
 
 
-@njit(cache=True)
+@kernel
 def folded_face(g, h):
     """A face that has the edge of h twice, or −1."""
     y = h
@@ -386,7 +386,7 @@ def folded_face(g, h):
             return -1
 
 
-@njit(cache=True)
+@kernel
 def split_segment(g, agenda, h, f, goal):
     """Split a segment that stands in the way of healing face f; False if there is no room for it.
 
