@@ -25,11 +25,16 @@ class Grid:
         Distance between neighbouring nodes along each axis, in the units of the shape.
     shape : (d,) int
         Number of nodes along each axis. Arrays on the grid are indexed ``[i, j, k]`` ↔ x, y, z.
+    mask : (*shape) bool, optional
+        Solid nodes: True where no way leads through. Distance is measured around the boxes of one cell that have them
+        at their centres, from node to node along the axes: a wall is tight where its nodes are joined by sides, or, in
+        the plane, by corners.
 
     Raises
     ------
     GeometryError
-        If the spacing is not positive and finite, or an axis has fewer than two nodes.
+        If the spacing is not positive and finite, an axis has fewer than two nodes, or the mask is not boolean, has
+        another shape or leaves no node.
 
     Examples
     --------
@@ -43,8 +48,9 @@ class Grid:
     origin: NDArray[np.float64]
     spacing: NDArray[np.float64]
     shape: tuple[int, ...]
+    mask: NDArray[np.bool_] | None
 
-    def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike) -> None:
+    def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None) -> None:
         corner = np.atleast_1d(np.array(origin, dtype=np.float64))
         counts = np.atleast_1d(np.asarray(shape))
         if corner.ndim != 1 or not np.isfinite(corner).all():
@@ -61,6 +67,7 @@ class Grid:
         object.__setattr__(self, "origin", frozen(corner))
         object.__setattr__(self, "spacing", frozen(np.broadcast_to(steps, corner.shape).copy()))
         object.__setattr__(self, "shape", tuple(int(n) for n in counts))
+        object.__setattr__(self, "mask", None if mask is None else _solid_nodes(mask, self.shape))
 
     @classmethod
     def around(
@@ -143,4 +150,14 @@ class Grid:
         return ((points >= self.origin) & (points <= self.upper)).all(axis=-1)
 
     def __repr__(self) -> str:
-        return f"Grid(origin={self.origin.tolist()}, spacing={self.spacing.tolist()}, shape={self.shape})"
+        solid = "" if self.mask is None else f", {int(self.mask.sum())} solid nodes"
+        return f"Grid(origin={self.origin.tolist()}, spacing={self.spacing.tolist()}, shape={self.shape}{solid})"
+
+
+def _solid_nodes(mask: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    solid = np.array(mask)
+    if solid.dtype != np.bool_ or solid.shape != shape:
+        raise GeometryError(f"the mask must be boolean, of shape {shape}, not {solid.dtype} of shape {solid.shape}")
+    if solid.all():
+        raise GeometryError("all nodes of the grid are solid: True in the mask means that no way leads through")
+    return frozen(solid)

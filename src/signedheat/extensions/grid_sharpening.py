@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+import numpy as np
+
+from ..errors import GeometryError
 from ..fields.grid_field import GridField
 from .sharpening import sharpen
 
@@ -14,6 +17,11 @@ def _(field: GridField) -> GridField:
     """Distance of every node to the zero set; signs stay as they are. Second order on smooth shapes."""
     from ..operators.closest_points import distance_to_zero_set
 
+    if not np.isfinite(field.values).all():
+        raise GeometryError(
+            "a field around solid nodes, or with parts that no source reaches, cannot be sharpened: straight lines to "
+            "its zero set would pass through what is solid; use it as it is"
+        )
     begin = time.perf_counter()
     values = distance_to_zero_set(field.values, field.grid.spacing)
     timings = {**field.diagnostics.timings, "sharpen": time.perf_counter() - begin}

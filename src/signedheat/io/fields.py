@@ -29,8 +29,8 @@ CONVENTION = (
 )
 NAME = "signed_distance"
 
-Parts = tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]
-"""Values, origin, spacing."""
+Parts = tuple[Any, ...]
+"""Values, origin, spacing; and the mask, where there is one."""
 
 
 def save_field(field: GridField, path: PathLike) -> None:
@@ -116,10 +116,10 @@ def load_field(path: PathLike) -> GridField | TetField | VertexField:
         raise unknown_extension(path, _FORMATS, "a field")
     _, read = _FORMATS[extension(path)]
     try:
-        values, origin, spacing = read(path)
+        values, origin, spacing, *mask = read(path)
         if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
             raise FileFormatError(f"{path}: the values are no real numbers but {values.dtype}: it holds no field")
-        return GridField(Grid(origin, spacing, values.shape), np.ascontiguousarray(values))
+        return GridField(Grid(origin, spacing, values.shape, *mask), np.ascontiguousarray(values))
     except GeometryError as error:
         raise FileFormatError(f"{path}: {error}") from error
 
@@ -136,13 +136,15 @@ def _write_npz(field: GridField, path: Path) -> None:
             origin=field.grid.origin,
             spacing=field.grid.spacing,
             convention=np.array(CONVENTION),
+            **({} if field.grid.mask is None else {"mask": field.grid.mask}),
         )
 
 
 def _read_npz(path: PathLike) -> Parts:
     try:
         with np.load(io.BytesIO(contents(path)), allow_pickle=False) as file:
-            return file["values"], file["origin"], file["spacing"]
+            solid = [file["mask"]] if "mask" in file else []
+            return file["values"], file["origin"], file["spacing"], *solid
     except KeyError as error:
         raise FileFormatError(f"{path}: {error}: a field has values, origin and spacing") from error
     except FileFormatError:

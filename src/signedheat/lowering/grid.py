@@ -97,4 +97,8 @@ def _(domain: Grid) -> GridDiscretization:
     if domain.dimension > 4:
         raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}")
     refuse_beyond_memory(domain)
+    if domain.mask is not None:
+        from .masked_grid import MaskedGridDiscretization
+
+        return MaskedGridDiscretization(domain)
     return GridDiscretization(domain)
