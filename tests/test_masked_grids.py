@@ -25,7 +25,7 @@ def exact(grid):
     x, y = np.moveaxis(grid.points, -1, 0)
     h = grid.spacing[0]
     columns, rows = (np.flatnonzero(grid.mask.any(axis=axis)) for axis in (1, 0))
-    left, right, top = (columns[0] - 0.5) * h, (columns[-1] + 0.5) * h, (rows[-1] + 0.5) * h
+    right, top = (columns[-1] + 0.5) * h, (rows[-1] + 0.5) * h
     return np.where((x > right) & (y < top), right - 0.3 + np.hypot(x - right, y - top), x - 0.3)
 
 

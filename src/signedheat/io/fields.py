@@ -11,7 +11,6 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError

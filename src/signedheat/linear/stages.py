@@ -41,7 +41,7 @@ def solve_in_stages(
     >>> A = sparse.csr_matrix(sparse.diags_array([-1.0, 1e9, -1.0], offsets=[-1, 0, 1], shape=(50, 50)))
     >>> factor = sparse.linalg.splu(A.tocsc())
     >>> stages = solve_in_stages(A, factor.solve, np.eye(50)[:, :1])
-    >>> len(stages), round((np.log(stages[-1][0][49, 0]) + stages[-1][1]) / np.log(1e-9), 6)
+    >>> len(stages), round(float((np.log(stages[-1][0][49, 0]) + stages[-1][1]) / np.log(1e-9)), 6)
     (2, 50.0)
     """
     pattern = sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)

@@ -1,4 +1,4 @@
-"""Grids with solid nodes as a discretisation: the same stencil as a sparse matrix, directions that bend around corners."""
+"""Grids with solid nodes as a discretisation: the stencil as a sparse matrix, directions that bend around corners."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ class MaskedIntegration(DirectIntegration):
     diffusing: MaskedGridDiscretization | None = None
 
     def fit(self, divergence: NDArray[np.float64], source: MaskedSource, levels: Levels) -> NDArray[np.float64]:
-        """Subtract from φ the mean of its error at the samples, weighted by area and by how much heat comes from them."""
+        """Subtract from φ the mean of its error at the samples, weighted by area and by the heat that each sends."""
         phi = self.solve(divergence, source)
         excess = deviation(source.rows @ phi, source, levels)
         if not excess.any():

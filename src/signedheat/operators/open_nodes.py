@@ -12,7 +12,6 @@ from scipy import sparse
 
 from ..domains.grid import Grid
 
-
 ECHO = 3
 """Nodes beside a wall whose gradients its echo turns by more than a degree."""
 
