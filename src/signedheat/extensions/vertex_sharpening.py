@@ -113,6 +113,8 @@ class Convex:
     def sharpened(
         self, surface: SurfaceDiscretization, values: NDArray[np.float64], source: Any, progress: Progress | None
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+        from threadpoolctl import threadpool_limits
+
         triangles, rows = surface.triangles, getattr(source, "rows", None)
         if rows is None or rows.shape[1] != triangles.n_vertices:
             raise SourceError(
@@ -134,17 +136,18 @@ class Convex:
         dual = np.zeros_like(slope)
         limited = at_most_one(slope)
         total, number, residual = area.sum(), 0, np.inf
-        while number < self.max_rounds and residual > self.tolerance:
-            before, limited = limited, at_most_one(relaxed + dual)
-            dual += relaxed - limited
-            phi = factor.solve(pull + divergence(triangles, limited - dual))
-            slope = slopes(triangles, phi)
-            relaxed = self.relaxation * slope + (1.0 - self.relaxation) * limited
-            primal = np.sqrt(area @ np.abs(slope - limited) ** 2 / total)
-            residual = max(primal, np.sqrt(area @ np.abs(limited - before) ** 2 / total))
-            number += 1
-            if progress is not None:
-                progress(number / self.max_rounds, "sharpen")
+        with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
+            while number < self.max_rounds and residual > self.tolerance:
+                before, limited = limited, at_most_one(relaxed + dual)
+                dual += relaxed - limited
+                phi = factor.solve(pull + divergence(triangles, limited - dual))
+                slope = slopes(triangles, phi)
+                relaxed = self.relaxation * slope + (1.0 - self.relaxation) * limited
+                primal = np.sqrt(area @ np.abs(slope - limited) ** 2 / total)
+                residual = max(primal, np.sqrt(area @ np.abs(limited - before) ** 2 / total))
+                number += 1
+                if progress is not None:
+                    progress(number / self.max_rounds, "sharpen")
         return np.where(known, phi, np.nan), {"rounds": number, "residual": float(residual)}
 
 

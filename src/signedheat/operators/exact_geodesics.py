@@ -159,7 +159,7 @@ def _merge(a, b, length, tolerance):
     ax, ay = _ray(a, s0)
     bx, by = _ray(b, s1)
     a_norm, b_norm = np.sqrt(ax * ax + ay * ay), np.sqrt(bx * bx + by * by)
-    if a_norm == 0.0 or b_norm == 0.0:
+    if ay <= 1e-9 * a_norm or by <= 1e-9 * b_norm:
         return False
     ax, ay, bx, by = ax / a_norm, ay / a_norm, bx / b_norm, by / b_norm
     turn = ax * by - ay * bx
@@ -167,7 +167,7 @@ def _merge(a, b, length, tolerance):
     middle = 0.5 * (_distance(a, between, 0.0) + _distance(b, between, 0.0))
     merged = np.empty(6)
     merged[_S0], merged[_S1] = s0, s1
-    if abs(turn) * 1e6 * length < (s1 - s0) * by:
+    if abs(turn) * 1e6 * length <= (s1 - s0) * by:
         x, y = ax + bx, ay + by
         norm = np.sqrt(x * x + y * y)
         merged[_P], merged[_Q], merged[_KIND] = x / norm, y / norm, _BEAM
