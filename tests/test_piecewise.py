@@ -262,7 +262,7 @@ def test_bad_domain_and_source():
     with pytest.raises(sh.SourceError):
         sh.piecewise_distance(mesh, [])
     with pytest.raises(sh.SourceError, match="unoriented"):
-        sh.piecewise_distance(mesh, sh.SurfacePoints([0], [[0.2, 0.3, 0.5]]))
+        sh.piecewise_distance(mesh, sh.Curve([0, 0], [[0.2, 0.3, 0.5], [0.5, 0.3, 0.2]], oriented=False))
 
 
 def test_progress_can_cancel():

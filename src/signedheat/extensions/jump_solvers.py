@@ -132,15 +132,15 @@ def minimize_fast(
     spring = problem.weights / problem.weights.mean()
     incidence = problem.incidence()
     transposed = sparse.csr_matrix(incidence.T)
-    factor = factorize(_grounded_laplacian(incidence, spring))
-    constants = factor.solve(transposed @ (spring * (0.5 * (low + high))))
-    step = problem.differences(constants)
-    best, bound = constants, problem.floor
-    least = problem.objective(best)
-    threshold = _THRESHOLD * problem.scale
-    negligible = 1e-9 * threshold * problem.weights.sum()
-    z, scaled, rounds = step.copy(), np.zeros_like(step), 0
     with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
+        factor = factorize(_grounded_laplacian(incidence, spring))
+        constants = factor.solve(transposed @ (spring * (0.5 * (low + high))))
+        step = problem.differences(constants)
+        best, bound = constants, problem.floor
+        least = problem.objective(best)
+        threshold = _THRESHOLD * problem.scale
+        negligible = 1e-9 * threshold * problem.weights.sum()
+        z, scaled, rounds = step.copy(), np.zeros_like(step), 0
         while least - bound > max(tolerance * least, negligible) and rounds < max_rounds:
             for _ in range(_LOOK):
                 target = step + scaled

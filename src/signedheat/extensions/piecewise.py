@@ -59,7 +59,7 @@ def piecewise_distance(
     domain : TriangleMesh or PolygonMesh
         The surface.
     sources : Curve, SurfacePoints, or a sequence of them
-        Unoriented curves must run along edges, and points lie at vertices.
+        Unoriented curves must run along edges.
     diffusion : float
         τ in ``t = τ h²``.
     exact : bool
@@ -111,8 +111,7 @@ def piecewise_distance(
         adapted, groups = discretization.adapt(as_list(sources))
         if adapted.triangles is not triangles:
             raise SourceError(
-                "piecewise distance takes unoriented curves along edges and points at vertices only: "
-                "move them there, or orient the curve"
+                "piecewise distance takes unoriented curves along edges only: move the curve there, or orient it"
             )
         source = discretization.lower(groups, diffusion)
         directions = normalize(discretization, diffuse(discretization, source))

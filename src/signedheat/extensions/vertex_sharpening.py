@@ -127,16 +127,16 @@ class Convex:
         stiffness = cotan_matrix(triangles)
         spring = _SPRING * stiffness.diagonal().max()
         held = sparse.csr_matrix(stiffness + upper_triangle(spring * (rows.T @ rows)))
-        factor = factorize(held + sparse.diags_array(np.where(known, 0.0, stiffness.diagonal() + 1.0)))
-
-        phi = np.nan_to_num(values)
-        stiff = np.ptp(phi)
-        pull *= np.sign(phi) / stiff
-        relaxed = slope = slopes(triangles, phi)
-        dual = np.zeros_like(slope)
-        limited = at_most_one(slope)
-        total, number, residual = area.sum(), 0, np.inf
         with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
+            factor = factorize(held + sparse.diags_array(np.where(known, 0.0, stiffness.diagonal() + 1.0)))
+
+            phi = np.nan_to_num(values)
+            stiff = np.ptp(phi)
+            pull *= np.sign(phi) / stiff
+            relaxed = slope = slopes(triangles, phi)
+            dual = np.zeros_like(slope)
+            limited = at_most_one(slope)
+            total, number, residual = area.sum(), 0, np.inf
             while number < self.max_rounds and residual > self.tolerance:
                 before, limited = limited, at_most_one(relaxed + dual)
                 dual += relaxed - limited
