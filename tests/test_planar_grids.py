@@ -1,0 +1,198 @@
+"""Grids of one, two and four dimensions: polylines, points with normals, boolean images, lines of equal distance."""
+
+from __future__ import annotations
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import viewing
+
+
+def circle(n=400, radius=1.0, center=(0.0, 0.0), part=1.0):
+    """Clockwise, so that φ < 0 inside."""
+    angle = -2 * np.pi * part * np.arange(n) / n
+    return sh.Polyline(center + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), closed=part == 1.0)
+
+
+SQUARE = sh.Polyline([[-1, -1], [-1, 1], [1, 1], [1, -1]], closed=True)
+
+
+def distance_to_square(points):
+    beyond = np.abs(points) - 1
+    return np.linalg.norm(np.maximum(beyond, 0), axis=-1) + np.minimum(beyond.max(axis=-1), 0)
+
+
+def away_from(field):
+    return np.linalg.norm(field.grid.points, axis=-1) - 1
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def test_distance_to_a_line_is_exact_and_positive_to_its_left():
+    grid = sh.Grid((-1, -1), 0.05, (41, 31))
+    phi = sh.signed_distance(sh.Polyline([[-1.0, -0.23], [1.0, -0.23]]), grid)
+    np.testing.assert_allclose(phi.values, grid.points[..., 1] + 0.23, atol=1e-5)
+    back = sh.signed_distance(sh.Polyline([[1.0, -0.23], [-1.0, -0.23]]), grid)
+    np.testing.assert_allclose(back.values, -phi.values, atol=1e-12)
+
+
+def test_distance_to_a_circle_converges():
+    sizes = (32, 64, 128)
+    errors = []
+    for n in sizes:
+        phi = sh.signed_distance(circle(8 * n), resolution=n)
+        assert max(phi.grid.shape) == n and phi.grid.dimension == 2
+        assert rms(phi.values - away_from(phi)) < 0.25 * phi.grid.spacing[0]
+        errors.append(rms(sh.sharpen(phi).values - away_from(phi)))
+    assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 1.7
+
+
+def test_distance_to_a_square():
+    phi = sh.sharpen(sh.signed_distance(SQUARE, resolution=128))
+    error = phi.values - distance_to_square(phi.grid.points)
+    assert rms(error) < 0.3 * phi.grid.spacing[0]
+    assert np.abs(error).max() < 1.0 * phi.grid.spacing[0]
+
+
+def test_broken_and_doubled_circles():
+    whole = circle()
+    arcs = [sh.Polyline(whole.points[k : k + 30]) for k in range(0, 400, 50)]
+    phi = sh.sharpen(sh.signed_distance(arcs, resolution=96))
+    assert rms(phi.values - away_from(phi)) < 0.01
+    twice = sh.signed_distance([whole, whole], resolution=64)
+    np.testing.assert_allclose(twice.values, sh.signed_distance(whole, resolution=64).values, atol=1e-4)
+
+
+def test_a_line_that_crosses_itself():
+    """A figure eight: one loop clockwise, the other counter-clockwise."""
+    t = 2 * np.pi * np.arange(400) / 400
+    eight = sh.Polyline(np.stack([np.sin(t), 0.5 * np.sin(2 * t)], axis=1), closed=True)
+    phi = sh.signed_distance(eight, resolution=64)
+    left, right = phi([[-0.6, 0.0], [0.6, 0.0]])
+    assert left == pytest.approx(-right, abs=0.01)
+    assert abs(left) == pytest.approx(np.linalg.norm(eight.points - [0.6, 0], axis=1).min(), abs=0.02)
+
+
+def test_several_components_and_levels():
+    inner, outer = circle(radius=0.5), circle(radius=1.0)
+    phi = sh.signed_distance([inner, outer], resolution=64, constraint=sh.LevelValues([0.0, 0.5]))
+    assert rms(phi.values - (away_from(phi) + 0.5)) < 0.01
+    each = sh.signed_distance([inner, outer], resolution=64, constraint=sh.EachComponent())
+    assert np.ptp(each([[1.0, 0.0], [0.0, 1.0]]) - each([[0.5, 0.0], [0.0, 0.5]])) < 0.01
+    assert each([[1.0, 0.0]]) - each([[0.5, 0.0]]) == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_distance_scales(scale):
+    small = sh.signed_distance(circle(), resolution=32)
+    large = sh.signed_distance(sh.Polyline(scale * circle().points, closed=True), resolution=32)
+    np.testing.assert_allclose(large.values, scale * small.values, atol=1e-6 * scale)
+
+
+def test_points_on_a_line():
+    ends = np.array([[-0.52], [0.73]])
+    grid = sh.Grid([-1.0], 0.05, [61])
+    phi = sh.signed_distance(sh.PointCloud(ends, normals=[[-1.0], [1.0]]), grid)
+    x = grid.points[:, 0]
+    exact = np.maximum(-0.52 - x, x - 0.73)
+    assert np.abs(phi.values - exact).max() < 0.5 * 0.05  # at the ridge between both
+    assert np.abs(sh.sharpen(phi).values - exact).max() < 1e-5
+    np.testing.assert_allclose(phi.gradient([[-0.9], [1.5]]), [[-1.0], [1.0]], atol=1e-5)
+
+
+def test_a_sphere_in_four_dimensions():
+    rng = np.random.default_rng(1)
+    points = rng.normal(size=(8000, 4))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    phi = sh.signed_distance(sh.PointCloud(points, normals=points), resolution=18, padding=0.4)
+    assert phi.grid.dimension == 4
+    assert rms(phi.values - away_from(phi)) < 0.1 * phi.grid.spacing[0]
+    assert phi([[0.7, 0.7, 0.7, 0.7]])[0] == pytest.approx(0.4, abs=0.02)
+    assert rms(sh.sharpen(phi).values - away_from(phi)) < 0.1 * phi.grid.spacing[0]
+
+
+def test_lines_of_equal_distance_are_oriented_and_close():
+    phi = sh.sharpen(sh.signed_distance(circle(), resolution=96))
+    [line] = phi.contour(0.15)
+    assert line.closed and line.signed_area < 0
+    np.testing.assert_allclose(np.linalg.norm(line.points, axis=1), 1.15, atol=1e-3)
+    assert line.length == pytest.approx(2 * np.pi * 1.15, rel=1e-3)
+    again = sh.signed_distance(line, phi.grid)  # oriented so that φ grows to the left
+    assert again([[0, 0]])[0] < 0 < again([[1.4, 0]])[0]
+    [out] = phi.offset(-0.5)
+    assert -out.signed_area == pytest.approx(np.pi * 0.25, rel=2e-3)
+    with pytest.raises(sh.OutsideError, match="use a padding"):
+        phi.offset(0.5)
+    with pytest.raises(sh.OutsideError):
+        phi.contour(10.0)
+
+
+def test_open_lines_end_at_the_box():
+    grid = sh.Grid((0, 0), 0.1, (21, 11))
+    [line] = sh.signed_distance(sh.Polyline([[0, 0.52], [2, 0.52]]), grid).contour(0.2)
+    assert not line.closed
+    np.testing.assert_allclose(line.points[[0, -1]], [[0, 0.72], [2, 0.72]], atol=1e-4)
+
+
+def test_field_in_the_plane(tmp_path):
+    phi = sh.signed_distance(circle(), resolution=64)
+    rng = np.random.default_rng(2)
+    points = rng.uniform(-1.3, 1.3, (50, 2))
+    radius = np.linalg.norm(points, axis=1)
+    points, radius = points[radius > 0.2], radius[radius > 0.2]
+    np.testing.assert_allclose(phi(points), radius - 1, atol=0.02)
+    np.testing.assert_allclose(phi.gradient(points), points / radius[:, None], atol=0.12)
+    for ending in ("npz", "vti", "nrrd", "npy"):
+        phi.save(tmp_path / f"phi.{ending}")
+        again = sh.load_field(tmp_path / f"phi.{ending}")
+        np.testing.assert_array_equal(again.values, phi.values)
+        np.testing.assert_array_equal(again.grid.origin, phi.grid.origin)
+    viewing.save_slices(phi, tmp_path / "phi.png", [circle()], [0.2])
+    assert matplotlib.image.imread(tmp_path / "phi.png")[..., :3].std() > 0.05
+
+
+def test_boolean_images():
+    x, y = np.meshgrid(np.linspace(-2, 2, 161), np.linspace(-1.5, 1.5, 121), indexing="ij")
+    inside = (np.hypot(x + 0.8, y) < 0.7) | (np.hypot(x - 0.8, y) < 0.6)
+    lines = sh.Polyline.from_mask(inside, (-2, -1.5), 4 / 160)
+    assert len(lines) == 2 and all(line.closed and line.signed_area < 0 for line in lines)
+    assert sum(-line.signed_area for line in lines) == pytest.approx(np.pi * (0.49 + 0.36), rel=0.01)
+    phi = sh.signed_distance(lines, resolution=96)
+    exact = np.minimum(
+        *(np.hypot(phi.grid.points[..., 0] - a, phi.grid.points[..., 1]) - r for a, r in ((-0.8, 0.7), (0.8, 0.6)))
+    )
+    assert rms(phi.values - exact) < 0.03
+    [border] = sh.Polyline.from_mask(np.ones((3, 3), dtype=bool))  # what meets the border of the image is closed
+    assert border.closed and border.bounds.tolist() == [[-0.5, -0.5], [2.5, 2.5]]
+    with pytest.raises(sh.GeometryError, match="boolean image"):
+        sh.Polyline.from_mask(np.ones((3, 3)))
+    with pytest.raises(sh.GeometryError, match="boolean image"):
+        sh.Polyline.from_mask(np.zeros((3, 3), dtype=bool))
+
+
+def test_polylines_are_checked():
+    with pytest.raises(sh.GeometryError, match="at least 2"):
+        sh.Polyline([[0, 0]])
+    with pytest.raises(sh.GeometryError, match="no length"):
+        sh.Polyline([[1, 1], [1, 1], [1, 1]])
+    with pytest.raises(sh.GeometryError, match="NaN"):
+        sh.Polyline([[0, 0], [np.nan, 1]])
+    with pytest.raises(sh.GeometryError, match="shape"):
+        sh.Polyline([[0, 0, 0], [1, 0, 0]])
+    assert sh.Polyline([[0, 0], [1, 0], [1, 1], [0, 0]], closed=True).n_points == 3
+    repeated = sh.Polyline([[-1, 0], [0, 0], [0, 0], [1, 0]])  # ugly, but valid
+    grid = sh.Grid((-1, -1), 0.1, (21, 21))
+    np.testing.assert_allclose(sh.signed_distance(repeated, grid).values, grid.points[..., 1], atol=1e-5)
+
+
+def test_sources_of_the_wrong_dimension_are_refused():
+    with pytest.raises(sh.SourceError, match="lives in 2 dimensions, and the grid in 3"):
+        sh.signed_distance(SQUARE, sh.Grid((0, 0, 0), 0.1, (4, 4, 4)))
+    with pytest.raises(sh.SourceError, match="lives in 3 dimensions, and the grid in 2"):
+        sh.signed_distance(sh.TriangleMesh(np.eye(3), [[0, 1, 2]]), sh.Grid((0, 0), 0.1, (4, 4)))
+    with pytest.raises(sh.SourceError, match="misses the shape"):
+        sh.signed_distance(SQUARE, sh.Grid((5, 5), 0.1, (4, 4)))
