@@ -120,7 +120,8 @@ def piecewise_distance(
         pairs = face_pairs(triangles)
         slopes = corner_slopes(triangles, directions)
         problem = jump_problem(triangles, pairs, slopes, guarded_edges(triangles, parts))
-        solution = minimize_exactly(problem) if exact else minimize_fast(problem)
+        inner = None if progress is None else lambda share: progress(0.5 + 0.25 * share, "integrate")
+        solution = minimize_exactly(problem) if exact else minimize_fast(problem, progress=inner)
         values = centered(triangles, pairs, slopes + solution.constants[:, None], parts)
     with stopwatch("finish"):
         phi = PiecewiseField(domain, domain.triangulation, values, triangles)
