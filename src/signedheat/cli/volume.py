@@ -7,6 +7,7 @@ from typing import Any
 
 from ..io import ensure_field_writable, ensure_writable, read, save_field
 from ..viewing import PICTURE_FORMATS, save_slices
+from . import tets
 from .computing import check_grid_options, compute, describe, grid_for, naming
 from .options import Parser, Summary, add_command, add_grid_options
 
@@ -25,11 +26,20 @@ def add_to(commands: Any) -> None:
         "shape", metavar="SHAPE", help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc"
     )
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="field: .npz .vti .nrrd .npy .vdb")
+    parser.add_argument(
+        "--tets",
+        nargs="?",
+        const="",
+        metavar="MESH",
+        help="measure on tets, of a .mesh .msh .vtu .vtk .ele file or around the shape; OUT: .vtu .vtk .msh",
+    )
     add_grid_options(parser)
 
 
 def run(parser: Parser, arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, write."""
+    if arguments.tets is not None:
+        return tets.run(parser, arguments)
     check_grid_options(parser, arguments)
     ensure_field_writable(arguments.output)
     if arguments.preview:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
+from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh
 
 
@@ -94,17 +95,51 @@ class CloudReport:
     upper: tuple[float, ...]
 
 
-def inspect(shape: TriangleMesh | PolygonMesh | PointCloud) -> SurfaceReport | CloudReport:
+@dataclass(frozen=True)
+class TetReport:
+    """What a tet mesh is made of, and what is wrong with it.
+
+    Attributes
+    ----------
+    n_vertices, n_tets, parts : int
+        Counts; tets of one part are connected through faces.
+    inside_out_tets : int
+        Tets that were given inside out; reading turned them.
+    flat_tets : int
+        Tets with next to no volume.
+    nonmanifold_faces : int
+        Faces of more than two tets.
+    boundary_faces : int
+        Faces of a single tet.
+    volume : float
+        Sum of the tets' volumes.
+    lower, upper : (3,) float
+        Bounds.
+    """
+
+    n_vertices: int
+    n_tets: int
+    parts: int
+    inside_out_tets: int
+    flat_tets: int
+    nonmanifold_faces: int
+    boundary_faces: int
+    volume: float
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
+def inspect(shape: TriangleMesh | PolygonMesh | PointCloud | TetMesh) -> SurfaceReport | CloudReport | TetReport:
     """Count what a shape is made of, and what is wrong with it. Takes O(n log n) time.
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh or PointCloud
+    shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh
         Any shape, however broken.
 
     Returns
     -------
-    SurfaceReport or CloudReport
+    SurfaceReport, CloudReport or TetReport
 
     Examples
     --------
@@ -121,7 +156,25 @@ def inspect(shape: TriangleMesh | PolygonMesh | PointCloud) -> SurfaceReport | C
             lower=_tuple(shape.bounds[0]),
             upper=_tuple(shape.bounds[1]),
         )
-    return _inspect_surface(shape)
+    return _inspect_tets(shape) if isinstance(shape, TetMesh) else _inspect_surface(shape)
+
+
+def _inspect_tets(mesh: TetMesh) -> TetReport:
+    from ..operators.tetrahedral import FLAT
+
+    counts = mesh.faces.tet_counts
+    return TetReport(
+        n_vertices=mesh.n_vertices,
+        n_tets=mesh.n_tets,
+        parts=int(mesh.parts.max()) + 1,
+        inside_out_tets=len(mesh.reoriented),
+        flat_tets=int((mesh.geometry.thickness < FLAT).sum()),
+        nonmanifold_faces=int((counts > 2).sum()),
+        boundary_faces=int((counts == 1).sum()),
+        volume=float(mesh.tet_volumes.sum()),
+        lower=_tuple(mesh.bounds[0]),
+        upper=_tuple(mesh.bounds[1]),
+    )
 
 
 def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:

@@ -107,6 +107,17 @@ class TetMesh:
         return TriangleMesh(self.vertices, self.faces.vertices[self.faces.tet_counts == 1])
 
     @cached_property
+    def parts(self) -> NDArray[np.int64]:
+        """(m,) part of the mesh that each tet belongs to; tets of one part are connected through faces."""
+        from scipy import sparse
+
+        m, of_tets = self.n_tets, self.faces.of_tets.ravel()
+        size = m + len(self.faces.vertices)
+        ends = np.repeat(np.arange(m), 4), of_tets + m
+        graph = sparse.coo_matrix((np.ones(4 * m, dtype=np.int8), ends), shape=(size, size))
+        return sparse.csgraph.connected_components(graph, directed=False)[1][:m].astype(np.int64)
+
+    @cached_property
     def search_tree(self) -> Any:
         """A tree of the tets' boxes: an `operators.box_tree.BoxTree`."""
         from ..operators.box_tree import BoxTree

@@ -78,14 +78,9 @@ class TetDiscretization:
         Heat flows through faces. Parts of the mesh that touch in an edge or a vertex alone are separate domains, and a
         vertex that they share is an unknown in each.
         """
-        m, tets = self.mesh.n_tets, self.mesh.tets
-        of_tets = self.mesh.faces.of_tets.ravel()
-        through = sparse.coo_matrix((np.ones(4 * m, dtype=np.int8), (np.repeat(np.arange(m), 4), of_tets + m)))
-        size = m + len(self.mesh.faces.vertices)
-        through.resize(size, size)
-        n_parts, part = sparse.csgraph.connected_components(through, directed=False)
-        keys = tets * n_parts + part[:m, None]
-        return np.unique(keys, return_inverse=True)[1].reshape(m, 4)
+        parts = self.mesh.parts
+        keys = self.mesh.tets * (parts.max() + 1) + parts[:, None]
+        return np.unique(keys, return_inverse=True)[1].reshape(-1, 4)
 
     @cached_property
     def n_unknowns(self) -> int:

@@ -1,0 +1,51 @@
+"""Distance inside a tank with a baffle goes round the baffle; the tets need not follow the source.
+
+The source is a broken sphere in one corner: a third of its faces are gone.
+"""
+
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import trimesh
+
+import signedheat as sh
+
+EXPECTED = 3.297, 0.08  # from the sphere over the edge of the baffle to the far corner: the exact length
+CENTER, RADIUS = np.array([0.5, 0.5, 0.5]), 0.3
+
+
+def tank(n: int) -> sh.TetMesh:
+    """The box [0, 3] × [0, 2] × [0, 1] in cubes of side 1/n, six tets each, but for 1.4 < x < 1.6, y < 1.5."""
+    cells = np.stack(np.meshgrid(*map(np.arange, (3 * n, 2 * n, n)), indexing="ij"), axis=-1).reshape(-1, 3)
+    x, y, _ = (cells + 0.5).T / n
+    cells = cells[~((np.abs(x - 1.5) < 0.1) & (y < 1.5))]
+    stride = np.array([(2 * n + 1) * (n + 1), n + 1, 1])
+    orders = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
+    steps = [np.cumsum(np.vstack([np.zeros(3, int), np.eye(3, dtype=int)[list(order)]]), axis=0) for order in orders]
+    ids, tets = np.unique(np.concatenate([(cells[:, None] + s) @ stride for s in steps]), return_inverse=True)
+    points = np.stack([ids // stride[0], ids % stride[0] // stride[1], ids % stride[1]], axis=1) / n
+    return sh.TetMesh(points, tets.reshape(-1, 4))
+
+
+def main(folder: Path) -> float:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
+    keep = np.random.default_rng(0).random(len(ball.faces)) > 1 / 3
+    phi = sh.signed_distance(sh.TriangleMesh(ball.vertices + CENTER, ball.faces[keep]), tank(20))
+    x, y = np.meshgrid(np.linspace(0, 3, 301), np.linspace(0, 2, 201))
+    middle = np.stack([x, y, 0.5 + 0 * x], axis=-1)
+    values = np.where((np.abs(x - 1.5) < 0.1) & (y < 1.5), np.nan, phi(middle.reshape(-1, 3)).reshape(x.shape))
+    figure, axes = plt.subplots(figsize=(8, 5), layout="constrained")
+    axes.set_facecolor("dimgray")
+    axes.contourf(x, y, values, 40, cmap="YlOrBr")
+    axes.contour(x, y, values, np.arange(-0.2, 4, 0.2), colors="black", linewidths=0.5)
+    axes.contour(x, y, values, [0.0], colors="navy", linewidths=2)
+    axes.set(title="Distance round a baffle, from a sphere without a third of its faces", aspect="equal")
+    figure.savefig(folder / "distance_round_corners.png")
+    plt.close(figure)
+    return float(phi([[3.0, 0.0, 0.5]])[0])
+
+
+if __name__ == "__main__":
+    print(main(Path(sys.argv[1] if len(sys.argv) > 1 else ".")))

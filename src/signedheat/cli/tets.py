@@ -1,0 +1,62 @@
+"""``signedheat volume --tets``: the distance on tets instead of a grid."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from typing import Any
+
+from ..domains.grid import Grid
+from ..domains.tet_mesh import TetMesh
+from ..errors import GeometryError
+from ..extensions.tetrahedralize import tetrahedralize
+from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
+from ..io import ensure_writable, read
+from ..io.tets import TET_FIELD_FORMATS
+from ..solver import SignedHeatSolver
+from ..viewing import PICTURE_FORMATS, save_slices
+from .computing import describe, naming
+from .options import Parser, Summary
+from .progress import ProgressBar
+
+RESOLUTION = 32
+PREVIEW_NODES = 64
+
+
+def run(parser: Parser, arguments: Namespace) -> Summary:
+    """Read, check that the result can be written, compute, write."""
+    if arguments.spacing is not None or arguments.origin is not None or arguments.grid_shape is not None:
+        parser.error("--spacing, --origin and --shape are for grids, and do not go with --tets")
+    given = arguments.tets
+    if given and (arguments.resolution is not None or arguments.padding is not None):
+        parser.error("--resolution and --padding do not go with a mesh of your own")
+    ensure_writable(arguments.output, TET_FIELD_FORMATS, "a field on tets")
+    if arguments.preview:
+        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+    shape = read(arguments.shape)
+    mesh = read(given) if given else None
+    if mesh is not None and not isinstance(mesh, TetMesh):
+        raise GeometryError(f"{given} holds no tets, but a {type(mesh).__name__}: use a .mesh, .msh, .vtu or .ele file")
+    with naming(arguments.shape):
+        if mesh is None:
+            mesh = tetrahedralize(shape, resolution=arguments.resolution or RESOLUTION, padding=arguments.padding)
+        with ProgressBar(arguments.quiet or arguments.json) as progress:
+            field = SignedHeatSolver(mesh, arguments.diffusion, progress).distance(shape, arguments.constraint)
+    field.save(arguments.output)
+    if arguments.preview:
+        save_slices(on_grid(field), arguments.preview, shape)
+    summary: dict[str, Any] = {
+        "input": arguments.shape,
+        "output": arguments.output,
+        **describe(field),
+        "n_tets": mesh.n_tets,
+        "notes": {name: str(note) for name, note in field.diagnostics.notes.items()},
+    }
+    text = f"{arguments.output}: {mesh.n_tets} tets, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
+    return summary, "; ".join([text, *(f"{name}: {note}" for name, note in summary["notes"].items())])
+
+
+def on_grid(field: TetField) -> GridField:
+    """The field at the nodes of a coarse grid around its mesh, to draw slices of."""
+    grid = Grid.around(field.mesh.bounds, resolution=PREVIEW_NODES, padding=0.0)
+    return GridField(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))
