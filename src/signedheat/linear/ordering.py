@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .matrices import whole
 
-_LEAF = 8  # unknowns that are not dissected further
+_LEAF = 3  # unknowns that are not dissected further
 
 
 def elimination_order(upper: Any) -> NDArray[np.int64]:

@@ -1,0 +1,200 @@
+"""Distance on triangle meshes beside potpourri3d, and beside nothing but the two sparse solves it cannot do without.
+
+    python benchmarks/surface.py [--levels 5 6 7 8] [--peer-up-to 7]
+
+Each program runs in a process of its own, one after the other, on the same mesh and curves: a bumpy sphere and level
+sets that cross its faces, nothing imposed. Times in seconds, memory in megabytes above what imports and input take.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+BATCH = 16
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--levels", type=int, nargs="+", default=[5, 6, 7], help="subdivisions of an icosahedron")
+    parser.add_argument("--peer-up-to", type=int, default=7)
+    parser.add_argument("--worker", nargs=2, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.worker:
+        program, file = arguments.worker
+        print(json.dumps({"ours": ours, "peer": peer, "bare": bare}[program](np.load(file))))
+        return
+    columns = ["first", "next", "next zero set", "batched", "memory"]
+    print(f"{'vertices':>9} {'':>10}" + "".join(f"{c:>15}" for c in columns))
+    with tempfile.TemporaryDirectory() as folder:
+        for level in arguments.levels:
+            file = Path(folder) / f"{level}.npz"
+            n = write_input(file, level)
+            run("ours", file)  # compiles and warms the file cache
+            results = {p: run(p, file) for p in ("bare", "ours") + (("peer",) if level <= arguments.peer_up_to else ())}
+            for program, row in results.items():
+                print(f"{n:>9} {program:>10}" + "".join(f"{row.get(c, np.nan):>15.3f}" for c in columns), flush=True)
+            for other in (p for p in results if p != "ours"):
+                ratios = [results[other].get(c, np.nan) / results["ours"][c] for c in columns]
+                print(f"{'':>9} {other + '/ours':>10}" + "".join(f"{r:>15.2f}" for r in ratios), flush=True)
+            if "peer" in results:
+                fields = [np.load(f"{file}.{p}.npy") for p in ("ours", "peer")]
+                print(
+                    f"{'':>9} largest difference / range: {np.abs(fields[0] - fields[1]).max() / np.ptp(fields[1]):.1e}"
+                )
+
+
+def run(program: str, file: Path) -> dict[str, float]:
+    """One worker's figures."""
+    command = [sys.executable, __file__, "--worker", program, str(file)]
+    out = subprocess.run(command, capture_output=True, text=True, check=False)
+    if out.returncode:
+        raise SystemExit(f"{program} failed on {file.name}:\n{out.stderr}")
+    row = json.loads(out.stdout.splitlines()[-1])
+    if row.get("phi"):
+        np.save(f"{file}.{program}.npy", np.array(row.pop("phi")))
+    return row
+
+
+def write_input(file: Path, level: int) -> int:
+    """The mesh, and curves as (edge, t) nodes."""
+    import trimesh
+
+    import signedheat as sh
+
+    ball = trimesh.creation.icosphere(level)
+    x, y, _ = ball.vertices.T
+    points = ball.vertices * (1 + 0.2 * np.sin(5 * x) * np.cos(4 * y))[:, None]
+    mesh = sh.TriangleMesh(points, ball.faces)
+    arrays = {}
+    for k, height in enumerate(np.linspace(0.3, -0.3, BATCH + 2)):
+        curve = max(mesh.level_set(points @ [0.1, 0.2, 1.0], height), key=lambda c: c.n_points)
+        arrays[f"faces{k}"], arrays[f"barycentric{k}"] = curve.faces, curve.barycentric
+        opposite = curve.barycentric.argmin(axis=1)
+        corner = (opposite + 1) % 3
+        edge = mesh.edges.of_faces[curve.faces, corner]
+        rows = np.arange(len(edge))
+        tail_first = mesh.edges.vertices[edge, 0] == mesh.faces[curve.faces, corner]
+        arrays[f"edge{k}"] = edge
+        arrays[f"t{k}"] = curve.barycentric[rows, np.where(tail_first, (corner + 1) % 3, corner)]
+    np.savez(file, vertices=points, faces=np.asarray(ball.faces), **arrays)
+    return len(points)
+
+
+def ours(data) -> dict[str, object]:
+    import signedheat as sh
+
+    curves = [sh.Curve(data[f"faces{k}"], data[f"barycentric{k}"], closed=True) for k in range(BATCH + 2)]
+    vertices, faces = data["vertices"], data["faces"]
+    small = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
+    for constraint in (sh.Free(), sh.ZeroSet()):  # load compiled kernels and libraries
+        sh.SignedHeatSolver(small).distance(sh.Curve([0, 0], [[0.5, 0.5, 0], [0, 0.5, 0.5]]), constraint)
+    before, clock = memory(), Clock()
+    solver = sh.SignedHeatSolver(sh.TriangleMesh(vertices, faces))
+    phi = solver.distance(curves[0], sh.Free()).values
+    row = {"first": clock.lap(), "phi": phi.tolist()}
+    solver.distance(curves[1], sh.Free())
+    row["next"] = clock.lap()
+    row["memory"] = peak() - before
+    clock.lap()
+    solver.distance(curves[1])
+    row["next zero set"] = clock.lap()
+    solver.distance_many(curves[2:], sh.Free())
+    row["batched"] = clock.lap() / BATCH
+    return row
+
+
+def peer(data) -> dict[str, object]:
+    import potpourri3d as pp3d
+
+    curves = []
+    for k in range(BATCH + 2):
+        nodes = [(int(e), [float(t)]) for e, t in zip(data[f"edge{k}"], data[f"t{k}"], strict=True)]
+        curves.append([*nodes, nodes[0]])
+    vertices, faces = data["vertices"], data["faces"]
+    before, clock = memory(), Clock()
+    solver = pp3d.MeshSignedHeatSolver(vertices, faces)
+    phi = np.asarray(solver.compute_distance([curves[0]], level_set_constraint="None"))
+    row = {"first": clock.lap(), "phi": phi.tolist()}
+    solver.compute_distance([curves[1]], level_set_constraint="None")
+    row["next"] = clock.lap()
+    row["memory"] = peak() - before
+    clock.lap()
+    solver.compute_distance([curves[1]], level_set_constraint="ZeroSet")
+    row["next zero set"] = clock.lap()
+    for curve in curves[2:6]:
+        solver.compute_distance([curve], level_set_constraint="None")
+    row["batched"] = clock.lap() / 4  # it has no batches: one after the other
+    return row
+
+
+def bare(data) -> dict[str, object]:
+    """Order, factorise and solve M + tL and C, assembled beforehand, as the solver library does it by itself."""
+    import signedheat as sh
+    from signedheat.linear import factorize
+    from signedheat.operators.crouzeix_raviart import vector_heat_matrix
+
+    surface = sh.SignedHeatSolver(sh.TriangleMesh(data["vertices"], data["faces"])).discretization
+    heat, stiffness = vector_heat_matrix(surface.triangles, surface.spacing**2), surface.stiffness.copy()
+    stiffness.data[0] *= 2
+    ones = [np.ones(heat.shape[0], dtype=complex), np.ones(stiffness.shape[0])]
+    before, clock = memory(), Clock()
+    factors = [factorize(heat), factorize(stiffness)]
+    for factor, rhs in zip(factors, ones, strict=True):
+        factor.solve(rhs)
+    row = {"first": clock.lap()}
+    for factor, rhs in zip(factors, ones, strict=True):
+        factor.solve(rhs)
+    row["next"] = clock.lap()
+    row["memory"] = peak() - before
+    clock.lap()
+    for factor, rhs in zip(factors, ones, strict=True):
+        factor.solve(np.repeat(rhs[:, None], BATCH, axis=1))
+    row["batched"] = clock.lap() / BATCH
+    return row
+
+
+def memory() -> float:
+    """Megabytes in use; from here on, `peak` counts anew (on Linux; elsewhere it goes on from the highest so far)."""
+    try:
+        Path("/proc/self/clear_refs").write_text("5")
+    except OSError:
+        return peak()
+    return status("VmRSS")
+
+
+def peak() -> float:
+    """Most megabytes in use since `memory`."""
+    return (
+        status("VmHWM")
+        if Path("/proc/self/status").exists()
+        else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    )
+
+
+def status(name: str) -> float:
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith(name))
+
+
+class Clock:
+    """Seconds since the last lap."""
+
+    def __init__(self) -> None:
+        self.begin = time.perf_counter()
+
+    def lap(self) -> float:
+        begin, self.begin = self.begin, time.perf_counter()
+        return self.begin - begin
+
+
+if __name__ == "__main__":
+    main()
