@@ -222,3 +222,20 @@ def test_command_line(tmp_path, capsys):
     assert run("volume", tmp_path / "ball.stl", "-o", lattice_field, "--tets", "--spacing", "0.1") == 2
     assert run("volume", tmp_path / "ball.stl", "-o", lattice_field, "--tets", tmp_path / "ball.stl") == 1
     assert "holds no tets" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("package", ["tetgen", "pytetwild"])
+def test_tets_of_other_programs(package):
+    pytest.importorskip(package)
+    from signedheat.extensions import tet_meshers
+
+    mesher = {
+        "tetgen": tet_meshers.tetrahedralize_with_tetgen,
+        "pytetwild": tet_meshers.tetrahedralize_with_tetwild,
+    }[package]
+    whole = sphere(3)
+    broken = sh.TriangleMesh(whole.vertices, whole.faces[np.random.default_rng(0).random(whole.n_faces) > 0.1])
+    mesh = mesher(broken, resolution=8)
+    assert mesh.tet_volumes.sum() == pytest.approx(2.8**3, rel=2e-3)
+    phi = sh.signed_distance(broken, mesh)
+    assert rms(phi.values - (np.linalg.norm(mesh.vertices, axis=1) - 1)) < 0.05

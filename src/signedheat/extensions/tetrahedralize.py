@@ -55,6 +55,12 @@ def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float | None = 
     MemoryLimitError
         If the lattice would have more than 50 million tets.
 
+    Notes
+    -----
+    On lattices, waves of heat are a little faster along some directions than others. Diffusing four times as long
+    (``diffusion=4``) halves the error that this makes on smooth shapes. Unstructured tets do not have it: see
+    `signedheat.extensions.tet_meshers` for those of TetGen and fTetWild.
+
     Examples
     --------
     >>> import signedheat as sh

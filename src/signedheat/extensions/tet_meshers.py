@@ -1,0 +1,101 @@
+"""Tets from other programs, none of which the default installation brings.
+
+Unstructured tets have no preferred directions, which lattices have: at the same size their error is half as large, or
+less (``benchmarks/tets.py``).
+
+* TetGen (``pip install signedheat[tetgen]``) is under the AGPL-3, or a commercial licence, whatever its wheel says.
+* fTetWild (``pip install signedheat[tetwild]``) is under the MPL-2.0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.point_cloud import PointCloud
+from ..domains.tet_mesh import TetMesh
+from ..errors import GeometryError
+from ..sources.area_elements import area_elements, extent
+
+
+def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
+    """Fill a box around a shape with tets of TetGen's, all of about the same size.
+
+    The shape itself is not given to TetGen, which fails on faces that cross each other: tets need not follow it.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh or PointCloud
+        Any shape, however broken.
+    resolution : int
+        Number of tet edges along the longest side of the shape's box.
+    padding : float, optional
+        Room on every side, in the units of the shape; by default a fifth of its longest side.
+
+    Raises
+    ------
+    ImportError
+        If the package `tetgen` is not installed.
+    GeometryError
+        If the shape has no extent.
+    """
+    import tetgen
+
+    corners, faces, spacing = _box_around(shape, resolution, padding)
+    mesher = tetgen.TetGen(corners, faces.astype(np.int32))
+    volume = 1.5 * spacing**3 / (6 * np.sqrt(2))  # TetGen stays below it: tets of this edge length in the mean
+    vertices, tets = mesher.tetrahedralize(order=1, mindihedral=15, minratio=1.3, maxvolume=volume, fixedvolume=True)[
+        :2
+    ]
+    return TetMesh(vertices, tets)
+
+
+def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
+    """Fill a box around a shape with tets of fTetWild's, which follow the shape's faces nearly.
+
+    Parameters
+    ----------
+    shape : TriangleMesh or PolygonMesh
+        Any shape, however broken.
+    resolution : int
+        Number of tet edges along the longest side of the shape's box.
+    padding : float, optional
+        Room on every side, in the units of the shape; by default a fifth of its longest side.
+
+    Raises
+    ------
+    ImportError
+        If the package `pytetwild` is not installed.
+    GeometryError
+        If the shape has no faces, or no extent.
+    """
+    import pytetwild
+
+    if isinstance(shape, PointCloud):
+        raise GeometryError("fTetWild follows faces, and a point cloud has none: use tetrahedralize")
+    corners, faces, spacing = _box_around(shape, resolution, padding)
+    triangles = area_elements(shape).corners
+    vertices, ids = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    vertices, tets = pytetwild.tetrahedralize(
+        np.concatenate([corners, vertices]),
+        np.concatenate([faces, ids.reshape(-1, 3) + len(corners)]).astype(np.int32),
+        edge_length_abs=spacing,
+    )[:2]
+    return TetMesh(vertices, tets[:, [0, 1, 3, 2]])  # fTetWild's own order has negative volumes
+
+
+def _box_around(
+    shape: Any, resolution: int, padding: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.int64], float]:
+    """Corners and outward faces of the padded box of a shape, and the edge length wanted."""
+    lower, upper = extent(shape)
+    longest = float((upper - lower).max())
+    if len(lower) != 3 or not longest > 0:
+        raise GeometryError(f"{shape!r} has no extent in space of three dimensions to put a mesh around")
+    padding = longest / 5 if padding is None else padding
+    bits = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])
+    corners = np.where(bits, upper + padding, lower - padding)
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    return corners, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), longest / resolution
