@@ -32,7 +32,7 @@ from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField
 from .fields.tet_field import TetField
 from .fields.vertex_field import VertexField
-from .io import load_field, read, read_curves, save, write_curves
+from .io import load_field, read, read_curves, read_polylines, save, write_curves, write_polylines
 from .lowering import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
 from .lowering import grid as _grid  # noqa: F401  registers the lowering
 from .lowering import point_clouds as _point_clouds  # noqa: F401  registers the lowering
@@ -88,6 +88,7 @@ __all__ = [
     "piecewise_distance",
     "read",
     "read_curves",
+    "read_polylines",
     "save",
     "sharpen",
     "shell",
@@ -95,4 +96,5 @@ __all__ = [
     "tetrahedralize",
     "thicken",
     "write_curves",
+    "write_polylines",
 ]

@@ -3,18 +3,22 @@
 from .curves import CURVE_FORMATS, read_curves, write_curves
 from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable
+from .polylines import POLYLINE_FORMATS, read_polylines, write_polylines
 from .shapes import SHAPE_FORMATS, read, save
 
 __all__ = [
     "CURVE_FORMATS",
     "FIELD_FORMATS",
+    "POLYLINE_FORMATS",
     "SHAPE_FORMATS",
     "ensure_field_writable",
     "ensure_writable",
     "load_field",
     "read",
     "read_curves",
+    "read_polylines",
     "save",
     "save_field",
     "write_curves",
+    "write_polylines",
 ]

@@ -14,6 +14,7 @@ from ..errors import FileFormatError, SourceError
 from ..sources.chains import chains
 from ..sources.curves import Curve
 from .files import PathLike, text
+from .point_lists import read_point_lists
 
 SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
 
@@ -139,10 +140,15 @@ def strands(path: PathLike, kind: str, nodes: list[Node], segments: Sequence[tup
     return groups
 
 
-def read_json(path: PathLike, domain: Any) -> list[Group]:
-    """Vertex ids and weights, independent of any order of edges."""
+def read_json(path: PathLike, domain: Any) -> list[Any]:
+    """Vertex ids and weights, independent of any order of edges; or polylines in space."""
     try:
         content = json.loads(text(path))
+        if "polylines" in content:
+            return [
+                domain.polyline(np.array(line["points"], dtype=np.float64), closed=bool(line.get("closed", False)))
+                for line in content["polylines"]
+            ]
         base, groups = int(content.get("index_base", 0)), []
         for group in content["groups"]:
             nodes = [
@@ -163,6 +169,11 @@ def read_json(path: PathLike, domain: Any) -> list[Group]:
         if isinstance(error, (FileFormatError, SourceError)):
             raise
         raise FileFormatError(f"{path}: these are no curves with vertex ids and weights ({error!r})") from error
+
+
+def read_csv(path: PathLike, domain: Any) -> list[Curve]:
+    """Polylines in space, as tables of points."""
+    return [domain.polyline(points, closed=closed) for points, closed in read_point_lists(path, 3)]
 
 
 def read_obj(path: PathLike, domain: Any) -> Iterable[Group | Curve]:

@@ -24,6 +24,7 @@ from .curve_readers import (
     Node,
     edge_vertices,
     nodes_of,
+    read_csv,
     read_json,
     read_obj,
     read_text,
@@ -41,7 +42,9 @@ def read_curves(path: PathLike, domain: Any) -> list[Curve | SurfacePoints]:
         ``unsigned_point``, then nodes ``v vertex``, ``e edge fraction``, ``f face a b [c]`` (ids from 0) or ``l`` and
         vertex ids from 1; or nodes and oriented segments ``l i j`` between them, with ``#offset 0`` where ids start at
         0. A ``.obj`` file with line elements: on the vertices of the mesh if its vertices are those, projected onto it
-        if not. A ``.json`` file with vertex ids and weights.
+        if not. A ``.json`` file with vertex ids and weights, or with ``{"polylines": [{"points": [[x, y, z], …],
+        "closed": false}, …]}``, and a ``.csv`` file with x, y and z on each line and an empty line between polylines,
+        both projected onto the surface.
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface that the ids refer to.
 
@@ -205,6 +208,11 @@ def write_obj(curves: Sequence[Any], domain: Any) -> str:
     return "\n".join([*vertices, *elements]) + "\n"
 
 
-READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {".json": read_json, ".obj": read_obj, ".txt": read_text}
+READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {
+    ".csv": read_csv,
+    ".json": read_json,
+    ".obj": read_obj,
+    ".txt": read_text,
+}
 WRITERS: dict[str, Callable[..., str]] = {".json": write_json, ".obj": write_obj, ".txt": write_text}
 CURVE_FORMATS = frozenset(WRITERS)

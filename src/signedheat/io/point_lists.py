@@ -1,0 +1,56 @@
+"""Tables of points: one point a line, an empty line between one polyline and the next."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError
+from .files import PathLike, text
+
+
+def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.float64], bool]]:
+    """Points (n, dimension) of each polyline, and whether it is closed: then the file repeats its first point at the end.
+
+    Numbers are separated by commas, semicolons, tabs or spaces. Lines that begin with ``#`` and a first line of names
+    are passed over.
+
+    Raises
+    ------
+    FileFormatError
+        If a line does not hold `dimension` numbers, or there is none.
+    """
+    blocks: list[list[list[float]]] = [[]]
+    for number, line in enumerate(text(path).removeprefix("\ufeff").splitlines(), start=1):
+        words = [word for word in re.split(r"[,;\s]+", line.strip()) if word]
+        if not words:
+            blocks.append([])
+        elif not words[0].startswith("#"):
+            try:
+                values = [float(word) for word in words]
+            except ValueError:
+                values = []
+            if len(values) == dimension:
+                blocks[-1].append(values)
+            elif values or any(blocks):
+                raise FileFormatError(
+                    f"{path}: line {number}, '{line.strip()[:60]}', does not hold {dimension} numbers: give one point "
+                    "a line, and an empty line between polylines"
+                )
+    lists = [np.array(block) for block in blocks if block]
+    if not lists:
+        raise FileFormatError(f"{path}: there is no point in it: give {dimension} numbers a line")
+    closed = [len(points) > 3 and bool((points[0] == points[-1]).all()) for points in lists]
+    return [(points[:-1] if end else points, end) for points, end in zip(lists, closed, strict=True)]
+
+
+def write_point_lists(lists: Sequence[tuple[NDArray[np.float64], bool]]) -> str:
+    """The opposite."""
+    blocks = []
+    for points, closed in lists:
+        rows = [*points.tolist(), *([points[0].tolist()] if closed else [])]
+        blocks.append("".join(",".join(map(repr, row)) + "\n" for row in rows))
+    return "\n".join(blocks)

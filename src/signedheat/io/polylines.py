@@ -1,0 +1,133 @@
+"""Polylines in the plane from files and back: drawings (SVG) and tables of points (CSV)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.polyline import Polyline
+from ..errors import FileFormatError, GeometryError
+from .files import PathLike, contents, extension, replacing, unknown_extension
+from .point_lists import read_point_lists, write_point_lists
+
+CURVE_PIECES = 64
+"""Segments into which a Bézier curve or an arc is cut."""
+
+
+def read_polylines(path: PathLike) -> list[Polyline]:
+    """Read polylines in the plane; the extension says the format.
+
+    Parameters
+    ----------
+    path : str or path
+        ``.svg``: all paths, lines, polylines, polygons, rectangles, circles and ellipses, with their transforms, in
+        user units. The y axis, which runs downwards in such files, is turned upwards, so that left is what you see on
+        the left of a path. ``.csv``: x and y on each line, an empty line between polylines; a polyline is closed where
+        its last point is its first.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown kind, damaged, or holds no line.
+    GeometryError
+        If what it holds is no polyline.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> square = Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_polylines(f"{folder}/square.svg", square)
+    ...     read_polylines(f"{folder}/square.svg")
+    [Polyline(4 points, closed)]
+    """
+    if extension(path) not in POLYLINE_FORMATS:
+        raise unknown_extension(path, POLYLINE_FORMATS, "polylines in the plane")
+    lists = read_svg(path) if extension(path) == ".svg" else read_point_lists(path, 2)
+    lines = []
+    for number, (points, closed) in enumerate(lists):
+        try:
+            lines.append(Polyline(points, closed))
+        except GeometryError as error:
+            raise GeometryError(f"{path}: polyline {number}: {error}") from error
+    return lines
+
+
+def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> None:
+    """Write polylines in the plane; the extension says the format.
+
+    Parameters
+    ----------
+    path : str or path
+        ``.svg`` or ``.csv``, as `read_polylines` reads them, to the last bit. Written under a temporary name and then
+        renamed: a file that was there before survives a failure.
+    lines : Polyline or sequence of Polyline
+        What to write.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown or the file cannot be written.
+    """
+    if extension(path) not in POLYLINE_FORMATS:
+        raise unknown_extension(path, POLYLINE_FORMATS, "polylines in the plane")
+    listed = [lines] if isinstance(lines, Polyline) else list(lines)
+    if extension(path) == ".svg":
+        content = svg(listed)
+    else:
+        content = write_point_lists([(line.points, line.closed) for line in listed])
+    with replacing(path) as temporary:
+        temporary.write_text(content, encoding="utf-8")
+
+
+def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
+    """Points of each subpath, and whether it is closed."""
+    contents(path)
+    from svgpathtools import Document, Line
+    from svgpathtools.document import CONVERSIONS
+
+    conversions = {**CONVERSIONS, "circle": clockwise_ellipse, "ellipse": clockwise_ellipse}
+    try:
+        whole_paths = Document(str(path)).paths(path_conversions=conversions)
+        subpaths = [part for whole in whole_paths for part in whole.continuous_subpaths()]
+        found = []
+        for subpath in subpaths:
+            pieces = [[0.0] if isinstance(s, Line) else np.arange(CURVE_PIECES) / CURVE_PIECES for s in subpath]
+            places = [s.point(t) for s, ts in zip(subpath, pieces, strict=True) for t in ts]
+            closed = abs(subpath.end - subpath.start) <= 1e-9 * max(map(abs, places), default=0.0)
+            found.append((np.array(places if closed else [*places, subpath.end]), closed))
+    except Exception as error:  # the parser lets through whatever it stumbles on
+        raise FileFormatError(f"{path}: it is no SVG drawing, or is damaged ({error}): write it again") from error
+    if not found:
+        raise FileFormatError(f"{path}: there is no line in the drawing: convert text and images to paths first")
+    return [(np.stack([points.real, -points.imag], axis=1), closed) for points, closed in found]
+
+
+def clockwise_ellipse(element: Any) -> str:
+    """A circle or ellipse as a path that runs the way the SVG standard says, clockwise as one sees it."""
+    x, y, r, rx, ry = (float(element.get(name, 0)) for name in ("cx", "cy", "r", "rx", "ry"))
+    rx, ry = rx or r, ry or r
+    return f"M{x + rx},{y} A{rx},{ry} 0 1 1 {x - rx},{y} A{rx},{ry} 0 1 1 {x + rx},{y} Z"
+
+
+def svg(lines: Sequence[Polyline]) -> str:
+    """A drawing of all lines, y downwards."""
+    points = np.concatenate([line.points for line in lines])
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    margin = 0.05 * float((upper - lower).max())
+    box = [lower[0] - margin, -upper[1] - margin, *(upper - lower + 2 * margin)]
+    paths = []
+    for line in lines:
+        steps = " L ".join(f"{x!r},{-y!r}" for x, y in line.points.tolist())
+        paths.append(f'<path d="M {steps}{" Z" if line.closed else ""}"/>')
+    style = f'fill="none" stroke="black" stroke-width="{0.1 * margin:.6g}"'
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{" ".join(f"{value:.9g}" for value in box)}">\n'
+        f"<g {style}>\n" + "\n".join(paths) + "\n</g>\n</svg>\n"
+    )
+
+
+POLYLINE_FORMATS = frozenset({".csv", ".svg"})
