@@ -145,6 +145,7 @@ def test_aspect_ratios_of_a_million(spoil):
     angles = np.degrees(better.corner_angles)
     assert angles.max() < 150 and ((angles.min(axis=1) > 28 - 1e-6) | (angles.min(axis=1) < 0.5)).all()
     assert better.triangles.face_areas.sum() == pytest.approx(4.0, rel=1e-9)
+    assert better.bring(curve).lengths.sum() == pytest.approx(150 * 2 * 0.55 * np.sin(np.pi / 150), rel=1e-6)
     assert error(mesh, sh.SignedHeatSolver(better).distance(curve).restrict()) < 5e-3
 
 

@@ -30,6 +30,9 @@ from ..sources.pieces import Pieces, in_pieces, pieces
 MARGIN = 1e-14
 """Triangle inequalities hold at least by this fraction of the mean length; flat triangles are thickened to it."""
 
+THICKNESS = 1e-9
+"""The same, for what is computed on a triangulation that has been made."""
+
 LARGEST_ANGLE = 30.0
 """Degrees; refinement is not sure to end for more."""
 
@@ -105,7 +108,8 @@ class IntrinsicTriangulation:
     @cached_property
     def corner_angles(self) -> NDArray[np.float64]:
         """(m, 3) radians."""
-        return np.arctan2(1.0, self.triangles.corner_cotangents)
+        leaving = self.triangles.edge_vectors
+        return np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
 
     @cached_property
     def thin_faces(self) -> NDArray[np.int64]:
@@ -265,15 +269,20 @@ class Retriangulated:
 
 
 def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
-    """An intrinsic triangulation as the three steps see it."""
+    """An intrinsic triangulation as the three steps see it; what is flat against an edge that stays, is thickened."""
+    triangles = triangulation.triangles
+    lengths, added = mollify(triangles.edge_lengths, THICKNESS)
+    if added:
+        corners, edges = triangles.corner_vertices, triangles.edges
+        triangles = LaidOutTriangles.from_lengths(corners, lengths, triangles.n_vertices, edges)
     options = {
         "domain": triangulation,
         "bring": triangulation.bring,
-        "spacing": spacing(triangulation.triangles),
+        "spacing": spacing(triangles),
         "notes": {"intrinsic triangulation": triangulation.summary},
         **options,
     }
-    return SurfaceDiscretization(triangles=triangulation.triangles, **options)
+    return SurfaceDiscretization(triangles=triangles, **options)
 
 
 def spacing(triangles: LaidOutTriangles) -> float:

@@ -106,5 +106,6 @@ def sectors(gluing: Gluing) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     other = np.where(gluing.forward[h] == gluing.forward[t], t, following)
     graph = csr_matrix((np.ones(len(h)), (h, other)), shape=(n, n))
     label = connected_components(graph, directed=False)[1]
-    angles = np.arctan2(1.0, lay_out(gluing).corner_cotangents).ravel()
-    return label, np.bincount(label, weights=angles)
+    leaving = lay_out(gluing).edge_vectors
+    angles = np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
+    return label, np.bincount(label, weights=angles.ravel())

@@ -111,15 +111,15 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
     faces, at_start, at_end, directions = in_faces(before, source)
     along = at_end - at_start
     growth = differences_of(before, faces, directions[:, None])[:, 0]
+    at_piece = (along * before.corner_positions[faces]).sum(axis=1)
     vectors = np.stack([along, growth], axis=1)
     middle = history.forward(*_snapped(*embedding.down(faces, 0.5 * (at_start + at_end), vectors)))
     lines = straight(after, *middle)
 
     along = lines.vectors[:, 0]
     fraction = np.einsum("rk,rk->r", lines.ends - lines.starts, along) / np.einsum("rk,rk->r", along, along)
-    fraction = np.abs(fraction)
-    keep = fraction > SNAP
-    owners, faces, fraction = lines.owners[keep], lines.faces[keep], fraction[keep]
+    keep = np.abs(fraction) > SNAP
+    owners, faces = lines.owners[keep], lines.faces[keep]
     starts, ends = locate(after, faces, lines.starts[keep]), locate(after, faces, lines.ends[keep])
     last = np.append(np.diff(owners) > 0, True)
     first = np.append(True, last[:-1])
@@ -128,7 +128,12 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
     who_start = np.where(first, source.ends[owners, 0], np.roll(who_end, 1))
     chosen, who = distinct(places)
 
-    grown = (lines.vectors[keep, 1] * after.corner_positions[faces]).sum(axis=1) * fraction
+    # the angle between piece and growth is known; what was carried only tells on which side, however thin the faces
+    corners = after.corner_positions[faces]
+    steps = ((ends.barycentric - starts.barycentric) * corners).sum(axis=1)
+    carried = np.conj(steps) * (lines.vectors[keep, 1] * corners).sum(axis=1)
+    turn = (directions / (at_piece * np.abs(directions / at_piece)))[owners]
+    grown = steps * np.where(carried.imag * turn.imag < 0, np.conj(turn), turn)
     off = (starts.barycentric == 0) & (ends.barycentric == 0)
     side = (off.argmax(axis=1) + 1) % 3
     on_edge = off.any(axis=1)
