@@ -32,7 +32,7 @@ def tank(n: int) -> sh.TetMesh:
 def main(folder: Path) -> float:
     ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
     keep = np.random.default_rng(0).random(len(ball.faces)) > 1 / 3
-    phi = sh.signed_distance(sh.TriangleMesh(ball.vertices + CENTER, ball.faces[keep]), tank(20))
+    phi = sh.signed_distance(sh.TriangleMesh(ball.vertices + CENTER, ball.faces[keep]), tank(14))
     x, y = np.meshgrid(np.linspace(0, 3, 301), np.linspace(0, 2, 201))
     middle = np.stack([x, y, 0.5 + 0 * x], axis=-1)
     values = np.where((np.abs(x - 1.5) < 0.1) & (y < 1.5), np.nan, phi(middle.reshape(-1, 3)).reshape(x.shape))
