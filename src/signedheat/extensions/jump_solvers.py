@@ -21,7 +21,7 @@ from ..linear import factorize
 _LOOK = 25  # rounds between two looks at the gap
 _RELAXATION = 1.6
 _THRESHOLD = 4.0  # of the proximal step at first, times a typical difference
-_GROWTH, _PATIENCE = 2.0, 250  # it grows so much after so many rounds; measured over curves on tori and spheres
+_GROWTH, _PATIENCE = 2.0, 250  # it may grow so much every so many rounds; measured over curves on tori and spheres
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ def minimize_fast(
         z, scaled, rounds = step.copy(), np.zeros_like(step), 0
         while least - bound > max(tolerance * least, negligible) and rounds < max_rounds:
             for _ in range(_LOOK):
-                target = step + scaled
+                before, target = z, step + scaled
                 excess = target - np.clip(target, low, high)
                 z = target - np.clip(excess, -threshold, threshold)
                 scaled = target - z
@@ -157,13 +157,21 @@ def minimize_fast(
             flow = scaled * spring
             flow -= spring * problem.differences(factor.solve(transposed @ flow))
             bound = max(bound, problem.bound(flow * (2.0 * problem.weights.mean() / threshold)))
-            if rounds % _PATIENCE == 0:
+            if rounds % _PATIENCE == 0 and _lags(spring, difference, low, high, z, before, scaled):
                 threshold *= _GROWTH
                 scaled *= _GROWTH  # the multipliers stay what they are
             if progress is not None:
                 progress(rounds / max_rounds)
     moved = regions_moved(problem, best, problem.scale)
     return JumpSolution(moved, problem.objective(moved), bound, rounds)
+
+
+def _lags(spring, difference, low, high, z, before, scaled) -> bool:
+    """Whether the multipliers are slow to settle: the dual residual is more than twice the primal one, as parts."""
+    primal = np.sqrt(spring @ (difference - z) ** 2)
+    jumps = np.sqrt(spring @ (difference - np.clip(difference, low, high)) ** 2)
+    dual = np.sqrt(spring @ (z - before) ** 2)
+    return bool(dual * jumps > 2.0 * primal * np.sqrt(spring @ scaled**2))
 
 
 def regions_moved(problem: JumpProblem, constants: NDArray[np.float64], jump: float) -> NDArray[np.float64]:
