@@ -231,6 +231,17 @@ def test_edges_run_straight_on_the_mesh(surface):
     np.testing.assert_allclose(starts[first], tails, atol=1e-9)
 
 
+def test_both_triangulations_are_linear_on_the_common_subdivision(surface):
+    for better in sh.intrinsic_delaunay(surface), sh.intrinsic_delaunay(surface, refine=True):
+        polygons, interpolate = sh.common_subdivision(better)
+        areas = np.linalg.norm(polygons.polygon_area_vectors, axis=1)  # they are flat
+        assert areas.sum() == pytest.approx(surface.face_areas.sum(), rel=1e-9)
+        assert polygons.n_polygons >= better.n_faces
+        np.testing.assert_allclose(interpolate.sum(axis=1), 1.0, atol=1e-12)
+        if not np.ptp(surface.vertices[:, 2]):
+            np.testing.assert_allclose(interpolate @ better.vertices, polygons.vertices, atol=1e-9)
+
+
 def test_small_angles_that_must_stay_are_told():
     spike = np.array([[0, 0, 30.0], *[[np.cos(a), np.sin(a), 0] for a in np.arange(8) * np.pi / 4]])
     faces = [[0, 1 + k, 1 + (k + 1) % 8] for k in range(8)]

@@ -22,6 +22,7 @@ from .errors import (
 )
 from .extensions import grid_sharpening as _grid_sharpening  # noqa: F401  registers it
 from .extensions.close_curves import close_curves
+from .extensions.common_subdivision import common_subdivision
 from .extensions.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.piecewise import piecewise_distance
@@ -80,6 +81,7 @@ __all__ = [
     "ZeroSet",
     "close_curves",
     "closing",
+    "common_subdivision",
     "dilate",
     "erode",
     "intrinsic_delaunay",

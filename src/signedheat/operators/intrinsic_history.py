@@ -72,13 +72,11 @@ class History:
 
     def edges_before(self) -> Lines:
         """The edges of `after`, from tail to head, as lines on `before`."""
-        side = np.unique(self.after.edges.of_faces, return_index=True)[1]
-        faces, k = side // 3, side % 3
-        rows = np.arange(len(side))
-        middle, along = np.zeros((len(side), 3)), np.zeros((len(side), 1, 3))
-        middle[rows, k] = middle[rows, (k + 1) % 3] = 0.5
-        along[rows, 0, k], along[rows, 0, (k + 1) % 3] = -1.0, 1.0
-        return straight(self.before, *self.backward(faces, middle, along))
+        return straight(self.before, *self.backward(*edge_middles(self.after)))
+
+    def edges_after(self) -> Lines:
+        """The edges of `before`, from tail to head, as lines on `after`."""
+        return straight(self.after, *self.forward(*edge_middles(self.before)))
 
     def _carry(
         self,
@@ -94,6 +92,17 @@ class History:
         n_faces = max(self.before.n_faces, self.after.n_faces)
         carry(self.steps, self.weights, forward, n_faces, faces, barycentric, vectors)
         return faces, barycentric, vectors
+
+
+def edge_middles(triangles: LaidOutTriangles) -> tuple[NDArray, NDArray, NDArray]:
+    """Faces and barycentric coordinates of the edges' middle points, and (e, 1, 3) vectors from tail to head."""
+    side = np.unique(triangles.edges.of_faces, return_index=True)[1]
+    faces, k, rows = side // 3, side % 3, np.arange(len(side))
+    middle, along = np.zeros((len(side), 3)), np.zeros((len(side), 1, 3))
+    middle[rows, k] = middle[rows, (k + 1) % 3] = 0.5
+    ahead = np.where(triangles.edges.forward[faces, k], 1.0, -1.0)
+    along[rows, 0, k], along[rows, 0, (k + 1) % 3] = -ahead, ahead
+    return faces, middle, along
 
 
 def straight(
@@ -129,4 +138,9 @@ def straight(
     position = np.where(against, -1 - np.arange(count), np.arange(count))
     vectors[:, 0] *= 2.0
     order = np.lexsort([position, owners])
-    return Lines(owners[order], faces[order], begin[order], finish[order], vectors[order])
+    owners, faces, begin, finish, vectors, against = (
+        a[order] for a in (owners, faces, begin, finish, vectors, against)
+    )
+    first_half = np.flatnonzero(against[:-1] & ~against[1:] & (owners[:-1] == owners[1:]))  # they meet in the middle
+    finish[first_half] = finish[first_half + 1]
+    return Lines(*(np.delete(a, first_half + 1, axis=0) for a in (owners, faces, begin, finish, vectors)))

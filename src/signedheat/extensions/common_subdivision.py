@@ -1,0 +1,100 @@
+"""The common subdivision of a mesh and an intrinsic triangulation of it: flat polygons on which both are linear.
+
+Along the surface the edges of both cut each other into convex polygons. Each lies in one face of the mesh, so it can be
+drawn, and in one intrinsic triangle, so that a field on the triangulation is linear on it.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from ..domains.polygon_mesh import PolygonMesh
+from ..sources.places import EDGE, VERTEX, locate
+from .intrinsic_triangulation import IntrinsicTriangulation
+
+
+def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMesh, csr_matrix]:
+    """Cut the triangles of an intrinsic triangulation along the edges of its mesh.
+
+    Parameters
+    ----------
+    triangulation : IntrinsicTriangulation
+        As `intrinsic_delaunay` makes it.
+
+    Returns
+    -------
+    PolygonMesh
+        Flat polygons, in space; the vertices of the triangulation go first.
+    (n_polygon_vertices, n_vertices) sparse
+        Takes values at the triangulation's vertices to values at the polygons' vertices.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> mesh = sh.TriangleMesh([[0, 0, 0], [10, 0, 0], [10, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> better = sh.intrinsic_delaunay(mesh, refine=True)
+    >>> polygons, interpolate = sh.common_subdivision(better)
+    >>> bool(abs(interpolate @ better.vertices - polygons.vertices).max() < 1e-12)
+    True
+    """
+    triangles, n = triangulation.triangles, triangulation.n_vertices
+    lines = triangulation.history.edges_after()
+    starts = locate(triangles, lines.faces, lines.starts)
+    ends = locate(triangles, lines.faces, lines.ends)
+    last = np.append(np.diff(lines.owners) > 0, True)
+    crossing = (ends.kinds == EDGE) & ~last
+    node = np.where(ends.kinds == VERTEX, ends.elements, n + np.cumsum(crossing) - 1)
+    begin = np.where(starts.kinds == VERTEX, starts.elements, np.roll(node, 1))
+
+    on_edge = defaultdict(list)
+    where = ends[np.flatnonzero(crossing)]
+    for k in np.lexsort([where.along, where.elements]).tolist():
+        on_edge[int(where.elements[k])].append(n + k)
+    chords = defaultdict(list)
+    inside = ~((lines.starts < 1e-9) & (lines.ends < 1e-9)).any(axis=1)
+    for k in np.flatnonzero(inside & (begin != node)).tolist():
+        chords[int(lines.faces[k])].append((int(begin[k]), int(node[k])))
+
+    polygons = []
+    table = triangles.edges
+    rows = (a.tolist() for a in (triangles.corner_vertices, table.of_faces, table.forward))
+    for face, (corners, edges, forward) in enumerate(zip(*rows, strict=True)):
+        outline = []
+        for corner, edge, ahead in zip(corners, edges, forward, strict=True):
+            outline += [corner, *on_edge.get(edge, [])[:: 1 if ahead else -1]]
+        polygons += cut(outline, chords.get(face, []))
+
+    used = triangles.corner_vertices.ravel()
+    corner_of = np.full(n, -1)
+    corner_of[used] = np.arange(len(used))
+    own = corner_of >= 0
+    weights = np.concatenate([np.eye(3)[corner_of % 3] * own[:, None], where.barycentric])
+    faces = np.concatenate([corner_of // 3, where.faces])
+    matrix = csr_matrix(
+        (weights.ravel(), triangles.corner_vertices[faces].ravel(), 3 * np.arange(len(faces) + 1)), (len(faces), n)
+    )
+    matrix.eliminate_zeros()
+    return PolygonMesh(np.concatenate([triangulation.vertices, positions(triangulation, where)]), polygons), matrix
+
+
+def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
+    """Cut a convex polygon along chords between its corners that do not cross each other."""
+    parts = [outline]
+    for a, b in chords:
+        for k, part in enumerate(parts):
+            if a in part and b in part:
+                i, j = sorted((part.index(a), part.index(b)))
+                if 1 < j - i < len(part) - 1:
+                    parts[k : k + 1] = [part[i : j + 1], part[j:] + part[: i + 1]]
+                break
+    return parts
+
+
+def positions(triangulation: IntrinsicTriangulation, places) -> NDArray[np.float64]:
+    """(p, 3) where points of the triangulation lie in space."""
+    found = triangulation.history.backward(places.faces, places.barycentric)
+    return triangulation.in_space(*triangulation.embedding.up(*found[:2]))
