@@ -108,3 +108,14 @@ def test_dissection_of_odd_graphs(edges):
 def test_dissection_of_many_parts_does_not_take_the_square_of_their_number():
     n = 100_000  # a quadratic search would take minutes
     assert len(elimination_order(sparse.eye(n, format="csr"))) == n
+
+
+@pytest.mark.parametrize("backend", available_backends())
+def test_a_factor_outlives_a_change_of_threads(backend):
+    from threadpoolctl import threadpool_limits
+
+    line = sparse.diags_array([-np.ones(89), 2 * np.ones(90), -np.ones(89)], offsets=[-1, 0, 1])
+    matrix = sparse.csr_matrix(sparse.kron(line, sparse.eye_array(90)) + sparse.kron(sparse.eye_array(90), line))
+    factor, rhs = factorize(matrix, backend), np.ones(8100)
+    with threadpool_limits(1, "blas"):
+        assert np.abs(matrix @ factor.solve(rhs) - rhs).max() < 1e-9

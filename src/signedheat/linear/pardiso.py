@@ -80,7 +80,7 @@ class _Call:
         self.parameters[1] = 3  # nested dissection in parallel
         self.parameters[4] = 0 if order is None else 1
         self.parameters[17] = -1  # report the nonzeros of the factor
-        self.parameters[23] = 1  # two-level parallel factorisation
+        self.parameters[23] = 0  # the two-level scheme solves wrongly, and silently, once the number of threads changes
         self.parameters[34] = 1  # indices count from zero
 
     def __call__(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
