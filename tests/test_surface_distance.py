@@ -279,6 +279,9 @@ def test_nothing_is_factorised_twice(monkeypatch):
     solver.distance(curves, sh.LevelValues([0, 1, 2]))
     solver.distance_many(curves, sh.Free())
     assert len(made) == 3
+    other = solver.with_diffusion(9.0)
+    np.testing.assert_allclose(other.distance(curves).values, distance(mesh, curves, diffusion=9.0), atol=1e-12)
+    assert made[3] == edges and len(made) == 6  # of the last three, two belong to the solver made anew
 
 
 @every_constraint

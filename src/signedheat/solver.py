@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
@@ -69,6 +69,20 @@ class SignedHeatSolver:
 
             return Retriangulated(self.domain)
         return discretize(self.domain)
+
+    def with_diffusion(self, diffusion: float) -> SignedHeatSolver:
+        """The same with another τ; keeps what does not depend on it, which is half of what is factorised.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> solver = sh.SignedHeatSolver(sh.Grid((0, 0), 1.0, (8, 8)))
+        >>> solver.with_diffusion(4.0).discretization is solver.discretization
+        True
+        """
+        other = replace(self, diffusion=diffusion)
+        other.__dict__["discretization"] = self.discretization
+        return other
 
     def distance(self, sources: Any, constraint: Constraint | None = None) -> Any:
         """Signed distance to sources.
