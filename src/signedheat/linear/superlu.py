@@ -1,4 +1,8 @@
-"""SciPy's SuperLU: there on every platform."""
+"""SciPy's SuperLU: there on every platform.
+
+With nested dissection and one BLAS thread, as much work as PARDISO at 100 000 unknowns and 2.5 times as much at 500 000;
+PARDISO also uses all cores.
+"""
 
 from __future__ import annotations
 
