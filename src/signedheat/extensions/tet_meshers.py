@@ -9,6 +9,7 @@ less (``benchmarks/tets.py``).
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -78,11 +79,15 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
     corners, faces, spacing = _box_around(shape, resolution, padding)
     triangles = area_elements(shape).corners
     vertices, ids = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    leftover = Path("__tracked_surface.stl")  # fTetWild leaves it in the working directory
+    keep = leftover.exists()
     vertices, tets = pytetwild.tetrahedralize(
         np.concatenate([corners, vertices]),
         np.concatenate([faces, ids.reshape(-1, 3) + len(corners)]).astype(np.int32),
         edge_length_abs=spacing,
     )[:2]
+    if not keep:
+        leftover.unlink(missing_ok=True)
     return TetMesh(vertices, tets[:, [0, 1, 3, 2]])  # fTetWild's own order has negative volumes
 
 
