@@ -7,10 +7,10 @@ import sys
 from collections.abc import Sequence
 
 from ..errors import SignedHeatError
-from . import contour, demo, info, morph, offset, surface, view, volume
+from . import close, contour, demo, info, morph, offset, surface, view, volume
 from .options import Parser
 
-COMMANDS = (volume, surface, offset, contour, morph, info, view, demo)
+COMMANDS = (volume, surface, close, offset, contour, morph, info, view, demo)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

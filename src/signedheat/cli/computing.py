@@ -12,6 +12,8 @@ import numpy as np
 from ..domains.grid import Grid
 from ..errors import SignedHeatError
 from ..fields.grid_field import GridField
+from ..io import POLYLINE_FORMATS, read, read_polylines
+from ..io.files import extension
 from ..solver import SignedHeatSolver
 from .options import Parser
 from .progress import ProgressBar
@@ -34,8 +36,12 @@ def check_grid_options(parser: Parser, arguments: Namespace) -> None:
     """Refuse options that contradict each other."""
     own = arguments.origin is not None or arguments.grid_shape is not None
     spacing = arguments.spacing
-    if spacing is not None and len(spacing) not in (1, 3):
-        parser.error(f"argument --spacing: one number or three, not {len(spacing)}")
+    dimension = 2 if is_planar(arguments.shape) else 3
+    if spacing is not None and len(spacing) not in (1, dimension):
+        parser.error(f"argument --spacing: one number or {dimension}, not {len(spacing)}")
+    for name, numbers in (("--origin", arguments.origin), ("--shape", arguments.grid_shape)):
+        if numbers is not None and len(numbers) != dimension:
+            parser.error(f"argument {name}: {dimension} numbers, not {len(numbers)}")
     if own and (arguments.origin is None or arguments.grid_shape is None or spacing is None):
         parser.error("a grid of your own needs all of --origin, --spacing and --shape")
     if own and (arguments.resolution is not None or arguments.padding is not None):
@@ -44,19 +50,37 @@ def check_grid_options(parser: Parser, arguments: Namespace) -> None:
         parser.error("--resolution does not go with --spacing: give one of them")
 
 
+def is_planar(path: Any) -> bool:
+    """Whether a file holds polylines in the plane."""
+    return extension(path) in POLYLINE_FORMATS
+
+
+def read_source(path: Any) -> Any:
+    """What distance is to be measured to: a shape in space, or a list of polylines in the plane."""
+    return read_polylines(path) if is_planar(path) else read(path)
+
+
 def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
     """The grid that the options ask for, with room for offsets up to `reach` unless they say otherwise."""
+    spacing = arguments.spacing
+    if spacing is not None and len(spacing) == 1:
+        spacing = spacing[0]
     if arguments.origin is not None:
-        spacing = arguments.spacing if len(arguments.spacing) == 3 else arguments.spacing[0]
         return Grid(arguments.origin, spacing, arguments.grid_shape)
-    spacing = None
-    if arguments.spacing is not None:
-        spacing = arguments.spacing if len(arguments.spacing) == 3 else arguments.spacing[0]
     options = {"resolution": arguments.resolution or RESOLUTION, "spacing": spacing}
+    bounds = bounds_of(shape)
     if arguments.padding is not None or reach == 0:
-        return Grid.around(shape.bounds, padding=arguments.padding, **options)
-    longest = float(np.ptp(shape.bounds, axis=0).max())
-    return Grid.around(shape.bounds, padding=0.2 * longest + 1.05 * reach, **options)
+        return Grid.around(bounds, padding=arguments.padding, **options)
+    longest = float(np.ptp(bounds, axis=0).max())
+    return Grid.around(bounds, padding=0.2 * longest + 1.05 * reach, **options)
+
+
+def bounds_of(shape: Any) -> Any:
+    """(2, d) of a shape or a list of polylines."""
+    if not isinstance(shape, list):
+        return shape.bounds
+    corners = np.concatenate([line.bounds for line in shape])
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
 def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:

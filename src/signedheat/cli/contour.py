@@ -5,9 +5,20 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
+from ..fields.grid_field import GridField
 from ..fields.vertex_field import VertexField
-from ..io import CURVE_FORMATS, SHAPE_FORMATS, ensure_writable, load_field, save, write_curves
+from ..io import (
+    CURVE_FORMATS,
+    POLYLINE_FORMATS,
+    SHAPE_FORMATS,
+    ensure_writable,
+    load_field,
+    save,
+    write_curves,
+    write_polylines,
+)
 from .computing import naming
+from .offset import counts, ensure_offset_writable
 from .options import Summary, add_command, finite
 
 
@@ -18,7 +29,8 @@ def add_to(commands: Any) -> None:
         "contour",
         run=run,
         help="surface of equal distance in a field",
-        description="The closed surface, or the curves on a surface, on which a field takes a level.",
+        description="The closed surface, the curves on a surface or the lines in the plane, on which a field takes a "
+        "level.",
     )
     parser.add_argument("field", metavar="FIELD", help=".npz .vti .nrrd .npy .vdb")
     parser.add_argument("level", metavar="LEVEL", type=finite, help="in the units of the field")
@@ -27,28 +39,30 @@ def add_to(commands: Any) -> None:
         "--output",
         required=True,
         metavar="OUT",
-        help="surface: .stl .obj .ply .off .vtp; of a field on a surface, curves: .obj .txt .json",
+        help="surface: .stl .obj .ply .off .vtp; of a field on a surface, curves: .obj .txt .json; in the plane, "
+        "lines: .svg .csv",
     )
 
 
 def run(arguments: Namespace) -> Summary:
     """Load, contour, write."""
-    ensure_writable(arguments.output, (SHAPE_FORMATS | CURVE_FORMATS) - {".xyz", ".pc"}, "a surface or curves")
+    known = (SHAPE_FORMATS | CURVE_FORMATS | POLYLINE_FORMATS) - {".xyz", ".pc"}
+    ensure_writable(arguments.output, known, "a surface, curves or lines")
     field = load_field(arguments.field)
     if isinstance(field, VertexField):
         return lines(field, arguments)
-    ensure_writable(arguments.output, SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
+    planar = isinstance(field, GridField) and field.grid.dimension == 2
+    ensure_offset_writable(arguments.output, planar)
     with naming(arguments.field):
-        surface = field.contour(arguments.level)
-    save(surface, arguments.output)
-    summary = {
-        "input": arguments.field,
-        "level": arguments.level,
-        "output": arguments.output,
-        "vertices": surface.n_vertices,
-        "faces": surface.n_faces,
-    }
-    return summary, f"{arguments.output}: {surface.n_faces} faces"
+        found = field.contour(arguments.level)
+    if planar:
+        write_polylines(arguments.output, found)
+    else:
+        save(found, arguments.output)
+    numbers = counts(found)
+    summary = {"input": arguments.field, "level": arguments.level, "output": arguments.output, **numbers}
+    size = f"{numbers['lines']} lines" if planar else f"{numbers['faces']} faces"
+    return summary, f"{arguments.output}: {size}"
 
 
 def lines(field: VertexField, arguments: Namespace) -> Summary:

@@ -9,10 +9,10 @@ from typing import Any
 from ..domains.grid import Grid
 from ..domains.inspection import inspect
 from ..errors import SourceError
-from ..io import FIELD_FORMATS, load_field, read, read_curves
+from ..io import FIELD_FORMATS, load_field, read, read_curves, read_polylines
 from ..io.files import extension
 from ..io.obj import read_obj_lines
-from .computing import describe
+from .computing import bounds_of, describe, is_planar
 from .options import Summary, add_command, whole_number
 
 
@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
         description="Counts, open, nonmanifold and inconsistent edges, degenerate and duplicate elements, bounds; "
         "the memory that grids around a shape take. Of a field: its grid and range.",
     )
-    parser.add_argument("file", metavar="FILE", help="a shape or a field")
+    parser.add_argument("file", metavar="FILE", help="a shape, polylines in the plane or a field")
     parser.add_argument("curves", metavar="CURVES", nargs="?", help="curves on the shape: .txt .obj .json")
     parser.add_argument(
         "--resolution",
@@ -45,6 +45,8 @@ def run(arguments: Namespace) -> Summary:
         summary = {"file": arguments.file, "kind": type(field).__name__, **describe(field)}
         del summary["seconds"]
         return summary, _table(summary)
+    if is_planar(arguments.file):
+        return lines_report(arguments)
     shape = read(arguments.file)
     summary = {"file": arguments.file, "kind": type(shape).__name__, **asdict(inspect(shape))}
     if extension(arguments.file) == ".obj":
@@ -61,6 +63,23 @@ def run(arguments: Namespace) -> Summary:
         summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
         text += f"\n\n{arguments.curves}\n{as_text(summary['curves'])}"
     return summary, text
+
+
+def lines_report(arguments: Namespace) -> Summary:
+    """Polylines in the plane."""
+    lines = read_polylines(arguments.file)
+    bounds = bounds_of(lines)
+    summary = {
+        "file": arguments.file,
+        "kind": "Polyline",
+        "n_polylines": len(lines),
+        "n_closed": sum(line.closed for line in lines),
+        "n_points": sum(line.n_points for line in lines),
+        "length": float(sum(line.length for line in lines)),
+        "lower": bounds[0].tolist(),
+        "upper": bounds[1].tolist(),
+    }
+    return summary, _table(summary)
 
 
 def _memory(shape: Any, resolution: int) -> int | None:

@@ -6,9 +6,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from ..io import SHAPE_FORMATS, ensure_writable, read, save
+from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
 from ..viewing import PICTURE_FORMATS, save_slices
-from .computing import check_grid_options, compute, describe, grid_for, naming
+from .computing import check_grid_options, compute, describe, grid_for, is_planar, naming, read_source
 from .options import Parser, Summary, add_command, add_grid_options, finite
 
 
@@ -19,12 +19,14 @@ def add_to(commands: Any) -> None:
         "offset",
         run=lambda arguments: run(parser, arguments),
         help="closed surfaces at given distances",
-        description="Closed surfaces at given distances from a shape, broken or not. Several distances make several "
-        "files: OUT.stl becomes OUT_+0.2.stl, OUT_-0.1.stl.",
+        description="Closed surfaces at given distances from a shape, broken or not; in the plane, lines. Several "
+        "distances make several files: OUT.stl becomes OUT_+0.2.stl, OUT_-0.1.stl.",
     )
     parser.usage = "%(prog)s SHAPE DISTANCE [DISTANCE ...] -o OUT [options]"
     parser.add_argument(
-        "shape", metavar="SHAPE", help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc"
+        "shape",
+        metavar="SHAPE",
+        help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc; in the plane, polylines: .svg .csv",
     )
     parser.add_argument(
         "distances",
@@ -33,7 +35,9 @@ def add_to(commands: Any) -> None:
         nargs="+",
         help="positive outside, negative inside, 0 the closed shape",
     )
-    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="surface: .stl .obj .ply .off .vtp")
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="OUT", help="surface: .stl .obj .ply .off .vtp; lines: .svg .csv"
+    )
     add_grid_options(parser)
 
 
@@ -41,25 +45,46 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute once, contour and write each."""
     check_grid_options(parser, arguments)
     outputs = output_names(arguments.output, arguments.distances)
+    planar = is_planar(arguments.shape)
     for output in outputs:
-        ensure_writable(output, SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
+        ensure_offset_writable(output, planar)
     if arguments.preview:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
-    shape = read(arguments.shape)
+    shape = read_source(arguments.shape)
     reach = max(abs(distance) for distance in arguments.distances)
     with naming(arguments.shape):
         field = compute(shape, grid_for(shape, arguments, reach), arguments)
-        surfaces = [field.offset(distance) for distance in arguments.distances]
-    for surface, output in zip(surfaces, outputs, strict=True):
-        save(surface, output)
+        found = [field.offset(distance) for distance in arguments.distances]
+    for what, output in zip(found, outputs, strict=True):
+        if planar:
+            write_polylines(output, what)
+        else:
+            save(what, output)
     if arguments.preview:
         save_slices(field, arguments.preview, shape, arguments.distances)
     written = [
-        {"distance": distance, "output": output, "vertices": surface.n_vertices, "faces": surface.n_faces}
-        for distance, output, surface in zip(arguments.distances, outputs, surfaces, strict=True)
+        {"distance": distance, "output": output, **counts(what)}
+        for distance, output, what in zip(arguments.distances, outputs, found, strict=True)
     ]
-    text = "\n".join(f"{w['output']}: closed surface at {w['distance']:+g}, {w['faces']} faces" for w in written)
-    return {"input": arguments.shape, "surfaces": written, "field": describe(field)}, text
+    kind = "{lines} lines ({closed} closed), length {length:.6g}" if planar else "closed surface, {faces} faces"
+    text = "\n".join(f"{w['output']}: at {w['distance']:+g}, {kind.format(**w)}" for w in written)
+    return {"input": arguments.shape, "lines" if planar else "surfaces": written, "field": describe(field)}, text
+
+
+def ensure_offset_writable(output: str, planar: bool) -> None:
+    """Find out before computing whether a surface, or lines in the plane, can be written."""
+    if planar:
+        ensure_writable(output, POLYLINE_FORMATS, "lines in the plane")
+    else:
+        ensure_writable(output, SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
+
+
+def counts(what: Any) -> dict[str, Any]:
+    """A surface, or lines in the plane, in numbers."""
+    if isinstance(what, list):
+        closed = sum(line.closed for line in what)
+        return {"lines": len(what), "closed": closed, "length": float(sum(line.length for line in what))}
+    return {"vertices": what.n_vertices, "faces": what.n_faces}
 
 
 def output_names(output: str, distances: list[float]) -> list[str]:

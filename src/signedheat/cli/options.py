@@ -42,14 +42,19 @@ def add_grid_options(parser: Parser) -> None:
     grid = parser.add_argument_group("grid (by default around the shape)")
     grid.add_argument("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side (128)")
     grid.add_argument(
-        "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each of x y z"
+        "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each axis"
     )
     grid.add_argument("--padding", type=not_negative, metavar="P", help="room around the shape, in its units")
     grid.add_argument(
-        "--origin", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="first node of a grid of your own"
+        "--origin", type=finite, nargs="+", metavar="X", help="first node of a grid of your own: X Y Z, or X Y"
     )
     grid.add_argument(
-        "--shape", type=whole_number(2), nargs=3, metavar=("NX", "NY", "NZ"), dest="grid_shape", help="its nodes"
+        "--shape",
+        type=whole_number(2),
+        nargs="+",
+        metavar="NX",
+        dest="grid_shape",
+        help="its nodes: NX NY NZ, or NX NY",
     )
     method = parser.add_argument_group("method")
     method.add_argument("--plain", action="store_true", help="the paper's field, not sharpened")
@@ -63,7 +68,7 @@ def add_grid_options(parser: Parser) -> None:
     method.add_argument(
         "--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"
     )
-    parser.add_argument("--preview", metavar="PNG", help="draw three slices of the result")
+    parser.add_argument("--preview", metavar="PNG", help="draw the result: in space, three slices")
 
 
 def constraint(word: str) -> Constraint:

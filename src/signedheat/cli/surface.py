@@ -10,7 +10,7 @@ import numpy as np
 
 from ..constraints import LevelValues, ZeroSet
 from ..errors import SourceError
-from ..io import CURVE_FORMATS, ensure_writable, read, read_curves, write_curves
+from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..viewing import PICTURE_FORMATS
 from .computing import naming
@@ -25,10 +25,13 @@ def add_to(commands: Any) -> None:
         "surface",
         run=lambda arguments: run(parser, arguments),
         help="signed distance to curves on a surface",
-        description="Signed distance on a mesh or a point cloud to curves, broken or not, and to points on it.",
+        description="Signed distance on a mesh, a point cloud or the boundary of a set of voxels to curves, broken or "
+        "not, and to points on it.",
     )
-    parser.add_argument("mesh", metavar="MESH", help="surface or points: .obj .ply .stl .off .vtp .glb .pc .xyz")
-    parser.add_argument("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json")
+    parser.add_argument(
+        "mesh", metavar="MESH", help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti"
+    )
+    parser.add_argument("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json .csv")
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="field: .ply .vtp .obj .npz")
     parser.add_argument(
         "--constraint",
@@ -43,7 +46,6 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--contours", type=whole_number(1), metavar="N", help="write N isolines beside the output, as OUT.contours.obj"
     )
-    parser.add_argument("--close", metavar="FILE", help="write the completed curves, φ = 0: .txt .json .obj")
     parser.add_argument("--preview", metavar="PNG", help="draw the result")
 
 
@@ -52,12 +54,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
     if arguments.preview:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
-    if arguments.close:
-        ensure_writable(arguments.close, CURVE_FORMATS, "curves")
-    surface = read(arguments.mesh)
-    with naming(arguments.mesh):
-        if not hasattr(surface, "triangulation"):
-            raise SourceError("curves lie on meshes and point clouds: this file holds neither")
+    surface = read_surface(arguments.mesh)
     curves = read_curves(arguments.curves, surface)
     from ..solver import SignedHeatSolver
 
@@ -80,9 +77,6 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         levels = np.linspace(low, high, arguments.contours + 2)[1:-1]
         lines = [curve for level in levels for curve in field.contour(float(level))]
         write_curves(summary["contours"], lines, surface)
-    if arguments.close:
-        summary["closed"] = arguments.close
-        write_curves(arguments.close, field.contour(0.0), surface)
     if arguments.preview:
         from ..surface_pictures import save_surface
 
@@ -91,6 +85,14 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     if summary["unreached"]:
         text += f", {summary['unreached']} vertices without any source"
     return summary, text
+
+
+def read_surface(path: str) -> Any:
+    """A file with something that curves can lie on."""
+    surface = read(path)
+    if not hasattr(surface, "triangulation"):
+        raise SourceError(f"{path}: curves lie on meshes, points and voxels, and this is a {type(surface).__name__}")
+    return surface
 
 
 def surface_constraint(word: str) -> Any:

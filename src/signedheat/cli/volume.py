@@ -5,10 +5,10 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from ..io import ensure_field_writable, ensure_writable, read, save_field
+from ..io import ensure_field_writable, ensure_writable, save_field
 from ..viewing import PICTURE_FORMATS, save_slices
 from . import tets
-from .computing import check_grid_options, compute, describe, grid_for, naming
+from .computing import check_grid_options, compute, describe, grid_for, naming, read_source
 from .options import Parser, Summary, add_command, add_grid_options
 
 
@@ -19,11 +19,14 @@ def add_to(commands: Any) -> None:
         "volume",
         run=lambda arguments: run(parser, arguments),
         help="signed distance on a grid",
-        description="Signed distance to a shape, broken or not, at the nodes of a grid.",
+        description="Signed distance to a shape, broken or not, at the nodes of a grid in space; or to polylines, "
+        "positive to their left, in the plane.",
     )
     parser.usage = "%(prog)s SHAPE -o OUT [options]"
     parser.add_argument(
-        "shape", metavar="SHAPE", help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc"
+        "shape",
+        metavar="SHAPE",
+        help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc; in the plane, polylines: .svg .csv",
     )
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="field: .npz .vti .nrrd .npy .vdb")
     parser.add_argument(
@@ -44,7 +47,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     ensure_field_writable(arguments.output)
     if arguments.preview:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
-    shape = read(arguments.shape)
+    shape = read_source(arguments.shape)
     with naming(arguments.shape):
         field = compute(shape, grid_for(shape, arguments), arguments)
     save_field(field, arguments.output)

@@ -13,7 +13,7 @@ from .files import PathLike, text
 
 
 def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.float64], bool]]:
-    """Points (n, dimension) of each polyline, and whether it is closed: then the file repeats its first point at the end.
+    """Points (n, dimension) of each polyline, and whether it is closed, its first point being repeated at the end.
 
     Numbers are separated by commas, semicolons, tabs or spaces. Lines that begin with ``#`` and a first line of names
     are passed over.
