@@ -163,6 +163,16 @@ def test_kept_curves_run_along_edges_and_boundaries_stay():
     assert brought.lengths.sum() == pytest.approx(polygon, rel=1e-9)
 
 
+def test_only_the_kept_curve_is_marked_on_a_closed_surface():
+    mesh = sphere(3)
+    north = mesh.polyline([[np.cos(a), np.sin(a), 0.4] for a in np.arange(40) * np.pi / 20], closed=True)
+    better = sh.intrinsic_delaunay(mesh, keep=north, refine=True)
+    assert better.n_vertices > 1.3 * mesh.n_vertices
+    lengths = np.zeros(better.triangles.n_edges)
+    lengths[better.triangles.edges.of_faces] = better.triangles.edge_lengths
+    assert lengths[better.marked].sum() == pytest.approx(better.bring(north).lengths.sum(), rel=1e-9)
+
+
 def test_sources_that_were_not_kept_are_carried_over():
     mesh = flipped(stretched_square(600, 30.0))
     curve = circle_on(mesh)

@@ -79,7 +79,10 @@ def refine_all(
         status = refine(gluing, agenda, goal)
         if status != GROW:
             n_edges = int(gluing.counts[1])
-            return gluing, np.append(segments, -1)[agenda.segment[:n_edges]], status != FULL
+            origin = np.full(n_edges, -1)
+            fixed = np.flatnonzero(gluing.fixed[:n_edges])
+            origin[fixed] = segments[agenda.segment[fixed]]
+            return gluing, origin, status != FULL
         gluing = gluing._replace(**{k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")})
         grown = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow")
         agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in grown})

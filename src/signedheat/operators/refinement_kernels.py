@@ -42,7 +42,7 @@ class Agenda(NamedTuple):
 
     `stack` and `stacked` are edges to be looked at for the Delaunay property. `bins` and `next_face` are linked lists
     of faces to be looked at, by the binary logarithm of their circumradius; `listed` says which faces are in one.
-    `segment` numbers the input segment of each edge (−1: none), `segment_ends` and `segment_length` describe those, and
+    `segment` numbers the input segment of each fixed edge, `segment_ends` and `segment_length` describe those, and
     `on_segment` is the segment on which a new vertex was put. `narrow` marks input vertices at which two segments meet,
     or the surface closes up, at less than 60°. `seen` counts the steps of the history whose faces have been listed;
     `room` and `halfedges` are for the search around a new vertex.
@@ -413,7 +413,7 @@ def split_segment(g, agenda, h, f, goal):
         new = split_edge(g, h, fraction)
         agenda.on_segment[new] = segment
         for k in range(g.counts[1] - 1 - ring, g.counts[1]):
-            agenda.segment[k] = segment if g.fixed[k] else -1
+            agenda.segment[k] = segment
     agenda.narrow[g.counts[2] - 1] = False
     look_around(g, agenda, step)
     list_face(g, agenda, f, goal)
