@@ -9,9 +9,10 @@ from surface_cases import book, flipped, sphere, square
 from surfaces import FlatGluing
 
 import signedheat as sh
-from signedheat.linear import available_backends
+from signedheat.linear import available_backends, whole
 from signedheat.lowering.surface import SurfaceDiscretization
 from signedheat.method import diffuse, integrate, normalize
+from signedheat.operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
 
 CONSTRAINTS = [sh.Free(), sh.ZeroSet(), sh.EachComponent(), sh.LevelValues([0.3]), sh.Soft(2.0)]
 every_constraint = pytest.mark.parametrize("constraint", CONSTRAINTS, ids=repr)
@@ -314,3 +315,15 @@ def test_the_same_bits_every_time():
     mesh = bumpy()
     for constraint in CONSTRAINTS:
         assert np.array_equal(distance(mesh, loops(mesh)[0], constraint), distance(mesh, loops(mesh)[0], constraint))
+
+
+@pytest.mark.parametrize("broken", [False, True], ids=["complex", "real"])
+def test_vector_heat_by_faces_equals_the_matrix(broken):
+    mesh = flipped(bumpy(2)) if broken else bumpy(2)
+    triangles = sh.SignedHeatSolver(mesh).discretization.triangles
+    rng = np.random.default_rng(0)
+    vectors = rng.normal(size=triangles.n_edges) + 1j * rng.normal(size=triangles.n_edges)
+    matrix = whole(vector_heat_matrix(triangles, 0.3))
+    expected = (matrix @ vectors.view(float)).view(complex) if broken else matrix @ vectors
+    forces = vector_heat_forces(triangles, 0.3, vectors, np.arange(triangles.n_faces))
+    np.testing.assert_allclose(forces, expected, atol=1e-12)

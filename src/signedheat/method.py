@@ -53,8 +53,8 @@ def unit(vectors: NDArray[Any]) -> NDArray[Any]:
     array([0.6+0.8j])
     """
     if np.iscomplexobj(vectors):
-        pairs = np.ascontiguousarray(vectors).view(vectors.real.dtype).reshape(*vectors.shape, 2)
-        return unit(pairs).view(vectors.dtype)[..., 0]
+        length = np.abs(vectors)  # NumPy's, too, neither overflows nor underflows on the way
+        return vectors / np.where(length > 0, length, 1)
     result = np.empty_like(vectors)
     for block in _blocks(vectors.shape):
         part = vectors[block]

@@ -1,7 +1,7 @@
 """SciPy's SuperLU: there on every platform.
 
-With nested dissection and one BLAS thread, as much work as PARDISO at 100 000 unknowns and 2.5 times as much at 500 000;
-PARDISO also uses all cores.
+With nested dissection and one BLAS thread it takes as much work as PARDISO at 100 000 unknowns, 2.5 times as much at
+500 000; PARDISO also uses all cores.
 """
 
 from __future__ import annotations

@@ -8,13 +8,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from ..linear import Factor, factorize, whole
-from ..operators.crouzeix_raviart import vector_heat_matrix
+from ..linear import Factor, factorize
+from ..operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
 from ..operators.laid_out_triangles import LaidOutTriangles
 
-_FAINT = 2.0**-800  # of the largest X: below, what underflows in the factor or on the way may be missing
+_FAINT = 2.0**-900  # of the largest X: below, what underflows in the factor or on the way may be missing
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,15 +39,10 @@ class VectorHeat:
     time: float
     order: NDArray[np.int64]
 
-    @property
-    def matrix(self) -> sparse.csr_matrix:
-        """Upper triangle of M + tL; made anew, since hardly anyone asks twice."""
-        return vector_heat_matrix(self.triangles, self.time)
-
     @cached_property
     def factor(self) -> Factor:
         """Its factor."""
-        matrix = self.matrix
+        matrix = vector_heat_matrix(self.triangles, self.time)
         if matrix.shape[0] == self.triangles.n_edges:
             return factorize(matrix, order=self.order)
         return factorize(matrix, order=(2 * self.order[:, None] + np.arange(2)).ravel())
@@ -62,7 +56,7 @@ class VectorHeat:
     def solve(self, sources: Sequence[NDArray[np.complex128]]) -> list[list[NDArray[np.complex128]]]:
         """X for each X₀, in stages: each is known up to a factor of its own, and NaN nearer than where it begins."""
         starts = [self._raised(vectors) for vectors in sources]
-        together = self._solve(np.stack(starts, axis=1))
+        together = self._solve(np.stack(starts).T)
         return [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
 
     def _carried_on(self, start: NDArray[np.complex128], near: NDArray[np.complex128]) -> list[NDArray[np.complex128]]:
@@ -85,16 +79,12 @@ class VectorHeat:
         self, vectors: NDArray[np.complex128], faint: NDArray[np.bool_], start: NDArray[np.complex128]
     ) -> NDArray[np.complex128]:
         """(M + tL) applied to X on the faint edges and zero elsewhere."""
-        kept = np.where(faint, vectors, 0)
-        of_face = faint[self.triangles.edges.of_faces]
-        mixed = of_face.any(axis=1) & ~of_face.all(axis=1)
+        edges = self.triangles.edges.of_faces
+        of_face = faint[edges]
         near_border = np.zeros(len(faint), dtype=bool)
-        near_border[self.triangles.edges.of_faces[mixed]] = True
-        matrix = whole(self.matrix)
-        if matrix.shape[0] == len(faint):
-            forces = matrix @ kept
-        else:
-            forces = (matrix @ kept.view(np.float64)).view(np.complex128)
+        near_border[edges[of_face.any(axis=1) & ~of_face.all(axis=1)]] = True
+        around = np.flatnonzero(near_border[edges].any(axis=1))
+        forces = vector_heat_forces(self.triangles, self.time, np.where(faint, vectors, 0), around)
         return np.where(near_border, forces, np.where(faint, start, 0))
 
     def _raised(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -103,8 +93,7 @@ class VectorHeat:
         if largest == 0:
             return vectors
         steps = int(np.frexp(self._smallest_mass)[1] - np.frexp(largest)[1])
-        half = steps // 2  # one power of two of them all might overflow
-        return vectors * 2.0**half * 2.0 ** (steps - half)
+        return np.ldexp(np.ascontiguousarray(vectors).view(np.float64), steps).view(np.complex128)
 
     def _solve(self, columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
         if self.factor.n == len(columns):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from .assembly import assemble
@@ -22,13 +23,33 @@ def vector_heat_matrix(triangles: LaidOutTriangles, time: float) -> sparse.csr_m
     time : float
         t, in squared units of length.
     """
-    edge, z, cot = triangles.edges.of_faces, triangles.edge_directions, triangles.corner_cotangents
-    following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1
-    diagonal = triangles.face_areas[:, None] / 3.0 + 2.0 * time * (cot + following)
-    factor = -2.0 * time * following
+    edge, z = triangles.edges.of_faces, triangles.edge_directions
+    diagonal, factor = _local_entries(triangles, time, slice(None))
     if triangles.is_consistently_oriented:
         return assemble(edge, diagonal, factor * np.conj(z) * np.roll(z, -1, axis=1), triangles.n_edges)
     return _real_form(triangles, diagonal, factor)
+
+
+def vector_heat_forces(
+    triangles: LaidOutTriangles, time: float, vectors: NDArray[np.complex128], faces: NDArray[np.int64]
+) -> NDArray[np.complex128]:
+    """(M + t L) times the (e,) vectors, as far as some faces add to it: complete at edges all of whose faces do."""
+    diagonal, factor = _local_entries(triangles, time, faces)
+    z, reflected = triangles.edge_directions[faces], triangles.reflected[faces]
+    edge = triangles.edges.of_faces[faces]
+    x = z * np.where(reflected, np.conj(vectors[edge]), vectors[edge])
+    forces = diagonal * x + factor * np.roll(x, -1, axis=1) + np.roll(factor * x, 1, axis=1)
+    turned = np.conj(z) * forces
+    sums = np.zeros(len(vectors), dtype=np.complex128)
+    np.add.at(sums, edge, np.where(reflected, np.conj(turned), turned))
+    return sums
+
+
+def _local_entries(triangles: LaidOutTriangles, time: float, faces: NDArray[np.int64] | slice) -> tuple:
+    """What each edge of a face has to itself, and what it shares with the edge after it, before turning."""
+    cot = triangles.corner_cotangents[faces]
+    following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1
+    return triangles.face_areas[faces, None] / 3.0 + 2.0 * time * (cot + following), -2.0 * time * following
 
 
 def _real_form(triangles: LaidOutTriangles, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
