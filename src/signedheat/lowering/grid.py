@@ -74,7 +74,7 @@ class GridDiscretization:
     def diffuse(self, source: GridSource) -> list[Level]:
         from ..operators.pyramid import diffuse_on_pyramid
 
-        return diffuse_on_pyramid(source.vectors, source.time_on)
+        return diffuse_on_pyramid(source.vectors, source.time_on, source.finest)
 
     def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
         from ..operators.extraction import unit_vectors

@@ -120,7 +120,7 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
         return np.zeros(source.grid.shape, dtype=np.float32)
     nodes = NodeSources.empty(source.vectors.shape, source.vectors.steps)
     scatter(*source.stencil, np.stack([weights, weights * values / largest], axis=1), nodes)
-    levels = diffuse_on_pyramid(nodes, source.time_on, finest=1, rounds=1)
+    levels = diffuse_on_pyramid(nodes, source.time_on, finest=max(1, source.finest), rounds=1)
     return collapse(levels, nodes.shape, 1, quotients).reshape(source.grid.shape) * np.float32(largest)
 
 

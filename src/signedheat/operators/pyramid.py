@@ -193,10 +193,14 @@ def collapse(
 
     `extract(vectors, inside, out, axis, start, stop)` fills `out` where `inside`.
     """
+    shapes = [tuple(shape)]
+    for level in levels[:-1]:
+        halves = [n if f == 1 else n // 2 + 1 if f == 2 else 1 for n, f in zip(shapes[-1], level.factors, strict=True)]
+        shapes.append(tuple(halves))
     result = np.empty((components, 1, 1, 1, 1), dtype=np.float32)
     for depth in range(len(levels) - 1, -1, -1):
         level = levels[depth]
-        fine_shape = shape if depth == 0 else level.vectors.shape[:4]
+        fine_shape = shapes[depth]
         out = np.zeros((components, *fine_shape), dtype=np.float32)
         if depth < len(levels) - 1:
             by_slabs(fine_shape, _interpolate, result, level.factors, out)

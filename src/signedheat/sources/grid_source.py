@@ -27,12 +27,21 @@ class GridSource:
     diffusion: float
 
     def time_on(self, spacing: float) -> float:
-        """t on a grid of this mean spacing (MATH: the larger of both spacings, squared)."""
-        return self.diffusion * max(spacing, self.samples.spacing) ** 2
+        """t on a coarser grid of this mean spacing: on none does √t span less than a cell."""
+        return self.time if spacing <= self._step else max(self.time, spacing**2)
 
     @property
     def time(self) -> float:
-        return self.time_on(float(self.grid.spacing.mean()))
+        return self.diffusion * max(self._step, self.samples.spacing) ** 2
+
+    @property
+    def finest(self) -> int:
+        """How many halvings of the grid still leave √t a cell to span: finer grids have nothing to add."""
+        return max(0, int(np.log2(np.sqrt(self.time) / self._step) + 1e-6))
+
+    @property
+    def _step(self) -> float:
+        return float(self.grid.spacing.mean())
 
     @property
     def vectors(self) -> NodeSources:
