@@ -60,7 +60,12 @@ class VectorHeat:
         return [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
 
     def _carried_on(self, start: NDArray[np.complex128], near: NDArray[np.complex128]) -> list[NDArray[np.complex128]]:
+        from ..operators.assembly_kernels import extremes
+
         stages = [near]
+        smallest, largest = extremes(near)
+        if smallest >= _FAINT * largest:
+            return stages
         unknown = np.ones(len(near), dtype=bool)
         while True:
             size = np.where(unknown, _size(stages[-1]), 0.0)
@@ -89,11 +94,14 @@ class VectorHeat:
 
     def _raised(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Scaled by a power of two, so that the largest X is about one."""
-        largest = _size(vectors).max(initial=0.0)
+        held = np.flatnonzero(vectors)
+        largest = _size(vectors[held]).max(initial=0.0)
         if largest == 0:
             return vectors
+        raised = np.zeros_like(vectors)
         steps = int(np.frexp(self._smallest_mass)[1] - np.frexp(largest)[1])
-        return np.ldexp(np.ascontiguousarray(vectors).view(np.float64), steps).view(np.complex128)
+        raised[held] = np.ldexp(vectors[held].view(np.float64), steps).view(np.complex128)
+        return raised
 
     def _solve(self, columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
         if self.factor.n == len(columns):
