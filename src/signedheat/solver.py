@@ -181,8 +181,8 @@ def signed_distance(
 
     Parameters
     ----------
-    source : TriangleMesh, PolygonMesh or PointCloud with normals, or a sequence of them
-        The shape; any source of `SignedHeatSolver.distance` where a domain is given.
+    source : TriangleMesh, PolygonMesh, PointCloud with normals or Polyline, or a sequence of them
+        The shape, in the plane a `Polyline`; any source of `SignedHeatSolver.distance` where a domain is given.
     domain : Grid, TetMesh, TriangleMesh, …, optional
         Where to measure; by default a grid of cubic cells around the shape.
     resolution : int

@@ -90,8 +90,8 @@ class AreaSamples:
 def area_elements(shape: Any) -> AreaElements:
     """Lower a shape in space to simplices with vectors."""
     raise SourceError(
-        f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, not to a "
-        f"{type(shape).__name__}"
+        f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
+        f"Polyline, not to a {type(shape).__name__}"
     )
 
 
