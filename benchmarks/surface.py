@@ -3,7 +3,8 @@
     python benchmarks/surface.py [--levels 5 6 7 8] [--peer-up-to 7]
 
 Each program runs in a process of its own, one after the other, on the same mesh and curves: a bumpy sphere and level
-sets that cross its faces, nothing imposed but where said. Times in seconds, memory in megabytes above what imports and input take.
+sets that cross its faces, nothing imposed but where said. Times in seconds, memory in megabytes above what imports
+and input take.
 """
 
 from __future__ import annotations
