@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .sweeps import STRETCH
-
-TINY = np.float32(1e-34)
-"""Where nothing greater arrives, the coarser level knows better."""
+from .sweeps import STRETCH, TINY
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})

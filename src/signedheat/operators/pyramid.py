@@ -1,12 +1,13 @@
 """Diffusion from sources on a grid, over a pyramid of coarser grids.
 
-X falls by e over √t. Farther than a few √t from the source its direction varies slowly, and the same question asked on
-a grid of twice the spacing, with the time that belongs to it (``t = τ max(h, h_source)²``, as on the finest grid), has
-the same answer at an eighth of the cost. So every level is swept only within `BAND` of the source, and the coarsest
-everywhere.
+X falls by e over √t. Farther than a few √t from the source its direction varies slowly, and a grid of twice the
+spacing, with the time that belongs to it (``t = τ max(h, h_source)²``, as on the finest grid), carries it on at an
+eighth of the cost. So every level is swept only within `BAND` of its sources, and the coarsest everywhere.
 
-Sources move to a coarser grid by the transpose of linear interpolation, which keeps their sums and first moments: two
-sides of a sheet thinner than a coarse cell do not cancel.
+A coarser level starts from what the finer one found within its band: X there, its length raised to the power that
+turns the decay of one level into that of the next, so that a path from the source to a node weighs the same wherever it
+leaves the band. Where a level is left out, sources move on by the transpose of linear interpolation, which keeps their
+sums and first moments: two sides of a sheet thinner than a coarse cell do not cancel.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .stencil import by_slabs
-from .sweeps import STRETCH, diffuse_by_sweeps
+from .sweeps import STRETCH, TINY, diffuse_by_sweeps
 
 BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
@@ -31,6 +32,8 @@ FEW = 4
 """Axes with no more nodes than this are not halved."""
 ROUNDS = 2
 """How often each combination of directions is swept within a band, if nothing else is asked for."""
+ROUNDS_BEYOND = 6
+"""The same on a level that carries on what a finer one found."""
 ROUNDS_EVERYWHERE = 12
 """The same on the coarsest grid, where paths from the source are longer, and sweeps cost nothing."""
 
@@ -84,6 +87,22 @@ class Level:
     factors: NDArray[np.int64]
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Values that a finer level found.
+
+    Attributes
+    ----------
+    vectors : (l₀, l₁, l₂, n, 4) float32
+        X.
+    where : (l₀, l₁, l₂, stretches) bool
+        Stretches that need no sweeping.
+    """
+
+    vectors: NDArray[np.float32]
+    where: NDArray[np.bool_]
+
+
 def diffuse_on_pyramid(
     sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = ROUNDS
 ) -> list[Level]:
@@ -100,17 +119,26 @@ def diffuse_on_pyramid(
     rounds : int
         How often each combination of directions is swept within a band.
     """
-    levels = []
+    levels: list[Level] = []
+    known = None
     while True:
         factors = coarsening(sources.shape, sources.steps)
         last = not (factors > 1).any()
         if len(levels) >= finest or last:
-            levels.append(_diffuse_level(sources, time, factors, ROUNDS_EVERYWHERE if last else rounds, last))
+            often = ROUNDS_EVERYWHERE if last else rounds if known is None else max(rounds, ROUNDS_BEYOND)
+            levels.append(_diffuse_level(sources, known, time, factors, often, last))
         else:
             levels.append(Level(None, None, factors))
         if last:
             return levels
-        sources = _restricted(sources, factors)
+        coarse = _coarser(sources, factors)
+        known = None
+        if levels[-1].vectors is not None:
+            power = np.sqrt(time(_mean_step(sources)) / time(_mean_step(coarse)))
+            known = _carried(levels[-1], coarse, power)
+        if known is None:
+            _restrict(sources.sums, sources.touched, factors, coarse.sums, coarse.touched)
+        sources = coarse
 
 
 def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -136,22 +164,33 @@ def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np
 
 def _diffuse_level(
     sources: NodeSources,
+    known: Known | None,
     time: Callable[[float], float],
     factors: NDArray[np.int64],
     rounds: int,
     last: bool,
 ) -> Level:
+    t = time(_mean_step(sources))
     real = sources.steps > 0
-    t = time(float(sources.steps[real].mean()))
     ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
+    start = sources.touched if known is None else known.where
     if last:
-        active = inside = np.ones_like(sources.touched)
+        active = inside = np.ones_like(start)
     else:
         width = np.ceil(BAND * np.sqrt(ratios)).astype(int)
-        active = _dilated(sources.touched, width)
-        inside = _dilated(sources.touched, np.maximum(width - MARGIN, 0))
-    vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, rounds)
+        active = _dilated(start, width)
+        inside = _dilated(start, np.maximum(width - MARGIN, 0))
+    if known is not None:
+        active = active & ~known.where
+    if known is None and not last:  # what lies far from a small source is worth more rounds, and they cost little
+        rounds = int(np.clip(rounds / active.mean(), rounds, 2 * rounds))
+    given = None if known is None else known.vectors
+    vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, rounds, given)
     return Level(vectors, inside, factors)
+
+
+def _mean_step(sources: NodeSources) -> float:
+    return float(sources.steps[sources.steps > 0].mean())
 
 
 def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -165,13 +204,22 @@ def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bo
     return spread.view(np.bool_)
 
 
-def _restricted(sources: NodeSources, factors: NDArray[np.int64]) -> NodeSources:
+def _coarser(sources: NodeSources, factors: NDArray[np.int64]) -> NodeSources:
+    """The next coarser grid, without sources."""
     counts = np.array(sources.shape)
     shape = np.where(factors == 2, counts // 2 + 1, np.where(factors == 1, counts, 1))
-    steps = np.where(shape > 1, sources.steps * factors, 0.0)
-    coarse = NodeSources.empty(tuple(int(n) for n in shape), steps)
-    _restrict(sources.sums, sources.touched, factors, coarse.sums, coarse.touched)
-    return coarse
+    return NodeSources.empty(tuple(int(n) for n in shape), np.where(shape > 1, sources.steps * factors, 0.0))
+
+
+def _carried(level: Level, coarse: NodeSources, power: float) -> Known | None:
+    """What a level found, for the next coarser one: in stretches of which it knows every node."""
+    vectors = np.zeros_like(coarse.sums)
+    counts = np.zeros(coarse.touched.shape, dtype=np.int64)
+    _carry(level.vectors, level.inside, level.factors, np.float32(power), vectors, counts)
+    full = np.full(counts.shape[3], STRETCH)
+    full[-1] = coarse.shape[3] - STRETCH * (len(full) - 1)
+    where = counts >= full
+    return Known(vectors, where) if where.any() else None
 
 
 def scatter(
@@ -219,6 +267,29 @@ def _scatter(nodes, weights, values, sums, touched, n):
                 for q in range(4):
                     sums[node, q] += np.float32(weight * values[s, q])
                 touched[node // n, node % n // STRETCH] = True
+
+
+@njit(cache=True, nogil=True)
+def _carry(vectors, inside, factors, power, coarse, counts):
+    """Vectors at the nodes that both grids share, with their lengths raised to a power; how many in each stretch."""
+    n0, n1, n2, n3 = vectors.shape[:4]
+    step = np.where(factors == 2, 2, 1)
+    for i in range(0, n0, step[0]):
+        for j in range(0, n1, step[1]):
+            for k in range(0, n2, step[2]):
+                a, b, c = i // factors[0], j // factors[1], k // factors[2]
+                for s in range(inside.shape[3]):
+                    if not inside[i, j, k, s]:
+                        continue
+                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
+                        line, d = vectors[i, j, k, m], m // factors[3]
+                        largest = max(max(abs(line[0]), abs(line[1])), max(abs(line[2]), abs(line[3])))
+                        if m % step[3] or largest < TINY:
+                            continue
+                        scale = largest ** (power - np.float32(1))
+                        for q in range(4):
+                            coarse[a, b, c, d, q] = scale * line[q]
+                        counts[a, b, c, d // STRETCH] += 1
 
 
 @njit(cache=True, nogil=True)

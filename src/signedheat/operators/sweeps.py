@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from .wavefront import sweep_lines
 
+TINY = np.float32(1e-34)
+"""Where nothing greater arrives, a coarser level knows better."""
 STRETCH = 8
 """Nodes of a line that are swept, or left out, together."""
 
@@ -23,6 +25,7 @@ def diffuse_by_sweeps(
     active: NDArray[np.bool_],
     ratios: NDArray[np.float64],
     rounds: int,
+    given: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
     """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j`` with no flux through the walls.
 
@@ -34,11 +37,13 @@ def diffuse_by_sweeps(
     touched : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
         Stretches in which B is not zero.
     active : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
-        Stretches in which to solve; X is zero in all others.
+        Stretches in which to solve.
     ratios : (4,) float
         a = t / h² along each axis.
     rounds : int
         How often each combination of directions is swept.
+    given : (l₀, l₁, l₂, n, 4) float32, optional
+        X in all other stretches, zero by default; overwritten.
 
     Returns
     -------
@@ -46,7 +51,7 @@ def diffuse_by_sweeps(
         X; pages outside the active stretches are never touched.
     """
     shape = sources.shape[:4]
-    vectors = np.zeros_like(sources)
+    vectors = np.zeros_like(sources) if given is None else given
     lines = shape[0] * shape[1] * shape[2]
     sweep_lines(
         _sweep_tile,
@@ -84,7 +89,6 @@ def _sweep_tile(vectors, sources, touched, active, shape, ratios, pivots, tile):
     n0, n1, n2, n = shape
     row = np.empty(4 * n, dtype=np.float32)
     none = np.zeros(4 * n, dtype=np.float32)  # beyond the walls
-    # stretches at the rim of the active ones have no neighbours beyond: their inflow from there is zero
     for i in range(tile[0], tile[1], tile[2]):
         for j in range(tile[3], tile[4], tile[5]):
             for k in range(tile[6], tile[7], tile[8]):
@@ -116,9 +120,18 @@ def _sweep_tile(vectors, sources, touched, active, shape, ratios, pivots, tile):
                         if touched[here, s]:
                             for m in range(4 * STRETCH * s, min(4 * STRETCH * (s + 1), 4 * n)):
                                 row[m] += sources[here, m]
-                    # elimination and substitution
-                    x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
+                    # elimination and substitution, between neighbours on the line whose values stay
                     along = ratios[3]
+                    out = vectors[here]
+                    x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
+                    if begin > 0:
+                        m = 4 * begin - 4
+                        q = along * pivot[begin - 1]  # of the eliminated neighbour, whose value is x + q · (value here)
+                        x, y = out[m] - q * out[m + 4], out[m + 1] - q * out[m + 5]
+                        z, w = out[m + 2] - q * out[m + 6], out[m + 3] - q * out[m + 7]
+                    if end < n:
+                        for c in range(4):
+                            row[4 * end - 4 + c] += along * out[4 * end + c]
                     for m in range(begin, end):
                         p = pivot[m]
                         q = along * p
@@ -131,7 +144,6 @@ def _sweep_tile(vectors, sources, touched, active, shape, ratios, pivots, tile):
                         row[4 * m + 2] = z
                         row[4 * m + 3] = w
                     x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-                    out = vectors[here]
                     for m in range(end - 1, begin - 1, -1):
                         q = along * pivot[m]
                         x = row[4 * m] + q * x
