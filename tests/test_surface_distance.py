@@ -327,3 +327,20 @@ def test_vector_heat_by_faces_equals_the_matrix(broken):
     expected = (matrix @ vectors.view(float)).view(complex) if broken else matrix @ vectors
     forces = vector_heat_forces(triangles, 0.3, vectors, np.arange(triangles.n_faces))
     np.testing.assert_allclose(forces, expected, atol=1e-12)
+
+
+def test_points_inside_faces_are_interpolated_when_asked_for_and_cost_accuracy():
+    mesh = sphere(4)
+    angles = np.linspace(0, 2 * np.pi, 100, endpoint=False)
+    circle = np.stack([np.sin(0.8) * np.cos(angles), np.sin(0.8) * np.sin(angles), np.full(100, np.cos(0.8))], axis=1)
+    curve = mesh.polyline(circle, closed=True)
+    solver = sh.SignedHeatSolver(mesh)
+    inside = (curve.barycentric > 1e-9).all(axis=1)
+    assert inside.any()
+    height = 0.5 * mesh.edge_lengths.mean()
+    hard, usual = (solver.distance(curve, constraint) for constraint in (sh.ZeroSet(hard=True), sh.ZeroSet()))
+    assert np.abs(hard(curve)).max() < 1e-8 * height
+    assert np.abs(usual(curve)[~inside]).max() < 1e-8 * height
+    exact = 0.8 - np.arccos(np.clip(mesh.vertices[:, 2], -1, 1))
+    error = [np.sqrt(np.mean((phi.values - exact) ** 2)) for phi in (usual, hard)]
+    assert error[0] < error[1] < 0.1

@@ -41,8 +41,10 @@ class ZeroSet:
     Parameters
     ----------
     hard : bool
-        On grids the default pulls φ to zero along the source by a smooth correction, which is cheaper and, on broken
-        input, more accurate than interpolating every sample; ``hard=True`` interpolates. On meshes both are the same.
+        Interpolate every point of the source. By default φ is zero, to rounding, where a curve passes vertices and
+        edges of a surface, but free at points inside faces, since several of them in one face would flatten φ there;
+        on grids and tets φ is pulled to zero along the source by a smooth correction, which is cheaper and, on broken
+        input, more accurate.
 
     Examples
     --------

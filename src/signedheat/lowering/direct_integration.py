@@ -54,19 +54,28 @@ class DirectIntegration:
         """Minimise ∫|∇φ − Y|² with nothing imposed."""
         return self._centered(self.factor.solve(divergence), source)
 
+    def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels exactly, but only where the source asks for it: see `SurfaceSource.pinned`."""
+        return self._impose(divergence, source, levels, source.pinned)
+
     def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels at the samples, or levels up to one unknown constant for each group of samples.
+        """Impose levels exactly at every sample."""
+        return self._impose(divergence, source, levels, np.ones(len(source.weights), dtype=bool))
+
+    def _impose(
+        self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels, chosen: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
+        """Impose levels at the chosen samples, or levels up to one unknown constant for each group of samples.
 
         The constants are those at which no group pulls: the multipliers of each add up to zero. One constant per
         connected part of the domain stays free, and is chosen by the mean.
         """
-        pinned = getattr(source, "pinned", slice(None))
-        rows, values = source.rows[pinned], levels.values[pinned]
+        rows, values = source.rows[chosen], levels.values[chosen]
         if levels.groups is None:
             fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
             _refuse_contradictions(rows, values, fitted[:, 0])
             return self._reached(fitted[:, 0], rows)
-        group = levels.groups[pinned]
+        group = levels.groups[chosen]
         bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a sample alone is bound to nothing
         rows, values, group = rows[bound], values[bound], np.unique(group[bound], return_inverse=True)[1]
         fixed = group[np.unique(self._part_of(rows), return_index=True)[1]]
@@ -84,8 +93,6 @@ class DirectIntegration:
         constants = np.linalg.lstsq(capacitance, -(loads.T @ pull[:, 0]))[0]
         fitted, _ = self._interpolate(rows, divergence[:, None], (values + loads @ constants)[:, None])
         return self._centered(fitted[:, 0], source)
-
-    fit = fit_exactly
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
         """``(C + λ Aᵀ W A) φ = b``."""
