@@ -17,6 +17,7 @@ from ..domains.tet_mesh import TetMesh
 from ..errors import UnreachedWarning
 from ..fields.tet_field import TetField
 from ..linear import factorize, upper_triangle, whole
+from ..linear.stages import solve_in_stages
 from ..method import unit
 from .tet_integration import TetIntegration
 
@@ -36,9 +37,6 @@ DIRECTION_ERROR = 1e-3
 
 SPRINGS = 30.0
 """Strength with which levels are imposed, over one edge length."""
-
-FAINT = 1e-250
-"""Vectors below this fraction of the largest are computed anew, before they underflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,30 +112,9 @@ class TetDiscretization:
         return self._bend(*self._in_tets(self._stages(source.time, loads)), source)
 
     def _stages(self, time: float, loads: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
-        """X at the faces, in stages, each with the logarithm of the factor that it is to be multiplied by.
-
-        X falls like exp(−r/√t), and out of the range of floating-point numbers a few hundred faces away. On the faint
-        faces it satisfies the same equation with a right-hand side along their border: scaled up, that is the next
-        stage. It is NaN nearer than where it begins.
-        """
-        matrix, scale = self._heat_matrix(time), float(np.abs(loads).max())
-        vectors, factor = self._solve(matrix, time, loads / scale), np.log(scale)
-        stages, faint = [(vectors, factor)], np.abs(vectors).max(axis=1) < FAINT
-        while faint.any():
-            forces = np.where(faint[:, None], loads / scale, 0)
-            border = self._around(faint)
-            forces[border] += (matrix @ np.where(faint[:, None], vectors, 0))[border]
-            scale = float(np.abs(forces).max())
-            if scale == 0:
-                break
-            loads, factor = forces, factor + np.log(scale)
-            vectors = self._solve(matrix, time, loads / scale)
-            still = faint & (np.abs(vectors).max(axis=1) < FAINT)
-            stages.append((np.where(faint[:, None], vectors, np.nan), factor))
-            if still.sum() == faint.sum():
-                break
-            faint = still
-        return stages
+        """X at the faces, in stages: it leaves the range of floating-point numbers a few hundred faces away."""
+        matrix = self._heat_matrix(time)
+        return solve_in_stages(matrix, lambda forces: self._solve(matrix, time, forces), loads)
 
     def _in_tets(
         self, stages: list[tuple[NDArray[np.float64], float]]
@@ -197,11 +174,6 @@ class TetDiscretization:
 
         order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
         return IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
-
-    def _around(self, faint: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Faces of the tets that have both kinds of faces."""
-        count = faint[self.mesh.faces.of_tets].sum(axis=1)
-        return np.unique(self.mesh.faces.of_tets[(count > 0) & (count < 4)])
 
     def _heat_matrix(self, time: float) -> sparse.csr_matrix:
         matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass(self.mesh.faces)
