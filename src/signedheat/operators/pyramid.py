@@ -26,14 +26,16 @@ BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
 MARGIN = 3
 """Lines at the rim of the band that take their values from the coarser level."""
+SMALL = 0.125
+"""Where the first band is less of the grid than this, it is swept twice as often: much depends on it, at little cost."""
 COARSEST = 32
 """A grid with no more nodes than this along any axis is not coarsened."""
 FEW = 4
 """Axes with no more nodes than this are not halved."""
 ROUNDS = 2
 """How often each combination of directions is swept within a band, if nothing else is asked for."""
-ROUNDS_BEYOND = 6
-"""The same on a level that carries on what a finer one found."""
+BEYOND = 2
+"""How many times as often a level is swept that carries on what a finer one found."""
 ROUNDS_EVERYWHERE = 12
 """The same on the coarsest grid, where paths from the source are longer, and sweeps cost nothing."""
 
@@ -125,7 +127,7 @@ def diffuse_on_pyramid(
         factors = coarsening(sources.shape, sources.steps)
         last = not (factors > 1).any()
         if len(levels) >= finest or last:
-            often = ROUNDS_EVERYWHERE if last else rounds if known is None else max(rounds, ROUNDS_BEYOND)
+            often = ROUNDS_EVERYWHERE if last else rounds if known is None else BEYOND * rounds
             levels.append(_diffuse_level(sources, known, time, factors, often, last))
         else:
             levels.append(Level(None, None, factors))
@@ -182,8 +184,8 @@ def _diffuse_level(
         inside = _dilated(start, np.maximum(width - MARGIN, 0))
     if known is not None:
         active = active & ~known.where
-    if known is None and not last:  # what lies far from a small source is worth more rounds, and they cost little
-        rounds = int(np.clip(rounds / active.mean(), rounds, 2 * rounds))
+    if known is None and not last and active.mean() < SMALL:
+        rounds *= 2
     given = None if known is None else known.vectors
     vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, rounds, given)
     return Level(vectors, inside, factors)
