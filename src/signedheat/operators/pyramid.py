@@ -27,7 +27,7 @@ BAND = 14.0
 MARGIN = 3
 """Lines at the rim of the band that take their values from the coarser level."""
 SMALL = 0.125
-"""Where the first band is less of the grid than this, it is swept twice as often: much depends on it, at little cost."""
+"""Where the first band is less of the grid than this, it is swept twice as often: much depends on it, at low cost."""
 COARSEST = 32
 """A grid with no more nodes than this along any axis is not coarsened."""
 FEW = 4
