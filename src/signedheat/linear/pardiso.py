@@ -81,6 +81,7 @@ class _Call:
         self.parameters[4] = 0 if order is None else 1
         self.parameters[17] = -1  # report the nonzeros of the factor
         self.parameters[23] = 0  # the two-level scheme solves wrongly, and silently, once the number of threads changes
+        self.parameters[33] = 1  # the same bits every time, on however many threads
         self.parameters[34] = 1  # indices count from zero
 
     def __call__(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
