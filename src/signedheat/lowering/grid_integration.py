@@ -112,16 +112,21 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
     It varies slowly, so the finest level of the pyramid is left out.
     """
     from ..operators.extraction import quotients
-    from ..operators.pyramid import NodeSources, collapse, diffuse_on_pyramid, scatter
+    from ..operators.pyramid import collapse, diffuse_on_pyramid, leave_out, scatter
+    from ..operators.stencil import interpolation_stencil
 
-    weights = source.weights / source.weights.max()
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)
-    nodes = NodeSources.empty(source.vectors.shape, source.vectors.steps)
-    scatter(*source.stencil, np.stack([weights, weights * values / largest], axis=1), nodes)
-    levels = diffuse_on_pyramid(nodes, source.time_on, finest=max(1, source.finest), rounds=1)
-    return collapse(levels, nodes.shape, 1, quotients).reshape(source.grid.shape) * np.float32(largest)
+    finest = source.vectors
+    left_out, nodes = leave_out(finest, max(1, source.finest))
+    axes = slice(-source.grid.dimension, None)
+    ratios = finest.steps[axes] / np.where(nodes.steps[axes] > 0, nodes.steps[axes], np.inf)
+    stencil = interpolation_stencil(source.samples.positions * ratios, nodes.shape[axes])
+    weights = source.weights / source.weights.max()
+    scatter(*stencil, np.stack([weights, weights * values / largest], axis=1), nodes)
+    levels = left_out + diffuse_on_pyramid(nodes, source.time_on, rounds=1)
+    return collapse(levels, finest.shape, 1, quotients).reshape(source.grid.shape) * np.float32(largest)
 
 
 def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:

@@ -40,7 +40,7 @@ def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float6
     squares = np.full(shape, np.inf, dtype=np.float32)
     points = crossings[:, :4].astype(np.float32)
     _seed(nearest, squares, edges, points, steps)
-    sweep_lines(_nearest_tile, shape, 1, nearest, squares, points, steps)
+    sweep_lines(_nearest_tiles, shape, 1, nearest, squares, points, steps)
     del squares
     result = np.empty(shape)
     reach = float(np.linalg.norm(spacing))  # no point of the zero set is farther from its nearest crossing
@@ -215,39 +215,40 @@ def _seed(nearest, squares, edges, points, steps):
 
 
 @njit(cache=True, nogil=True)
-def _nearest_tile(nearest, squares, points, steps, tile):
+def _nearest_tiles(nearest, squares, points, steps, tiles):
     """Take over the nearest crossing of lines already visited, and along each line both ways."""
     n0, n1, n2, n = nearest.shape
     step = np.float32(steps[3])
-    for i in range(tile[0], tile[1], tile[2]):
-        for j in range(tile[3], tile[4], tile[5]):
-            for k in range(tile[6], tile[7], tile[8]):
-                own, square = nearest[i, j, k], squares[i, j, k]
-                x, y, z = np.float32(i * steps[0]), np.float32(j * steps[1]), np.float32(k * steps[2])
-                for side in range(1, 8):
-                    a = i - (tile[2] if side & 4 else 0)
-                    b = j - (tile[5] if side & 1 else 0)
-                    c = k - (tile[8] if side & 2 else 0)
-                    if not (0 <= a < n0 and 0 <= b < n1 and 0 <= c < n2):
-                        continue
-                    other = nearest[a, b, c]
-                    for m in range(n):
-                        p = other[m]
-                        if p >= 0 and p != own[m]:
-                            w = m * step - points[p, 3]
-                            s = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2 + w * w
-                            if s < square[m]:
-                                square[m], own[m] = s, p
-                for way in range(2):
-                    p = np.int32(-1)
-                    for count in range(n):
-                        m = count if way == 0 else n - 1 - count
-                        if p >= 0 and p != own[m]:
-                            w = m * step - points[p, 3]
-                            s = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2 + w * w
-                            if s < square[m]:
-                                square[m], own[m] = s, p
-                        p = own[m]
+    for tile in tiles:
+        for i in range(tile[0], tile[1], tile[2]):
+            for j in range(tile[3], tile[4], tile[5]):
+                for k in range(tile[6], tile[7], tile[8]):
+                    own, square = nearest[i, j, k], squares[i, j, k]
+                    x, y, z = np.float32(i * steps[0]), np.float32(j * steps[1]), np.float32(k * steps[2])
+                    for side in range(1, 8):
+                        a = i - (tile[2] if side & 4 else 0)
+                        b = j - (tile[5] if side & 1 else 0)
+                        c = k - (tile[8] if side & 2 else 0)
+                        if not (0 <= a < n0 and 0 <= b < n1 and 0 <= c < n2):
+                            continue
+                        other = nearest[a, b, c]
+                        for m in range(n):
+                            p = other[m]
+                            if p >= 0 and p != own[m]:
+                                w = m * step - points[p, 3]
+                                s = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2 + w * w
+                                if s < square[m]:
+                                    square[m], own[m] = s, p
+                    for way in range(2):
+                        p = np.int32(-1)
+                        for count in range(n):
+                            m = count if way == 0 else n - 1 - count
+                            if p >= 0 and p != own[m]:
+                                w = m * step - points[p, 3]
+                                s = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2 + w * w
+                                if s < square[m]:
+                                    square[m], own[m] = s, p
+                            p = own[m]
 
 
 @njit(cache=True, nogil=True)

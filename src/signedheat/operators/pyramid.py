@@ -164,6 +164,15 @@ def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np
     return factors
 
 
+def leave_out(sources: NodeSources, finest: int) -> tuple[list[Level], NodeSources]:
+    """The first levels of the pyramid, with nothing in them, and the coarser grid that follows, without sources."""
+    levels: list[Level] = []
+    while len(levels) < finest and ((factors := coarsening(sources.shape, sources.steps)) > 1).any():
+        levels.append(Level(None, None, factors))
+        sources = _coarser(sources, factors)
+    return levels, sources
+
+
 def _diffuse_level(
     sources: NodeSources,
     known: Known | None,

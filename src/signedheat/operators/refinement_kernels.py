@@ -187,9 +187,16 @@ def is_hopeless(g, agenda, h):
 def is_needle(g, h, goal):
     """Whether the ends of h all but coincide, and no angle of the face exceeds 150°: thin, but harmless."""
     n, d = tangent_at(g, preceding(h))
-    n1, d1 = tangent_at(g, h)
-    n2, d2 = tangent_at(g, following(h))
-    return n < goal.needle * d and n1 < 13.9 * d1 and n2 < 13.9 * d2
+    if n >= goal.needle * d:
+        return False
+    longest, opposite = -1.0, h
+    for k in range(3):
+        x = 3 * (h // 3) + k
+        if g.length[g.edge[x]] > longest:
+            longest, opposite = g.length[g.edge[x]], preceding(x)
+    n, d = tangent_at(g, opposite)
+    sine = 2.0 * np.sqrt(n * d) / (n + d)
+    return g.length[g.edge[h]] < 0.035 * sine * longest
 
 
 @kernel

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ..parallel import n_threads
-from .wavefront import padded_shape
+from .wavefront import SMALL, padded_shape
 
 SLAB = 16
 """Rows of lines that one job works on."""
@@ -69,29 +69,23 @@ def solve_poisson(
         (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) / h**2
         for n, h in zip(right_hand_side.shape, spacing, strict=True)
     ]
-    inner = np.zeros(())
-    for axis_values in eigenvalues[1:]:
-        inner = np.add.outer(inner, axis_values)
-    with ThreadPoolExecutor(workers) as pool:
-        rows = [transformed[k : k + 1] for k in range(len(transformed))]  # views, in one dimension too
-        list(pool.map(lambda row, value: _divide(row, inner + value), rows, eigenvalues[0]))
+    padded = padded_shape(transformed.shape)
+    eigenvalues = [np.zeros(1)] * (4 - len(eigenvalues)) + eigenvalues
+    by_slabs(padded, _divide, *eigenvalues, transformed.reshape(padded))
     return idctn(transformed, type=2, overwrite_x=True, workers=workers)
-
-
-def _divide(row: NDArray[np.float64], eigenvalues: NDArray[np.float64]) -> None:
-    zero = eigenvalues == 0.0
-    row /= np.where(zero, np.inf, eigenvalues)
 
 
 def interpolation_stencil(
     positions: NDArray[np.float64], shape: tuple[int, ...]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """(s, 2^d) nodes and weights that interpolate linearly along every axis at positions given in cells."""
+    """(s, 2^d) nodes and weights that interpolate linearly at positions given in cells, along axes of several nodes."""
     cell = np.minimum(positions.astype(np.int64), np.array(shape) - 2)
     part = positions - cell
     nodes = np.zeros((len(positions), 1), dtype=np.int64)
     weights = np.ones((len(positions), 1))
     for axis, n in enumerate(shape):
+        if n == 1:
+            continue
         below = nodes * n + cell[:, axis, None]
         nodes = np.concatenate([below, below + 1], axis=1)
         f = part[:, axis, None]
@@ -103,10 +97,28 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
     """Run a kernel over slabs of the first long axis."""
     axis = 0 if shape[0] > 1 else 1
     n = shape[axis]
+    if np.prod(shape) < SMALL:
+        kernel(*arguments, axis, 0, n)
+        return
     with ThreadPoolExecutor(n_threads()) as pool:
         jobs = [pool.submit(kernel, *arguments, axis, start, min(start + SLAB, n)) for start in range(0, n, SLAB)]
         for job in jobs:
             job.result()
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _divide(values0, values1, values2, values3, transformed, axis, start, stop):
+    """Divide by sums of one-dimensional eigenvalues; where they are zero the quotient is."""
+    n0, n1, n2, n = transformed.shape
+    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
+        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
+            for k in range(n2):
+                line = transformed[i, j, k]
+                outer = values0[i] + values1[j] + values2[k]
+                for m in range(n):
+                    line[m] /= outer + values3[m]
+                if outer == 0.0 and values3[0] == 0.0:
+                    line[0] = 0.0
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})

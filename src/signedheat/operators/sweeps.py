@@ -54,7 +54,7 @@ def diffuse_by_sweeps(
     vectors = np.zeros_like(sources) if given is None else given
     lines = shape[0] * shape[1] * shape[2]
     sweep_lines(
-        _sweep_tile,
+        _sweep_tiles,
         shape,
         rounds,
         vectors.reshape(lines, 4 * shape[3]),
@@ -83,74 +83,79 @@ def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[
     return table.astype(np.float32)
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nnan", "nsz"})
-def _sweep_tile(vectors, sources, touched, active, shape, ratios, pivots, tile):
-    """Update the lines of one tile in order: four components side by side."""
+@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
+def _sweep_tiles(vectors, sources, touched, active, shape, ratios, pivots, tiles):
+    """Update the lines of tiles in order: four components side by side. Parts of lines are sliced, for vector code."""
     n0, n1, n2, n = shape
+    ratio0, ratio1, ratio2, along = ratios
     row = np.empty(4 * n, dtype=np.float32)
     none = np.zeros(4 * n, dtype=np.float32)  # beyond the walls
-    for i in range(tile[0], tile[1], tile[2]):
-        for j in range(tile[3], tile[4], tile[5]):
-            for k in range(tile[6], tile[7], tile[8]):
-                here = (i * n1 + j) * n2 + k
-                stretch, stretches = 0, active.shape[1]
-                walls = (i == 0 or i == n0 - 1) + 2 * (j == 0 or j == n1 - 1) + 4 * (k == 0 or k == n2 - 1)
-                pivot = pivots[walls]
-                while stretch < stretches:
-                    if not active[here, stretch]:
-                        stretch += 1
-                        continue
-                    first = stretch
-                    while stretch < stretches and active[here, stretch]:
-                        stretch += 1
-                    begin, end = first * STRETCH, min(stretch * STRETCH, n)
-                    # what flows in from the lines around, and the source
-                    low, high = vectors[here - n2] if j > 0 else none, vectors[here + n2] if j < n1 - 1 else none
-                    left, right = vectors[here - 1] if k > 0 else none, vectors[here + 1] if k < n2 - 1 else none
-                    for m in range(4 * begin, 4 * end):
-                        row[m] = ratios[1] * (low[m] + high[m]) + ratios[2] * (left[m] + right[m])
-                    if n0 > 1:
-                        below, above = (
-                            vectors[here - n1 * n2] if i > 0 else none,
-                            vectors[here + n1 * n2] if i < n0 - 1 else none,
-                        )
-                        for m in range(4 * begin, 4 * end):
-                            row[m] += ratios[0] * (below[m] + above[m])
-                    for s in range(first, stretch):
-                        if touched[here, s]:
-                            for m in range(4 * STRETCH * s, min(4 * STRETCH * (s + 1), 4 * n)):
-                                row[m] += sources[here, m]
-                    # elimination and substitution, between neighbours on the line whose values stay
-                    along = ratios[3]
-                    out = vectors[here]
-                    x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-                    if begin > 0:
-                        m = 4 * begin - 4
-                        q = along * pivot[begin - 1]  # of the eliminated neighbour, whose value is x + q · (value here)
-                        x, y = out[m] - q * out[m + 4], out[m + 1] - q * out[m + 5]
-                        z, w = out[m + 2] - q * out[m + 6], out[m + 3] - q * out[m + 7]
-                    if end < n:
-                        for c in range(4):
-                            row[4 * end - 4 + c] += along * out[4 * end + c]
-                    for m in range(begin, end):
-                        p = pivot[m]
-                        q = along * p
-                        x = p * row[4 * m] + q * x
-                        y = p * row[4 * m + 1] + q * y
-                        z = p * row[4 * m + 2] + q * z
-                        w = p * row[4 * m + 3] + q * w
-                        row[4 * m] = x
-                        row[4 * m + 1] = y
-                        row[4 * m + 2] = z
-                        row[4 * m + 3] = w
-                    x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-                    for m in range(end - 1, begin - 1, -1):
-                        q = along * pivot[m]
-                        x = row[4 * m] + q * x
-                        y = row[4 * m + 1] + q * y
-                        z = row[4 * m + 2] + q * z
-                        w = row[4 * m + 3] + q * w
-                        out[4 * m] = x
-                        out[4 * m + 1] = y
-                        out[4 * m + 2] = z
-                        out[4 * m + 3] = w
+    stretches = active.shape[1]
+    for tile in tiles:
+        for i in range(tile[0], tile[1], tile[2]):
+            for j in range(tile[3], tile[4], tile[5]):
+                for k in range(tile[6], tile[7], tile[8]):
+                    here = (i * n1 + j) * n2 + k
+                    walls = (i == 0 or i == n0 - 1) + 2 * (j == 0 or j == n1 - 1) + 4 * (k == 0 or k == n2 - 1)
+                    stretch = 0
+                    while stretch < stretches:
+                        if not active[here, stretch]:
+                            stretch += 1
+                            continue
+                        first = stretch
+                        while stretch < stretches and active[here, stretch]:
+                            stretch += 1
+                        begin, end = first * STRETCH, min(stretch * STRETCH, n)
+                        part = slice(4 * begin, 4 * end)
+                        inflow, out, pivot = row[: 4 * (end - begin)], vectors[here, part], pivots[walls, begin:end]
+                        # what flows in from the lines around, the source, and the values that stay on the line
+                        low = vectors[here - n2, part] if j > 0 else none[part]
+                        high = vectors[here + n2, part] if j < n1 - 1 else none[part]
+                        left = vectors[here - 1, part] if k > 0 else none[part]
+                        right = vectors[here + 1, part] if k < n2 - 1 else none[part]
+                        for m in range(len(inflow)):
+                            inflow[m] = ratio1 * (low[m] + high[m]) + ratio2 * (left[m] + right[m])
+                        if n0 > 1:
+                            below = vectors[here - n1 * n2, part] if i > 0 else none[part]
+                            above = vectors[here + n1 * n2, part] if i < n0 - 1 else none[part]
+                            for m in range(len(inflow)):
+                                inflow[m] += ratio0 * (below[m] + above[m])
+                        for s in range(first, stretch):
+                            if touched[here, s]:
+                                source = sources[here, 4 * STRETCH * s : 4 * min(STRETCH * (s + 1), n)]
+                                into = inflow[4 * STRETCH * (s - first) :]
+                                for m in range(len(source)):
+                                    into[m] += source[m]
+                        x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
+                        if begin > 0:  # the neighbour was eliminated: its value is x + q · (value here)
+                            before = vectors[here, 4 * begin - 4 : 4 * begin]
+                            q = along * pivots[walls, begin - 1]
+                            x, y = before[0] - q * out[0], before[1] - q * out[1]
+                            z, w = before[2] - q * out[2], before[3] - q * out[3]
+                        if end < n:
+                            for c in range(4):
+                                inflow[4 * (end - begin) - 4 + c] += along * vectors[here, 4 * end + c]
+                        # elimination and substitution
+                        for m in range(end - begin):
+                            p = pivot[m]
+                            q = along * p
+                            x = p * inflow[4 * m] + q * x
+                            y = p * inflow[4 * m + 1] + q * y
+                            z = p * inflow[4 * m + 2] + q * z
+                            w = p * inflow[4 * m + 3] + q * w
+                            inflow[4 * m] = x
+                            inflow[4 * m + 1] = y
+                            inflow[4 * m + 2] = z
+                            inflow[4 * m + 3] = w
+                        x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
+                        for back in range(end - begin):
+                            m = end - begin - 1 - back
+                            q = along * pivot[m]
+                            x = inflow[4 * m] + q * x
+                            y = inflow[4 * m + 1] + q * y
+                            z = inflow[4 * m + 2] + q * z
+                            w = inflow[4 * m + 3] + q * w
+                            out[4 * m] = x
+                            out[4 * m + 1] = y
+                            out[4 * m + 2] = z
+                            out[4 * m + 3] = w

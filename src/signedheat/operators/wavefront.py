@@ -25,20 +25,22 @@ def padded_shape(shape: tuple[int, ...]) -> tuple[int, int, int, int]:
 
 
 def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int, *arguments: Any) -> None:
-    """Run ``kernel(*arguments, tile)`` over all lines along the last axis, in every combination of directions.
+    """Run ``kernel(*arguments, tiles)`` over all lines along the last axis, in every combination of directions.
 
-    A tile is (begin, end, step) for each of the first three axes of `shape`.
+    A tile is (begin, end, step) for each of the first three axes of `shape`; those of one call run in order.
     """
     steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
-    small = np.prod(shape) < SMALL
-    size = [n if small else max(8, min(32, -(-n // 8))) for n in shape[1:3]]
-    with ThreadPoolExecutor(n_threads()) as pool:
-        each = map if small else pool.map
+    threads = 1 if np.prod(shape) < SMALL else n_threads()
+    size = [n if threads == 1 else max(12, -(-n // (4 * threads))) for n in shape[1:3]]
+    with ThreadPoolExecutor(max(1, threads - 1)) as others:
         for direction in list(product(*steps)) * rounds:
             for plane in range(shape[0])[:: direction[0]]:
                 for wave in wavefronts(shape[1:3], size, direction[1:]):
-                    tiles = [np.array([plane, plane + direction[0], direction[0], *tile]) for tile in wave]
-                    list(each(lambda tile: kernel(*arguments, tile), tiles))
+                    tiles = np.array([[plane, plane + direction[0], direction[0], *tile] for tile in wave])
+                    jobs = [others.submit(kernel, *arguments, tiles[k::threads]) for k in range(1, threads)]
+                    kernel(*arguments, tiles[::threads])
+                    for job in jobs:
+                        job.result()
 
 
 def wavefronts(shape: tuple[int, ...], size: list[int], direction: tuple[int, ...]) -> list[list[list[int]]]:

@@ -63,7 +63,7 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
     stack = np.empty((deepest, n_corners, dimension))
-    levels = np.empty(deepest, dtype=np.int64)
+    shares = np.empty(deepest)  # of the whole simplex
     capacity = 1024
     sums = np.zeros((capacity, 2 * dimension + 1))
     labels = np.empty(capacity, dtype=np.int64)
@@ -71,7 +71,10 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
     first = 0  # slots of the component at hand start here
     current = np.int64(-1)
     centre = np.empty(dimension)
-    limit = size * size
+    lines = np.zeros(1 << (dimension - 1), dtype=np.int64)  # of nodes, around a piece, and its share of each
+    parts = np.empty(1 << (dimension - 1))
+    n = shape[dimension - 1]
+    limit, part_of_corner = size * size, 1.0 / n_corners
     for face in order:
         if weights[face] == 0.0:
             continue
@@ -79,7 +82,7 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
             current = components[face]
             first = count
         stack[0] = corners[face]
-        levels[0] = 0
+        shares[0] = 1.0
         top = 1
         while top > 0:
             top -= 1
@@ -103,7 +106,7 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
                     if square > longest:
                         longest, tail, head = square, e, c
             if longest > limit and top + 2 < deepest:
-                level = levels[top] + 1
+                half = 0.5 * shares[top]
                 for c in range(n_corners):
                     for d in range(dimension):
                         stack[top + 1, c, d] = stack[top, c, d]
@@ -111,7 +114,7 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
                     middle = 0.5 * (stack[top, tail, d] + stack[top, head, d])
                     stack[top, tail, d] = middle
                     stack[top + 1, head, d] = middle
-                levels[top] = levels[top + 1] = level
+                shares[top] = shares[top + 1] = half
                 top += 2
                 continue
             cell = np.int64(0)
@@ -119,7 +122,7 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
                 mean = 0.0
                 for c in range(n_corners):
                     mean += stack[top, c, d]
-                mean /= n_corners
+                mean *= part_of_corner
                 centre[d] = mean
                 if mean < 0.0 or mean > shape[d] - 1:
                     missed = True
@@ -140,23 +143,26 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
                 labels[slot] = current
                 count += 1
                 slots[cell] = count
-            share = 0.5 ** levels[top]
+            share = shares[top]
             weight = weights[face] * share
-            for corner in range(1 << dimension):
-                node, part = np.int64(0), share / scale
-                for d in range(dimension):
-                    below = min(max(np.int64(centre[d]), 0), shape[d] - 2)
-                    f = centre[d] - below
-                    if corner >> d & 1:
-                        below += 1
-                        part *= f
-                    else:
-                        part *= 1.0 - f
-                    node = node * shape[d] + below
-                if part > 0.0:
-                    for d in range(dimension):
-                        nodes[node, d] += np.float32(part * vectors[face, d])
-                    touched[node // shape[dimension - 1], node % shape[dimension - 1] // stretch] = True
+            lines[0], parts[0] = 0, share / scale
+            for d in range(dimension - 1):
+                below = min(max(np.int64(centre[d]), 0), shape[d] - 2)
+                f = centre[d] - below
+                for k in range(1 << d):
+                    line, part = lines[k] * shape[d] + below, parts[k]
+                    lines[k], parts[k] = line, part * (1.0 - f)
+                    lines[k + (1 << d)], parts[k + (1 << d)] = line + 1, part * f
+            below = min(max(np.int64(centre[dimension - 1]), 0), n - 2)
+            f = centre[dimension - 1] - below
+            for k in range(1 << (dimension - 1)):
+                if parts[k] > 0.0:
+                    for side in range(2):
+                        part = parts[k] * (f if side else 1.0 - f)
+                        if part > 0.0:
+                            for d in range(dimension):
+                                nodes[lines[k] * n + below + side, d] += np.float32(part * vectors[face, d])
+                            touched[lines[k], (below + side) // stretch] = True
             for d in range(dimension):
                 sums[slot, d] += weight * centre[d]
                 sums[slot, dimension + d] += vectors[face, d] * share
