@@ -126,7 +126,9 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
     weights = source.weights / source.weights.max()
     scatter(*stencil, np.stack([weights, weights * values / largest], axis=1), nodes)
     levels = left_out + diffuse_on_pyramid(nodes, source.time_on, rounds=1)
-    return collapse(levels, finest.shape, 1, quotients).reshape(source.grid.shape) * np.float32(largest)
+    mean = collapse(levels, finest.shape, 1, quotients).reshape(source.grid.shape)
+    mean *= np.float32(largest)
+    return mean
 
 
 def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:

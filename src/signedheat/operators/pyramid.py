@@ -205,14 +205,22 @@ def _mean_step(sources: NodeSources) -> float:
 
 
 def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bool_]:
-    from scipy.ndimage import maximum_filter1d
-
-    spread = mask.view(np.uint8)
+    """The mask grown by a box of this half width, in nodes."""
+    grown = mask
     for axis, n in enumerate(mask.shape):
-        reach = int(width[axis]) if axis < 3 else -(-int(width[3]) // STRETCH)
-        if n > 1 and reach > 0:
-            spread = maximum_filter1d(spread, 2 * min(reach, n) + 1, axis=axis, mode="constant")
-    return spread.view(np.bool_)
+        wanted = min(n - 1, int(width[axis]) if axis < 3 else -(-int(width[3]) // STRETCH))
+        reach = 0
+        while reach < wanted:  # what has grown by r on either side may be shifted by r + 1 and leaves no gap
+            shift = min(reach + 1, wanted - reach)
+            ahead, behind = (
+                (slice(None),) * axis + (slice(shift, None),),
+                (slice(None),) * axis + (slice(None, -shift),),
+            )
+            before, grown = grown, grown.copy()
+            grown[ahead] |= before[behind]
+            grown[behind] |= before[ahead]
+            reach += shift
+    return grown
 
 
 def _coarser(sources: NodeSources, factors: NDArray[np.int64]) -> NodeSources:
@@ -260,8 +268,9 @@ def collapse(
     for depth in range(len(levels) - 1, -1, -1):
         level = levels[depth]
         fine_shape = shapes[depth]
-        out = np.zeros((components, *fine_shape), dtype=np.float32)
-        if depth < len(levels) - 1:
+        coarsest = depth == len(levels) - 1
+        out = (np.zeros if coarsest else np.empty)((components, *fine_shape), dtype=np.float32)
+        if not coarsest:
             by_slabs(fine_shape, _interpolate, result, level.factors, out)
         if level.vectors is not None:
             by_slabs(fine_shape, extract, level.vectors, level.inside, out)

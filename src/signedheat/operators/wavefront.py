@@ -31,7 +31,9 @@ def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int
     """
     steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
     threads = 1 if np.prod(shape) < SMALL else n_threads()
-    size = [n if threads == 1 else max(12, -(-n // (4 * threads))) for n in shape[1:3]]
+    size = [
+        -(-n // parts) for n, parts in zip(shape[1:3], (threads, 4 * threads) if threads > 1 else (1, 1), strict=True)
+    ]
     with ThreadPoolExecutor(max(1, threads - 1)) as others:
         for direction in list(product(*steps)) * rounds:
             for plane in range(shape[0])[:: direction[0]]:
