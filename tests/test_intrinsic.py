@@ -138,12 +138,15 @@ def test_bad_triangles_do_not_matter_any_more(stretch):
 
 @pytest.mark.parametrize("spoil", [with_needles, with_caps])
 def test_aspect_ratios_of_a_million(spoil):
-    mesh = spoil(square(12, jitter=0.2), 1e-6)
+    sound = square(12, jitter=0.2)
+    mesh = spoil(sound, 1e-6)
     curve = circle_on(mesh)
     better = sh.intrinsic_delaunay(mesh, keep=curve, refine=True)
     assert better.complete
-    angles = np.degrees(better.corner_angles)
-    assert angles.max() < 150 and ((angles.min(axis=1) > 28 - 1e-6) | (angles.min(axis=1) < 0.5)).all()
+    assert better.close[better.thin_faces].all()
+    assert better.triangles.face_areas[better.close].sum() < 1e-4 < better.close.mean()
+    n_sound = sh.intrinsic_delaunay(sound, keep=circle_on(sound), refine=True).n_vertices
+    assert better.n_vertices < n_sound + 1.2 * mesh.n_faces  # and not hundreds for each needle
     assert better.triangles.face_areas.sum() == pytest.approx(4.0, rel=1e-9)
     assert better.bring(curve).lengths.sum() == pytest.approx(150 * 2 * 0.55 * np.sin(np.pi / 150), rel=1e-6)
     assert error(mesh, sh.SignedHeatSolver(better).distance(curve).restrict()) < 5e-3
@@ -301,13 +304,79 @@ def test_fixed_edges_keep_their_numbers():
     assert isinstance(after, LaidOutTriangles) and after.n_edges == triangles.n_edges
 
 
+def test_vertices_that_all_but_coincide():
+    from signedheat.operators.coincidence_kernels import coinciding
+
+    places = np.array(
+        [0.0, 1e-3, 2e-3, 1.0, 1.5, 1.5 + 1e-3, 9.0, 9.0 + 1e-5, 9.001]
+    )  # and the last three hang together
+    tail = np.arange(8)
+    length = np.diff(places)
+    group, extent = coinciding(tail, tail + 1, length, np.argsort(length), 9)
+    np.testing.assert_array_equal(group, [0, 0, 0, -1, 4, 4, 6, 6, 6])
+    np.testing.assert_allclose(extent[[0, 4, 6]], [2e-3, 1e-3, 1e-3])
+    group, _ = coinciding(tail[:2], tail[:2] + 1, length[:2], np.arange(2), 3)
+    assert (group < 0).all()  # there is nothing else that they would be close in comparison with
+
+
+def test_vertices_all_but_on_a_boundary_do_not_need_hundreds_of_others():
+    for height in 1e-3, 1e-6, 1e-9:
+        corners = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [0.7, height, 0], [1.3, 1 - height, 0]]
+        faces = [[0, 1, 4], [1, 5, 4], [1, 2, 5], [2, 3, 5], [3, 4, 5], [3, 0, 4]]
+        better = sh.intrinsic_delaunay(sh.TriangleMesh(corners, faces), refine=True)
+        assert better.complete and better.close[better.thin_faces].all()
+        assert better.n_vertices < 40
+
+
+def test_progress_and_cancelling():
+    mesh = squashed(sphere(5))
+    seen = []
+    better = sh.intrinsic_delaunay(mesh, refine=True, progress=lambda *report: seen.append(report))
+    shares = [share for share, _ in seen]
+    assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] == 1.0
+    assert sum(2 / 3 < share < 1 for share in shares) > 0  # within refinement
+    assert [step for _, step in seen][:3] == ["embed curves", "flip", "refine"]
+    quiet = sh.intrinsic_delaunay(mesh, refine=True)
+    np.testing.assert_array_equal(better.triangles.edge_lengths, quiet.triangles.edge_lengths)
+
+    def cancel(share, step):
+        if step == "refine":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sh.intrinsic_delaunay(mesh, refine=True, progress=cancel)
+    seen.clear()
+    curve = mesh.level_set(mesh.vertices[:, 2], 0.1)
+    sh.SignedHeatSolver(mesh, progress=lambda *report: seen.append(report), intrinsic=True).distance(curve)
+    shares = [share for share, _ in seen]
+    assert shares == sorted(shares) and shares[-1] == 1.0 and "refine" in [step for _, step in seen]
+
+
 def test_what_cannot_be_done_is_said():
     mesh = square(4)
-    with pytest.raises(sh.GeometryError, match="30 degrees"):
-        sh.intrinsic_delaunay(mesh, refine=True, angle=45)
-    with pytest.raises(sh.GeometryError, match="TriangleMesh"):
-        sh.intrinsic_delaunay(sh.PolygonMesh(mesh.vertices, mesh.faces.tolist()))
+    for angle in 45, 0, -3, np.nan, np.inf:
+        with pytest.raises(sh.GeometryError, match="30 degrees"):
+            sh.intrinsic_delaunay(mesh, refine=True, angle=angle)
+    for limit in 0, -1, np.nan, np.inf:
+        with pytest.raises(sh.GeometryError, match="max_vertices"):
+            sh.intrinsic_delaunay(mesh, refine=True, max_vertices=limit)
+    for domain in sh.PolygonMesh(mesh.vertices, mesh.faces.tolist()), sh.intrinsic_delaunay(mesh), None:
+        with pytest.raises(sh.GeometryError, match="TriangleMesh"):
+            sh.intrinsic_delaunay(domain)
+        with pytest.raises(sh.GeometryError, match="TriangleMesh"):
+            sh.SignedHeatSolver(domain, intrinsic=True).distance(mesh.path([0, 1]))
     with pytest.raises(sh.GeometryError, match="length zero"):
         sh.intrinsic_delaunay(sh.TriangleMesh(np.ones((3, 3)), [[0, 1, 2]]))
     with pytest.raises(sh.SourceError, match="face 1000"):
         sh.intrinsic_delaunay(mesh, keep=sh.Curve([1000, 0], np.eye(3)[:2]))
+    for keep in "curve", np.zeros(3), [None], 3:
+        with pytest.raises(sh.SourceError, match="Curve or SurfacePoints"):
+            sh.intrinsic_delaunay(mesh, keep=keep)
+    with pytest.raises(sh.GeometryError, match="IntrinsicTriangulation"):
+        sh.common_subdivision(mesh)
+    better = sh.intrinsic_delaunay(mesh)
+    with pytest.raises(sh.GeometryError, match="NaN"):
+        better.locate([0], [[np.nan, 0, 1]])
+    for face in -1, mesh.n_faces:
+        with pytest.raises(sh.GeometryError, match=f"face {face}"):
+            better.locate([face], [[1, 0, 0]])

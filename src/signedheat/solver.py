@@ -40,7 +40,7 @@ class SignedHeatSolver:
     diffusion : float
         τ in ``t = τ h²``, h the mean distance between unknowns. Larger values complete broken sources more roundly.
     progress : callable, optional
-        Called as ``progress(fraction, step)``.
+        Called as ``progress(fraction, step)``; what it raises cancels.
     intrinsic : bool
         Triangulate a triangle mesh anew, along its surface, for every set of sources: slower, since nothing is kept
         from one distance to the next, and far more accurate where triangles are bad or curves cross them. For control
@@ -67,7 +67,9 @@ class SignedHeatSolver:
         if self.intrinsic:
             from .extensions.intrinsic_triangulation import Retriangulated
 
-            return Retriangulated(self.domain)
+            progress = self.progress
+            report = None if progress is None else lambda share: progress((1 + share) / 5, "refine")
+            return Retriangulated(self.domain, report)
         return discretize(self.domain)
 
     def with_diffusion(self, diffusion: float) -> SignedHeatSolver:

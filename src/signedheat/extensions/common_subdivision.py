@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from ..domains.polygon_mesh import PolygonMesh
+from ..errors import GeometryError
 from ..sources.places import EDGE, VERTEX, locate
 from .intrinsic_triangulation import IntrinsicTriangulation
 
@@ -32,6 +33,11 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     (n_polygon_vertices, n_vertices) sparse
         Takes values at the triangulation's vertices to values at the polygons' vertices.
 
+    Raises
+    ------
+    GeometryError
+        If it is no intrinsic triangulation.
+
     Examples
     --------
     >>> import signedheat as sh
@@ -41,6 +47,8 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     >>> bool(abs(interpolate @ better.vertices - polygons.vertices).max() < 1e-12)
     True
     """
+    if not isinstance(triangulation, IntrinsicTriangulation):
+        raise GeometryError(f"a {type(triangulation).__name__} is no IntrinsicTriangulation: see intrinsic_delaunay")
     triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
     starts = locate(triangles, lines.faces, lines.starts)

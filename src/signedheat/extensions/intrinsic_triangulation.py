@@ -7,7 +7,7 @@ angles alone: nothing of the surface changes. Flips give the intrinsic Delaunay 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
@@ -18,12 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..discretization import discretize
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import frozen
+from ..domains.validation import finite_rows, frozen
 from ..errors import GeometryError
 from ..lowering.surface import SurfaceDiscretization
 from ..operators.intrinsic_history import History
 from ..operators.laid_out_triangles import LaidOutTriangles
 from ..operators.mollification import mollify
+from ..solver import Progress, Stopwatch
 from ..sources.carrying import Embedding, carry_pieces
 from ..sources.pieces import Pieces, in_pieces, pieces
 
@@ -35,9 +36,6 @@ THICKNESS = 1e-9
 
 LARGEST_ANGLE = 30.0
 """Degrees; refinement is not sure to end for more."""
-
-NEEDLE = 0.5
-"""Degrees; refinement leaves alone what is thinner, unless it has an angle above 150°."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +57,8 @@ class IntrinsicTriangulation:
         The angle, in degrees, that refinement aimed at; 0 for flips only.
     complete : bool
         Whether refinement ended before the limit on the number of vertices.
+    close : (m,) bool
+        Faces at vertices that all but coincide; refinement leaves thin ones among them alone.
     """
 
     mesh: TriangleMesh
@@ -66,6 +66,7 @@ class IntrinsicTriangulation:
     marked: NDArray[np.bool_]
     goal: float
     complete: bool
+    close: NDArray[np.bool_] = field(repr=False)
     base: LaidOutTriangles = field(repr=False)
     embedding: Embedding = field(repr=False)
     history: History = field(repr=False)
@@ -123,15 +124,16 @@ class IntrinsicTriangulation:
             return f"Delaunay; the smallest angle is {np.degrees(self.corner_angles.min()):.3g}°"
         if not len(self.thin_faces):
             return f"no angle below {self.goal:g}°"
-        angles = self.corner_angles[self.thin_faces]
-        needles = int(((angles.min(axis=1) < np.radians(NEEDLE)) & (angles.max(axis=1) < np.radians(150.0))).sum())
-        reasons = [f"{needles} where vertices all but coincide"] if needles else []
-        rest = len(angles) - needles
+        n_close = int(self.close[self.thin_faces].sum())
+        rest = len(self.thin_faces) - n_close
+        reasons = [f"{n_close} where vertices all but coincide"] if n_close else []
         if rest and self.complete:
             reasons.append(f"{rest} where the surface, its boundary or the kept curves close in at less than 60°")
         elif rest:
             reasons.append(f"{rest} because the limit of {self.n_vertices} vertices was reached: raise max_vertices")
-        return f"no angle below {self.goal:g}° but in {len(angles)} of {self.n_faces} faces: {', '.join(reasons)}"
+        return (
+            f"no angle below {self.goal:g}° but in {len(self.thin_faces)} of {self.n_faces} faces: {', '.join(reasons)}"
+        )
 
     def in_space(self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
         """(p, 3) positions of points given on the mesh."""
@@ -141,8 +143,18 @@ class IntrinsicTriangulation:
         return positions
 
     def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Points of the mesh (faces, barycentric coordinates) in the triangulation's own faces."""
-        faces, barycentric = np.asarray(faces, dtype=np.int64), np.asarray(barycentric, dtype=np.float64)
+        """Points of the mesh (faces, barycentric coordinates) in the triangulation's own faces.
+
+        Raises
+        ------
+        GeometryError
+            If a face does not exist, or a coordinate is NaN or infinite.
+        """
+        barycentric = finite_rows(barycentric, "barycentric coordinates", 3)
+        faces = np.asarray(faces, dtype=np.int64)
+        wrong = np.flatnonzero((faces < 0) | (faces >= self.mesh.n_faces))
+        if len(wrong):
+            raise GeometryError(f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces")
         below = self.embedding.down(faces, barycentric, np.zeros((len(faces), 0, 3)))
         found, weights, _ = self.history.forward(below[0], np.maximum(below[1], 0.0))
         return found, weights / weights.sum(axis=1, keepdims=True)
@@ -170,6 +182,7 @@ def intrinsic_delaunay(
     refine: bool = False,
     angle: float = 28.0,
     max_vertices: int | None = None,
+    progress: Progress | None = None,
 ) -> IntrinsicTriangulation:
     """Triangulate a mesh anew, along the surface: better angles, the same geometry.
 
@@ -184,12 +197,16 @@ def intrinsic_delaunay(
         Sources that are to run along edges, and to lie at vertices. Others can still be used afterwards.
     refine : bool
         Insert vertices until no angle is smaller than `angle`. Smaller ones remain where the surface, its boundary or
-        kept curves close in at less than 60°; and, on purpose, below half a degree in faces at two vertices that almost
-        coincide (they do no harm as long as no angle is large). `IntrinsicTriangulation.summary` tells.
+        kept curves close in at less than 60°; and, on purpose, in faces at vertices that all but coincide: are
+        together smaller than a hundredth of the way to any other (grading towards them takes hundreds of vertices each,
+        and gains nothing). `IntrinsicTriangulation.summary` tells.
     angle : float
         Degrees, at most 30.
     max_vertices : int, optional
-        Refine no further; 20 for every vertex of the mesh, and 10,000 more, by default.
+        Refine no further, so that it ends in any case; 20 for every vertex of the mesh and the kept curves, and
+        10,000 more, by default.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; what it raises cancels.
 
     Returns
     -------
@@ -200,7 +217,7 @@ def intrinsic_delaunay(
     Raises
     ------
     GeometryError
-        If the domain is not a triangle mesh, has no area, or `angle` is out of range.
+        If the domain is not a triangle mesh, has no area, or `angle` or `max_vertices` is out of range.
     SourceError
         If a curve to be kept does not fit the mesh.
 
@@ -219,24 +236,31 @@ def intrinsic_delaunay(
     from ..operators.intrinsic_refinement import refine_all
 
     if not isinstance(mesh, TriangleMesh):
-        raise GeometryError(f"{type(mesh).__name__} has no triangles to flip: give a TriangleMesh")
+        raise GeometryError(f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(mesh).__name__}")
     if not 0 < angle <= LARGEST_ANGLE:
         raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle}")
-    base, _ = laid_out(mesh)
-    listed = list(keep) if isinstance(keep, Sequence) else [keep]
-    kept = list(chain.from_iterable(in_pieces(listed, base, mesh.vertices)))
-    embedding = Embedding.of(base, kept)
-    gluing, marked, complete = flip_all(glue(embedding.triangles, embedding.marked)), embedding.marked, True
-    if refine:
-        limit = 20 * mesh.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
-        gluing, origin, complete = refine_all(gluing, np.radians(angle), np.radians(NEEDLE), limit)
-        marked = np.append(marked, False)[origin]
+    if max_vertices is not None and not 0 < max_vertices < np.inf:
+        raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices}")
+    stopwatch = Stopwatch(progress, steps=3)
+    with stopwatch("embed curves"):
+        base, _ = laid_out(mesh)
+        listed = list(keep) if isinstance(keep, Sequence) else [keep]
+        embedding = Embedding.of(base, list(chain.from_iterable(in_pieces(listed, base, mesh.vertices))))
+        marked, complete = embedding.marked, True
+    with stopwatch("flip"):
+        gluing = flip_all(glue(embedding.triangles, marked))
+        close = np.zeros(embedding.triangles.n_faces, dtype=bool)
+    with stopwatch("refine"):
+        if refine:
+            inner = None if progress is None else lambda share: progress((2 + share) / 3, "refine")
+            limit = 20 * embedding.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
+            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), limit, inner)
+            marked = np.append(marked, False)[origin]
     n = int(gluing.counts[3])
     triangles = lay_out(gluing)
     history = History(embedding.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
-    return IntrinsicTriangulation(
-        mesh, triangles, marked, angle if refine else 0.0, complete, base=base, embedding=embedding, history=history
-    )
+    goal = angle if refine else 0.0
+    return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, embedding, history)
 
 
 def laid_out(mesh: TriangleMesh) -> tuple[LaidOutTriangles, float]:
@@ -260,10 +284,12 @@ class Retriangulated:
     """
 
     mesh: TriangleMesh
+    progress: Callable[[float], None] | None = field(default=None, repr=False)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the mesh with the sources along edges."""
-        domain = intrinsic_delaunay(self.mesh, keep=sources, refine=True)
+        inner = None if self.progress is None else lambda share, _: self.progress(share)
+        domain = intrinsic_delaunay(self.mesh, keep=sources, refine=True, progress=inner)
         own = np.arange(self.mesh.n_vertices)
         return lowered(domain, domain=self.mesh, restriction=own).adapt(sources)
 

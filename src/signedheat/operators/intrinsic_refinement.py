@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,14 +14,19 @@ from .intrinsic_delaunay import doubled
 
 if TYPE_CHECKING:
     from .intrinsic_kernels import Gluing
+    from .refinement_kernels import Agenda
 
 PER_FACE = ("tail", "edge", "forward", "front", "ring")
 PER_EDGE = ("start", "length", "fixed")
+TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
+
+PATIENCE = 5000
+"""New vertices between two reports of progress: some hundredths of a second."""
 
 
 def refine_all(
-    gluing: Gluing, angle: float, needle: float, max_vertices: int
-) -> tuple[Gluing, NDArray[np.int64], bool]:
+    gluing: Gluing, angle: float, max_vertices: int, progress: Callable[[float], None] | None = None
+) -> tuple[Gluing, NDArray[np.int64], NDArray[np.bool_], bool]:
     """Refine a Delaunay triangulation until every face that can be helped has no angle below `angle`.
 
     Fixed, boundary and nonmanifold edges may be split but stay. Small angles remain where fixed edges meet, or the
@@ -33,11 +39,10 @@ def refine_all(
         Delaunay, as `flip_all` returns it; changed.
     angle : float
         Radians.
-    needle : float
-        Radians. Faces with a smaller angle are left alone, unless another of their angles exceeds 150°: two vertices
-        all but coincide there, and grading the faces towards them would take many more, for no gain in accuracy.
     max_vertices : int
         Stop when there are as many.
+    progress : callable, optional
+        Called now and then with an estimate of the part that is done; what it raises ends the work.
 
     Returns
     -------
@@ -45,47 +50,80 @@ def refine_all(
         The refined triangulation.
     (e,) int
         The fixed edge before that each edge now is part of, or −1.
+    (m,) bool
+        Faces at vertices that all but coincide: thin ones among them have been left alone.
     bool
         Whether it was finished before the limit.
     """
-    from .refinement_kernels import FULL, GROW, N_BINS, Agenda, Goal, list_all, refine
+    from .refinement_kernels import FULL, GROW, PAUSED, Goal, list_all, refine
+
+    segments, agenda = agenda_of(gluing)
+    goal = Goal(np.tan(angle / 2) ** 2, max_vertices)
+    list_all(gluing, agenda, goal)
+    listed = np.flatnonzero(agenda.bins >= 0)  # by size: large faces go first, so the list in turn tells the progress
+    done = 0.0
+    while True:
+        status = refine(gluing, agenda, goal, PATIENCE)
+        if status == PAUSED and progress is not None:
+            done = max(done, float(listed[-1] - agenda.seen[1]) / len(listed))
+            progress(min(done, 1.0))
+        if status == GROW:
+            grown = {k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")}
+            gluing = gluing._replace(**grown)
+            agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in TO_GROW})
+        if status not in (PAUSED, GROW):
+            break
+    n_edges = int(gluing.counts[1])
+    origin = np.full(n_edges, -1)
+    fixed = np.flatnonzero(gluing.fixed[:n_edges])
+    origin[fixed] = segments[agenda.segment[fixed]]
+    return gluing, origin, close_faces(gluing, agenda), status != FULL
+
+
+def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
+    """(m,) faces whose shortest side joins vertices that all but coincide."""
+    n_faces = int(gluing.counts[0])
+    faces = np.arange(n_faces)
+    lengths = gluing.length[gluing.edge[: 3 * n_faces]].reshape(-1, 3)
+    group = agenda.group[gluing.tail[: 3 * n_faces]].reshape(-1, 3)
+    side = lengths.argmin(axis=1)
+    one, other = group[faces, side], group[faces, (side + 1) % 3]
+    return (one >= 0) & (one == other) & (lengths[faces, side] <= agenda.extent[one])
+
+
+def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:
+    """The fixed edges, and what there is to do; boundary and nonmanifold edges become fixed."""
+    from .coincidence_kernels import coinciding
+    from .refinement_kernels import N_BINS, Agenda
 
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
     gluing.fixed[:n_edges] |= counts != 2
+    start = gluing.start[:n_edges]
+    tail, head = gluing.tail[start], gluing.tail[3 * (start // 3) + (start + 1) % 3]
+    lengths = gluing.length[:n_edges]
+    order = np.argsort(lengths, kind="stable")
+    group, extent = coinciding(tail, head, lengths, order[counts[order] > 0], n_vertices)
     segments = np.flatnonzero(gluing.fixed[:n_edges])
     segment = np.full(n_edges, -1, dtype=np.int64)
     segment[segments] = np.arange(len(segments))
-    start = gluing.start[segments]
-    ends = np.stack([gluing.tail[start], gluing.tail[3 * (start // 3) + (start + 1) % 3]], axis=1)
-    agenda = Agenda(
+    return segments, Agenda(
         stack=np.empty(n_edges, dtype=np.int64),
         stacked=np.zeros(n_edges, dtype=bool),
         bins=np.full(N_BINS, -1, dtype=np.int64),
         next_face=np.full(n_faces, -1, dtype=np.int64),
         listed=np.zeros(n_faces, dtype=bool),
         segment=segment,
-        segment_ends=ends.reshape(-1, 2),
+        segment_ends=np.stack([tail[segments], head[segments]], axis=1),
         segment_length=gluing.length[segments],
         on_segment=np.full(n_vertices, -1, dtype=np.int64),
         narrow=narrow_vertices(gluing),
-        seen=gluing.counts[3:4].copy(),
+        group=group,
+        extent=extent,
+        seen=np.array([gluing.counts[3], N_BINS]),
         room=np.empty((4096, 5)),
         halfedges=np.empty(4096, dtype=np.int64),
     )
-    goal = Goal(np.tan(angle / 2) ** 2, np.tan(needle / 2) ** 2, max_vertices)
-    list_all(gluing, agenda, goal)
-    while True:
-        status = refine(gluing, agenda, goal)
-        if status != GROW:
-            n_edges = int(gluing.counts[1])
-            origin = np.full(n_edges, -1)
-            fixed = np.flatnonzero(gluing.fixed[:n_edges])
-            origin[fixed] = segments[agenda.segment[fixed]]
-            return gluing, origin, status != FULL
-        gluing = gluing._replace(**{k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")})
-        grown = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow")
-        agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in grown})
 
 
 def narrow_vertices(gluing: Gluing) -> NDArray[np.bool_]:

@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .circumcenter_kernels import BLOCKED, LOST, cross, encroached, find_circumcenter
+from .coincidence_kernels import NEARNESS
 from .intrinsic_kernels import (
     FLIP,
     SPLIT_EDGE,
@@ -27,13 +29,12 @@ from .intrinsic_kernels import (
     tangent_at,
 )
 
-DONE, GROW, FULL = 0, 1, 2
-"""Why `refine` stopped: nothing left to do; out of room; as many vertices as allowed."""
+DONE, GROW, FULL, PAUSED = 0, 1, 2, 3
+"""Why `refine` stopped: nothing left to do; out of room; as many vertices as allowed; to report how far it is."""
 
 NARROW = np.pi / 3
 """Where segments meet, or the surface closes up, at less than this, small angles have to stay."""
 
-INSIDE, BLOCKED, LOST = 0, 1, 2
 N_BINS = 256
 
 
@@ -44,8 +45,9 @@ class Agenda(NamedTuple):
     of faces to be looked at, by the binary logarithm of their circumradius; `listed` says which faces are in one.
     `segment` numbers the input segment of each fixed edge, `segment_ends` and `segment_length` describe those, and
     `on_segment` is the segment on which a new vertex was put. `narrow` marks input vertices at which two segments meet,
-    or the surface closes up, at less than 60°. `seen` counts the steps of the history whose faces have been listed;
-    `room` and `halfedges` are for the search around a new vertex.
+    or the surface closes up, at less than 60°. `group` and `extent` tell which vertices all but
+    coincide, as `coinciding` does. `seen` counts the steps of the history whose faces have been listed, and remembers
+    the list that the last face came from; `room` and `halfedges` are for the search around a new vertex.
     """
 
     stack: NDArray[np.int64]
@@ -58,22 +60,24 @@ class Agenda(NamedTuple):
     segment_length: NDArray[np.float64]
     on_segment: NDArray[np.int64]
     narrow: NDArray[np.bool_]
+    group: NDArray[np.int64]
+    extent: NDArray[np.float64]
     seen: NDArray[np.int64]
     room: NDArray[np.float64]
     halfedges: NDArray[np.int64]
 
 
 class Goal(NamedTuple):
-    """When refinement is done: squared tangents of half the angles, and the largest number of vertices."""
+    """When refinement is done: squared tangent of half the angle, and the largest number of vertices."""
 
     angle: float
-    needle: float
     max_vertices: int
 
 
 @kernel
-def refine(g, agenda, goal):
-    """Insert vertices until no face that can be helped has a smaller angle than the goal."""
+def refine(g, agenda, goal, patience):
+    """Insert vertices until no face that can be helped has a smaller angle than the goal; pause after `patience`."""
+    pause = g.counts[2] + patience
     while settle(g, agenda.stack, agenda.stacked):
         for n in range(agenda.seen[0], g.counts[3]):
             for f in changed_faces(g, n):
@@ -84,6 +88,9 @@ def refine(g, agenda, goal):
             return DONE
         if g.counts[2] >= goal.max_vertices:
             return FULL
+        if g.counts[2] >= pause:
+            list_face(g, agenda, f, goal)
+            return PAUSED
         if not improve(g, agenda, f, goal):
             list_face(g, agenda, f, goal)
             return GROW
@@ -143,6 +150,7 @@ def next_thin(g, agenda, goal):
             f = agenda.bins[place]
             agenda.bins[place] = agenda.next_face[f]
             agenda.listed[f] = False
+            agenda.seen[1] = place
             if is_thin(g, f, goal)[0]:
                 return f
     return -1
@@ -150,20 +158,43 @@ def next_thin(g, agenda, goal):
 
 @kernel
 def improve(g, agenda, f, goal):
-    """Insert one vertex for the sake of a thin face, if that can help; False if there is no room for it."""
+    """Insert one vertex for the sake of a thin face, if that can help; False if there is no room for it.
+
+    A face at vertices that all but coincide is left alone, unless an angle above 150° makes its circumcircle large and
+    nothing stands in the way of a vertex there: grading the faces towards such vertices would take hundreds of new
+    ones, for no gain in accuracy.
+    """
     h = is_thin(g, f, goal)[1]
-    if is_hopeless(g, agenda, h) or is_needle(g, h, goal):
+    close = coincide(g, agenda, h)
+    if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
         return True
     outcome, place, x, y = find_circumcenter(g, f)
     if outcome == LOST:
         return True
-    segment = place if outcome == BLOCKED else encroached(g, agenda, place, x, y)
+    segment = place if outcome == BLOCKED else encroached(g, place, x, y, agenda.room, agenda.halfedges)
     if segment >= 0:
-        return split_segment(g, agenda, segment, f, goal)
+        return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
     if not has_room(g, agenda, 2):
         return False
     insert(g, agenda, place, x, y)
     return True
+
+
+@kernel
+def coincide(g, agenda, h):
+    """Whether the two ends of a halfedge all but coincide."""
+    group = agenda.group[g.tail[h]]
+    return group >= 0 and group == agenda.group[g.tail[following(h)]] and g.length[g.edge[h]] <= agenda.extent[group]
+
+
+@kernel
+def is_cap(g, agenda, f):
+    """Whether an angle of the face exceeds 150°, opposite to a side whose ends do not coincide."""
+    for h in range(3 * f, 3 * f + 3):
+        n, d = tangent_at(g, preceding(h))
+        if n > 13.9 * d:
+            return not coincide(g, agenda, h)
+    return False
 
 
 @kernel
@@ -184,22 +215,6 @@ def is_hopeless(g, agenda, h):
 
 
 @kernel
-def is_needle(g, h, goal):
-    """Whether the ends of h all but coincide, and no angle of the face exceeds 150°: thin, but harmless."""
-    n, d = tangent_at(g, preceding(h))
-    if n >= goal.needle * d:
-        return False
-    longest, opposite = -1.0, h
-    for k in range(3):
-        x = 3 * (h // 3) + k
-        if g.length[g.edge[x]] > longest:
-            longest, opposite = g.length[g.edge[x]], preceding(x)
-    n, d = tangent_at(g, opposite)
-    sine = 2.0 * np.sqrt(n * d) / (n + d)
-    return g.length[g.edge[h]] < 0.035 * sine * longest
-
-
-@kernel
 def sector(g, corner):
     """Angle around the tail of a halfedge from segment to segment, or all around, as far as it matters (up to π)."""
     n, d = tangent_at(g, corner)
@@ -215,116 +230,6 @@ def sector(g, corner):
             n, d = tangent_at(g, c)
             total += 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
     return total
-
-
-@kernel
-def unfold(g, h, side, tx, ty, hx, hy):
-    """Lay out the face on the other side of h, whose ends lie at t and h: its apex, and on which side its inside lies.
-
-    `side` is 1 where the face of h is laid out counter-clockwise, −1 where clockwise.
-    """
-    t = g.ring[h]
-    if g.forward[t] == g.forward[h]:
-        side = -side
-    else:
-        tx, ty, hx, hy = hx, hy, tx, ty
-    x, y = apex_position(g, t)
-    length = g.length[g.edge[t]]
-    ux, uy = (hx - tx) / length, (hy - ty) / length
-    return tx + x * ux - side * y * uy, ty + x * uy + side * y * ux, side
-
-
-@kernel
-def cross(ax, ay, bx, by, cx, cy):
-    """Twice the signed area of abc."""
-    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-
-
-@kernel
-def find_circumcenter(g, f):
-    """Walk straight from a face's barycentre to its circumcentre.
-
-    Returns INSIDE with a face and the centre in its frame (first halfedge along x), BLOCKED with a segment's halfedge,
-    or LOST where the face is flat.
-    """
-    x, y = np.zeros(3), np.zeros(3)
-    x[1] = g.length[g.edge[3 * f]]
-    x[2], y[2] = apex_position(g, 3 * f)
-    if not y[2] > 0.0:
-        return LOST, f, 0.0, 0.0
-    cx, cy = 0.5 * x[1], 0.5 * (x[2] * (x[2] - x[1]) / y[2] + y[2])
-    if not np.isfinite(cy):
-        return LOST, f, 0.0, 0.0
-    sx, sy = x.sum() / 3.0, y.sum() / 3.0
-    side, entry = 1, -1
-    for _ in range(100000):
-        leaving, worst, outside = -1, 0.0, 0.0
-        area = cross(x[0], y[0], x[1], y[1], x[2], y[2])
-        for k in range(3):
-            l = (k + 1) % 3
-            beyond = -cross(x[k], y[k], x[l], y[l], cx, cy) / area
-            left, right = cross(sx, sy, cx, cy, x[k], y[k]), cross(sx, sy, cx, cy, x[l], y[l])
-            outside = max(outside, beyond)
-            if k != entry and beyond > worst and left * right <= 0.0:
-                leaving, worst = k, beyond
-        if leaving < 0 and not outside < 1e-9:
-            return LOST, f, 0.0, 0.0
-        if leaving < 0:
-            break
-        h = 3 * f + leaving
-        if g.fixed[g.edge[h]]:
-            return BLOCKED, h, 0.0, 0.0
-        l = (leaving + 1) % 3
-        t = g.ring[h]
-        kt = t % 3
-        ax, ay, turned = unfold(g, h, side, x[leaving], y[leaving], x[l], y[l])
-        if turned == side:
-            x[leaving], y[leaving], x[l], y[l] = x[l], y[l], x[leaving], y[leaving]
-        tx, ty, hx, hy = x[leaving], y[leaving], x[l], y[l]
-        x[kt], y[kt], x[(kt + 1) % 3], y[(kt + 1) % 3], x[(kt + 2) % 3], y[(kt + 2) % 3] = tx, ty, hx, hy, ax, ay
-        f, side, entry = t // 3, turned, kt
-    base = g.length[g.edge[3 * f]]
-    ux, uy = (x[1] - x[0]) / base, (y[1] - y[0]) / base
-    px, py = (cx - x[0]) * ux + (cy - y[0]) * uy, side * ((cy - y[0]) * ux - (cx - x[0]) * uy)
-    return INSIDE, f, px, py
-
-
-@kernel
-def encroached(g, agenda, f, px, py):
-    """A segment in whose diametral circle p lies and which p would see, or −1; p in the frame of face f."""
-    ends, halfedges = agenda.room, agenda.halfedges
-    x, y = np.zeros(3), np.zeros(3)
-    x[1] = g.length[g.edge[3 * f]]
-    x[2], y[2] = apex_position(g, 3 * f)
-    count, visited = 0, 0
-    for k in range(3):
-        l = (k + 1) % 3
-        halfedges[count] = 3 * f + k
-        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = x[k], y[k], x[l], y[l], 1.0
-        count += 1
-    while count > 0:
-        count -= 1
-        h, (tx, ty, hx, hy, side) = halfedges[count], ends[count]
-        dot = (tx - px) * (hx - px) + (ty - py) * (hy - py)
-        if g.fixed[g.edge[h]]:
-            if dot < 0.0:
-                return h
-            continue
-        t = g.ring[h]
-        n, d = tangent_at(g, preceding(t))
-        in_circle = dot * 2.0 * np.sqrt(n * d) + (d - n) * abs(cross(px, py, tx, ty, hx, hy)) < 0.0
-        visited += 1
-        if not in_circle or count + 2 > len(ends) or visited > len(ends):
-            continue
-        ax, ay, turned = unfold(g, h, side, tx, ty, hx, hy)
-        if turned == side:
-            tx, ty, hx, hy = hx, hy, tx, ty
-        halfedges[count], halfedges[count + 1] = following(t), preceding(t)
-        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = hx, hy, ax, ay, turned
-        count += 1
-        ends[count, 0], ends[count, 1], ends[count, 2], ends[count, 3], ends[count, 4] = ax, ay, tx, ty, turned
-        count += 1
-    return -1
 
 
 @kernel
@@ -376,7 +281,7 @@ def insert(g, agenda, f, px, py):
         weights /= weights.sum()
         split_face(g, f, weights[0], weights[1], weights[2])
     new = g.counts[2] - 1
-    agenda.on_segment[new] = -1
+    agenda.on_segment[new] = agenda.group[new] = -1
     agenda.narrow[new] = False
     look_around(g, agenda, step)
 
@@ -394,11 +299,26 @@ def folded_face(g, h):
 
 
 @kernel
+def vertex_beside(g, h):
+    """The vertex opposite to an edge that all but lies on it, its height above and its place along h; or −1, 0, ½."""
+    nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
+    while True:
+        along, above = apex_position(g, y)
+        along = along / length if g.forward[y] == g.forward[h] else 1.0 - along / length
+        if above < min(height, NEARNESS * length * min(along, 1.0 - along)):
+            nearby, height, fraction = g.tail[preceding(y)], above, along
+        y = g.ring[y]
+        if y == h:
+            return nearby, height, fraction
+
+
+@kernel
 def split_segment(g, agenda, h, f, goal):
     """Split a segment that stands in the way of healing face f; False if there is no room for it.
 
-    In the middle; but near an end where segments meet in a small angle at a power of two from it, so that the parts of
-    both segments come out equal and stop splitting each other. Parts a billionth of their segment are left alone.
+    In the middle; but beside a vertex that all but lies on it, and near an end where segments meet in a small angle at
+    a power of two from it, so that the parts of both segments come out equal and stop splitting each other. Parts a
+    billionth of their segment are left alone.
     """
     e = g.edge[h]
     segment, length, step = agenda.segment[e], g.length[e], g.counts[3]
@@ -409,19 +329,24 @@ def split_segment(g, agenda, h, f, goal):
         return False
     folded = folded_face(g, h)
     if folded >= 0:
-        split_face(g, folded, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
-        agenda.on_segment[g.counts[2] - 1] = -1
+        new = split_face(g, folded, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
+        agenda.on_segment[new] = agenda.group[new] = -1
     else:
-        fraction = 0.5
+        nearby, height, fraction = vertex_beside(g, h)
         at_tail, at_head = agenda.narrow[g.tail[h]], agenda.narrow[g.tail[following(h)]]
-        if at_tail != at_head:
+        if nearby < 0 and at_tail != at_head:
             shell = 2.0 ** np.round(np.log2(0.5 * length)) / length
             fraction = shell if at_tail else 1.0 - shell
         new = split_edge(g, h, fraction)
-        agenda.on_segment[new] = segment
+        agenda.on_segment[new], agenda.group[new] = segment, -1
+        if nearby >= 0:
+            if agenda.group[nearby] < 0:
+                agenda.group[nearby], agenda.extent[nearby] = nearby, 0.0
+            agenda.group[new] = agenda.group[nearby]
+            agenda.extent[agenda.group[new]] += 1.01 * height
         for k in range(g.counts[1] - 1 - ring, g.counts[1]):
             agenda.segment[k] = segment
-    agenda.narrow[g.counts[2] - 1] = False
+    agenda.narrow[new] = False
     look_around(g, agenda, step)
     list_face(g, agenda, f, goal)
     return True
