@@ -61,7 +61,9 @@ def _crossed_edges(field):
                     sign = field[i, j, k, m] >= 0
                     if count + 4 > capacity:
                         grown = np.empty((2 * capacity, 5), dtype=np.int32)
-                        grown[:capacity] = edges
+                        for e in range(count):
+                            for d in range(5):
+                                grown[e, d] = edges[e, d]
                         edges = grown
                         capacity *= 2
                     for axis in range(4):
@@ -148,7 +150,8 @@ def _crossings(field, edges, steps):
         for d in range(4):
             start[d] = edges[e, d]
         start[axis] += here / (here - there)
-        place[:] = start
+        for d in range(4):
+            place[d] = start[d]
         # onto the zero set of the interpolant, along its gradient; back to the crossing if that leads away
         for _ in range(3):
             value = _cubic(field, place, weights, slope)
@@ -163,7 +166,8 @@ def _crossings(field, edges, steps):
                 if place[d] < 0.0 or place[d] > field.shape[d] - 1:
                     moved = 2.0
             if not moved < 1.0:
-                place[:] = start
+                for d in range(4):
+                    place[d] = start[d]
                 break
         _cubic(field, place, weights, slope)
         square = 0.0
@@ -179,17 +183,19 @@ def _crossings(field, edges, steps):
             result[e, 4 + d] = slope[d] / length
         # differences of the gradient one cell apart
         for d in range(4):
-            ahead[:] = place
-            behind[:] = place
+            for f in range(4):
+                ahead[f] = behind[f] = place[f]
+                bend[d, f] = 0.0
             ahead[d] = min(place[d] + 1.0, field.shape[d] - 1.0)
             behind[d] = max(place[d] - 1.0, 0.0)
             span = (ahead[d] - behind[d]) * steps[d] * length
-            bend[d, :] = 0.0
             if span > 0.0:
                 _cubic(field, ahead, weights, slope)
-                bend[d, :] += slope / steps / span
+                for f in range(4):
+                    bend[d, f] += slope[f] / steps[f] / span
                 _cubic(field, behind, weights, slope)
-                bend[d, :] -= slope / steps / span
+                for f in range(4):
+                    bend[d, f] -= slope[f] / steps[f] / span
         at = 8
         for d in range(4):
             for f in range(d + 1):

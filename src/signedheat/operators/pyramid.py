@@ -293,10 +293,9 @@ def _scatter(nodes, weights, values, sums, touched, n):
 def _carry(vectors, inside, factors, power, coarse, counts):
     """Vectors at the nodes that both grids share, with their lengths raised to a power; how many in each stretch."""
     n0, n1, n2, n3 = vectors.shape[:4]
-    step = np.where(factors == 2, 2, 1)
-    for i in range(0, n0, step[0]):
-        for j in range(0, n1, step[1]):
-            for k in range(0, n2, step[2]):
+    for i in range(0, n0, 2 if factors[0] == 2 else 1):
+        for j in range(0, n1, 2 if factors[1] == 2 else 1):
+            for k in range(0, n2, 2 if factors[2] == 2 else 1):
                 a, b, c = i // factors[0], j // factors[1], k // factors[2]
                 for s in range(inside.shape[3]):
                     if not inside[i, j, k, s]:
@@ -304,7 +303,7 @@ def _carry(vectors, inside, factors, power, coarse, counts):
                     for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
                         line, d = vectors[i, j, k, m], m // factors[3]
                         largest = max(max(abs(line[0]), abs(line[1])), max(abs(line[2]), abs(line[3])))
-                        if m % step[3] or largest < TINY:
+                        if (m % 2 and factors[3] == 2) or largest < TINY:
                             continue
                         scale = largest ** (power - np.float32(1))
                         for q in range(4):
@@ -361,7 +360,8 @@ def _interpolate(coarse, factors, out, axis, start, stop):
                 more2 = 1 + (1 if factors[2] == 2 and k % 2 else 0)
                 share = np.float32(1.0 / (more0 * more1 * more2))
                 for q in range(out.shape[0]):
-                    row[:] = np.float32(0)
+                    for m in range(row.shape[0]):
+                        row[m] = np.float32(0)
                     for x in range(more0):
                         for y in range(more1):
                             for z in range(more2):
@@ -369,10 +369,9 @@ def _interpolate(coarse, factors, out, axis, start, stop):
                                 for m in range(row.shape[0]):
                                     row[m] += share * line[m]
                     into = out[q, i, j, k]
-                    if factors[3] == 1:
-                        into[:] = row
-                    elif factors[3] > 2:
-                        into[:] = row[0]
+                    if factors[3] != 2:
+                        for m in range(n):
+                            into[m] = row[m // factors[3]]
                     else:
                         for m in range((n + 1) // 2):
                             into[2 * m] = row[m]
