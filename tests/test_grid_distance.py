@@ -26,6 +26,13 @@ def test_sphere_plain_and_sharpened():
     assert relative_error(sh.sharpen(plain).values, exact) <= 0.0002
 
 
+@pytest.mark.parametrize("n", [12, 24, 32, 33, 47])
+def test_few_nodes(n):
+    grid = box(n)
+    field = sh.signed_distance(sphere(10000), grid)
+    assert rms(field.values - sphere_distance(grid)) <= 0.06 * grid.spacing[0]
+
+
 @pytest.mark.parametrize("shape, distance", [(sphere(40000), sphere_distance), (torus(300, 150), torus_distance)])
 def test_sharpened_distance_is_second_order(shape, distance):
     nodes = np.array([32, 56, 96])

@@ -119,7 +119,7 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)
     finest = source.vectors
-    left_out, nodes = leave_out(finest, max(1, source.finest))
+    left_out, nodes = leave_out(finest.shape, finest.steps, max(1, source.finest))
     axes = slice(-source.grid.dimension, None)
     ratios = finest.steps[axes] / np.where(nodes.steps[axes] > 0, nodes.steps[axes], np.inf)
     stencil = interpolation_stencil(source.samples.positions * ratios, nodes.shape[axes])

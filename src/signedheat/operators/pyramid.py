@@ -164,13 +164,14 @@ def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np
     return factors
 
 
-def leave_out(sources: NodeSources, finest: int) -> tuple[list[Level], NodeSources]:
+def leave_out(shape: tuple[int, ...], steps: NDArray[np.float64], finest: int) -> tuple[list[Level], NodeSources]:
     """The first levels of the pyramid, with nothing in them, and the coarser grid that follows, without sources."""
     levels: list[Level] = []
-    while len(levels) < finest and ((factors := coarsening(sources.shape, sources.steps)) > 1).any():
+    nodes = NodeSources.empty(shape, steps)
+    while len(levels) < finest and ((factors := coarsening(nodes.shape, nodes.steps)) > 1).any():
         levels.append(Level(None, None, factors))
-        sources = _coarser(sources, factors)
-    return levels, sources
+        nodes = _coarser(nodes, factors)
+    return levels, nodes
 
 
 def _diffuse_level(

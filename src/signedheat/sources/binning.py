@@ -59,7 +59,10 @@ def merge_in_cells(
 
 @njit(cache=True, nogil=True)
 def _merge(corners, vectors, weights, components, order, shape, size, slots, nodes, touched, scale, stretch):
-    """Sums of weight · position, vector and weight per (component, cell). Loops compile faster than array assignment."""
+    """Sums of weight · position, vector and weight per (component, cell).
+
+    Element by element: array assignment compiles slowly.
+    """
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
     stack = np.empty((deepest, n_corners, dimension))
