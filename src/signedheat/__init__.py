@@ -21,14 +21,16 @@ from .errors import (
     UnreachedWarning,
 )
 from .extensions import grid_sharpening as _grid_sharpening  # noqa: F401  registers it
+from .extensions import tet_sharpening as _tet_sharpening  # noqa: F401  registers it
+from .extensions import vertex_sharpening as _vertex_sharpening  # noqa: F401  registers it
 from .extensions.close_curves import close_curves
 from .extensions.common_subdivision import common_subdivision
 from .extensions.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.piecewise import piecewise_distance
 from .extensions.sharpening import sharpen
+from .extensions.sharpening_methods import Convex, Geodesic
 from .extensions.tetrahedralize import tetrahedralize
-from .extensions.vertex_sharpening import Convex, Geodesic
 from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField
 from .fields.tet_field import TetField

@@ -57,23 +57,38 @@ def closed_level_set(mesh: TetMesh, values: NDArray[np.float64], level: float) -
             f"level {level:g} is outside the values of the tet mesh, {low:g} to {high:g}: choose another level or a "
             "larger mesh"
         )
-    keys = _triangles(tets, used, mesh.n_vertices, _CUTS)
+    keys, _ = _triangles(tets, used, mesh.n_vertices, _CUTS)
     faces = tet_faces(tets)
     walls = faces.vertices[faces.tet_counts == 1]
     if below[walls].any() and not below[walls].all():
-        keys = np.concatenate([keys, _triangles(walls, below[walls], mesh.n_vertices, _LIDS)])
+        keys = np.concatenate([keys, _triangles(walls, below[walls], mesh.n_vertices, _LIDS)[0]])
+    return manifold(*_crossings(mesh.vertices, values, level, keys, CLEARANCE))
+
+
+def level_triangles(
+    vertices: NDArray[np.float64], tets: NDArray[np.int64], values: NDArray[np.float64], level: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """The level set itself: positions (n, 3), triangles (k, 3), and the tet of each. No lids; exact where φ is linear."""
+    known = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
+    keys, owners = _triangles(tets[known], (values < level)[tets[known]], len(vertices), _CUTS)
+    return *_crossings(vertices, values, level, keys, 0.0), known[owners]
+
+
+def _crossings(
+    vertices: NDArray[np.float64], values: NDArray[np.float64], level: float, keys: NDArray[np.int64], clearance: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Where the edges that keys name take the level, and the triangles between."""
     crossings, triangles = np.unique(keys, return_inverse=True)
-    low, high = crossings // mesh.n_vertices, crossings % mesh.n_vertices
+    low, high = crossings // len(vertices), crossings % len(vertices)
     rise = values[high] - values[low]
-    along = np.clip((level - values[low]) / np.where(rise != 0, rise, 1), CLEARANCE, 1 - CLEARANCE)
-    positions = mesh.vertices[low] + along[:, None] * (mesh.vertices[high] - mesh.vertices[low])
-    return manifold(positions, triangles.reshape(-1, 3))
+    along = np.clip((level - values[low]) / np.where(rise != 0, rise, 1), clearance, 1 - clearance)
+    return vertices[low] + along[:, None] * (vertices[high] - vertices[low]), triangles.reshape(-1, 3)
 
 
 def _triangles(
     elements: NDArray[np.int64], below: NDArray[np.bool_], n: int, table: dict[int, list]
-) -> NDArray[np.int64]:
-    """(k, 3) triangles whose corners are ``smaller · n + larger`` vertex id of the edge that they lie on."""
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(k, 3) triangles whose corners are ``smaller · n + larger`` vertex id of their edge, and (k,) their elements."""
     corners = elements.shape[1]
     masks = below @ (1 << np.arange(corners))
     if corners == 4:
@@ -81,14 +96,15 @@ def _triangles(
     else:
         orders = np.array([[0, 1, 2], [0, 1, 2], [1, 2, 0], [0, 1, 2], [2, 0, 1], [2, 0, 1], [1, 2, 0], [0, 1, 2]])
         counts = _COUNTS[:8]
-    found = []
+    found, owners = [], []
     for count, triangles in table.items():
-        chosen = counts[masks] == count
+        chosen = np.flatnonzero(counts[masks] == count)
         ordered = np.take_along_axis(elements[chosen], orders[masks[chosen]], axis=1)
         for triangle in triangles:
             ends = [(ordered[:, a], ordered[:, b]) for a, b in triangle]
             found.append(np.stack([np.minimum(a, b) * n + np.maximum(a, b) for a, b in ends], axis=1))
-    return np.concatenate(found)
+            owners.append(chosen)
+    return np.concatenate(found), np.concatenate(owners)
 
 
 def manifold(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> TriangleMesh:

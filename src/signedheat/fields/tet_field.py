@@ -31,6 +31,8 @@ class TetField:
         inside a shape with outward normals. NaN on parts of the mesh that no source is connected to.
     diagnostics : Diagnostics
         What happened on the way.
+    source : SourceTerm
+        The source as the solver saw it.
 
     Raises
     ------
@@ -52,6 +54,7 @@ class TetField:
     mesh: TetMesh
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+    source: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float64)

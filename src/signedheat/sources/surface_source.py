@@ -41,6 +41,10 @@ class SurfaceSource:
     pinned : (s,) bool
         Samples at which exact constraints hold: not those inside faces, where their component has others. Three of them
         inside one face, however close to a line, would flatten φ on it.
+    triangles : LaidOutTriangles
+        What they were lowered to; the first vertices are those of the domain's own triangles.
+    parts : list of Pieces
+        The sources on these triangles.
     """
 
     vectors: NDArray[np.complex128]
@@ -51,6 +55,8 @@ class SurfaceSource:
     owners: NDArray[np.int64]
     oriented: bool
     pinned: NDArray[np.bool_]
+    triangles: LaidOutTriangles
+    parts: Sequence[Pieces]
 
 
 def surface_source(
@@ -116,6 +122,8 @@ def surface_source(
         owners=np.repeat(np.arange(len(groups)), sizes),
         oriented=any(p.oriented for p in parts),
         pinned=outside | ~np.isin(components, components[outside]),
+        triangles=triangles,
+        parts=parts,
     )
 
 

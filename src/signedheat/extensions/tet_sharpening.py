@@ -1,0 +1,91 @@
+"""Sharpening of distance on tets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..discretization import discretize
+from ..fields.marching_tets import level_triangles
+from ..fields.tet_field import TetField
+from ..lowering.tets import TetDiscretization
+from ..operators.linear_elements import LinearElements
+from .sharpening import Method, Progress, sharpen, sharpened
+from .sharpening_methods import straight_distance
+
+GRAZING = 1e-6
+"""A line may lie so far outside the mesh, over the size of its tets."""
+
+LARGEST_BEND = 1.0
+"""The zero set is moved by at most this, over h, for the curvature of φ; creases know no curvature."""
+
+
+@sharpen.register
+def _(field: TetField, method: Method | None = None, progress: Progress | None = None) -> TetField:
+    lowered = discretize(field.mesh)
+    mesh, unknowns, n = field.mesh, lowered.unknowns, lowered.n_unknowns
+    elements = LinearElements.on_tets(mesh.geometry, unknowns, n)
+    vertices = np.empty(n, dtype=np.int64)
+    vertices[unknowns] = mesh.tets
+    new, diagnostics = sharpened(field, lowered, elements, field.values[vertices], method, progress)
+    known = np.flatnonzero(~np.isnan(new))  # parts that touch at a vertex may differ there, as in any field on tets
+    counts, sums = (np.bincount(vertices[known], w, mesh.n_vertices) for w in (None, new[known]))
+    values = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+    return replace(field, values=values, diagnostics=diagnostics)
+
+
+@straight_distance.register
+def _(
+    lowered: TetDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
+) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    """Through space, from the surface on which values vanish; round the walls of the mesh.
+
+    Where the linear interpolant vanishes, φ itself does not if it is curved. By how much it differs there, its
+    gradients at the corners of the tet tell to second order: ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)``.
+    """
+    from ..operators.box_tree import BoxTree
+    from ..operators.nearest import nearest_on_triangles
+    from ..operators.straight_lines import Walls, bent_distance
+    from ..operators.visibility import tet_neighbors
+    from ..sources.clipping import barycentric
+
+    mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
+    at_corners = values[unknowns]
+    points = np.empty((len(values), 3))
+    points[unknowns] = mesh.vertices[mesh.tets] - planes.center
+    positions, corners, owners = level_triangles(points, unknowns, values, 0.0)
+    if not len(corners):
+        return np.full(len(values), np.inf), {}
+    triangles = positions[corners]
+    nearest, _ = nearest_on_triangles(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)), points)
+    nearest[unknowns[np.isnan(at_corners)]] = -1
+    walls = Walls(unknowns, tet_neighbors(mesh.faces), mesh.faces.of_tets, planes.normals, planes.offsets, planes.signs)
+    distance, nearest, feet, hidden = bent_distance(
+        walls,
+        points,
+        *by_element(unknowns, len(values), 4),
+        triangles,
+        corners,
+        *by_element(corners, len(positions), 3),
+        nearest,
+        GRAZING * lowered.spacing,
+    )
+    reached = np.flatnonzero(np.isfinite(distance))
+    tets, feet = owners[nearest[reached]], feet[reached]
+    weights = barycentric(mesh, tets, feet + planes.center)
+    gradients = mesh.geometry.mean_gradients(np.nan_to_num(values), unknowns, len(values))[unknowns[tets]]
+    slope = np.linalg.norm(np.einsum("pk,pki->pi", weights, gradients), axis=1)
+    rise = 0.5 * np.einsum("pk,pki,pki->p", weights, gradients, feet[:, None] - points[unknowns[tets]])
+    most = LARGEST_BEND * lowered.spacing
+    bend = np.clip(rise / np.where(slope > 0, slope, np.inf), -most, most)
+    distance[reached] = np.maximum(distance[reached] + np.copysign(1.0, values[reached]) * bend, 0.0)
+    return distance, {"round corners": hidden}
+
+
+def by_element(ids: NDArray[np.int64], n: int, width: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Where each of n ids begins, in the list of the rows that name it."""
+    starts = np.concatenate([[0], np.cumsum(np.bincount(ids.ravel(), minlength=n))])
+    return starts, np.argsort(ids.ravel(), kind="stable") // width

@@ -1,0 +1,82 @@
+"""Functions that are linear in every cell: all that the convex problem of Sec. 7.3 knows of a domain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .laid_out_triangles import LaidOutTriangles
+from .tetrahedral import Tetrahedra
+
+
+@dataclass(frozen=True, eq=False)
+class LinearElements:
+    """Triangles or tets with one value at each corner.
+
+    Attributes
+    ----------
+    corners : (m, d + 1) int
+        Unknown at each corner of each cell.
+    sizes : (m,) float
+        Areas or volumes.
+    slope_matrix : (m d, n) sparse
+        Takes values to the components of ∇φ in every cell, one cell after the other.
+    """
+
+    corners: NDArray[np.int64]
+    sizes: NDArray[np.float64]
+    slope_matrix: sparse.csr_matrix
+
+    @classmethod
+    def of(cls, corners: NDArray[np.int64], sizes: NDArray[np.float64], hats: NDArray[np.float64], n: int):
+        """From the gradients (m, d + 1, d) of the functions that are one at a corner and zero at the others.
+
+        Examples
+        --------
+        >>> hats = np.array([[[-1.0], [1.0]], [[-0.5], [0.5]]])
+        >>> line = LinearElements.of(np.array([[0, 1], [1, 2]]), np.array([1.0, 2.0]), hats, 3)
+        >>> line.slopes(np.array([0.0, 1.0, 4.0])).ravel().tolist(), line.masses.tolist()
+        ([1.0, 1.5], [0.5, 1.5, 1.0])
+        """
+        m, k = corners.shape
+        d = hats.shape[2]
+        columns = np.repeat(corners[:, None], d, axis=1)
+        entries = hats.transpose(0, 2, 1).ravel(), columns.ravel(), k * np.arange(m * d + 1)
+        return cls(corners, sizes, sparse.csr_matrix(entries, shape=(m * d, n)))
+
+    @classmethod
+    def on_triangles(cls, triangles: LaidOutTriangles) -> LinearElements:
+        """A surface; slopes are in the layout of each face."""
+        hats = 1j * np.roll(triangles.edge_vectors, -1, axis=1) / (2.0 * triangles.face_areas)[:, None]
+        hats = np.stack([hats.real, hats.imag], axis=2)
+        return cls.of(triangles.corner_vertices, triangles.face_areas, hats, triangles.n_vertices)
+
+    @classmethod
+    def on_tets(cls, tets: Tetrahedra, corners: NDArray[np.int64], n: int) -> LinearElements:
+        """Tets; thin ones count less, as they do in C, and flat ones not at all."""
+        flat = tets.thickness < 1e-10
+        hats = tets.area_vectors / np.where(flat, -np.inf, -3.0 * tets.volumes)[:, None, None]
+        return cls.of(corners, np.where(flat, 0.0, tets.weights * tets.volumes), hats, n)
+
+    @property
+    def masses(self) -> NDArray[np.float64]:
+        """(n,) integral of the function that is one at an unknown and zero at the others."""
+        share = np.repeat(self.sizes / self.corners.shape[1], self.corners.shape[1])
+        return np.bincount(self.corners.ravel(), share, self.slope_matrix.shape[1])
+
+    def slopes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, d) ∇φ in every cell."""
+        return (self.slope_matrix @ values).reshape(len(self.sizes), -1)
+
+    def divergence(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """b of Eq. 13, ``b_i = ∫ ⟨∇λ_i, Y⟩``, for one vector per cell."""
+        return self.slope_matrix.T @ (self.sizes[:, None] * vectors).ravel()
+
+    def slope_error(self, values: NDArray[np.float64]) -> float:
+        """Root mean square of ``|∇φ| − 1`` over the cells in which φ is known."""
+        error = (np.linalg.norm(self.slopes(values), axis=1) - 1.0) ** 2
+        known = np.isfinite(error) & (self.sizes > 0)
+        return float(np.sqrt(np.average(error[known], weights=self.sizes[known]))) if known.any() else float("nan")

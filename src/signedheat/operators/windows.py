@@ -1,0 +1,128 @@
+"""Kernels: windows of light on the edges of a polyhedral surface.
+
+In the frame of an edge, its tail is at the origin, its head on the positive x axis, light comes from below. A window is
+a row ``(s0, s1, p, q, sigma, kind)``: the interval; kind `POINT`: waves from the point (p, q ≤ 0), whose own distance
+is σ; kind `FOCUS`: waves that contract to the point (p, q ≥ 0), whose distance would be σ; kind `BEAM`: straight waves
+along the direction (p, q > 0), σ their distance at the tail.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+POINT, BEAM, FOCUS = 1.0, 0.0, -1.0
+S0, S1, P, Q, SIGMA, KIND = range(6)
+
+
+@njit(cache=True, nogil=True)
+def arrival(w, x, y):
+    """From the source of a window to a point in the frame of its edge."""
+    if w[KIND] == BEAM:
+        return w[SIGMA] + w[P] * x + w[Q] * y
+    return w[SIGMA] + w[KIND] * np.sqrt((x - w[P]) ** 2 + (y - w[Q]) ** 2)
+
+
+@njit(cache=True, nogil=True)
+def ray(w, x):
+    """Direction of the light at a point of the edge; of any length."""
+    if w[KIND] == BEAM:
+        return w[P], w[Q]
+    return w[KIND] * (x - w[P]), -w[KIND] * w[Q]
+
+
+@njit(cache=True, nogil=True)
+def outrun(w, at_tail, at_head, length, slack):
+    """Whether paths through an end of the edge reach all of the window sooner."""
+    if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
+        return True
+    return at_head + length - w[S0] < arrival(w, w[S0], 0.0) - slack
+
+
+@njit(cache=True, nogil=True)
+def trim(a, b):
+    """Cut back two windows, a beginning first, where they overlap and the other is nearer."""
+    if b[S0] >= a[S1]:
+        return
+    low, high = b[S0], min(a[S1], b[S1])
+    first = arrival(a, low, 0.0) - arrival(b, low, 0.0)
+    last = arrival(a, high, 0.0) - arrival(b, high, 0.0)
+    inside = b[S1] < a[S1]
+    if first <= 0.0 and last <= 0.0:
+        b[S0] = high
+    elif first >= 0.0 and last >= 0.0:
+        if not inside:
+            a[S1] = low
+    else:
+        ahead = first < 0.0
+        for _ in range(30):
+            middle = 0.5 * (low + high)
+            if (arrival(a, middle, 0.0) < arrival(b, middle, 0.0)) == ahead:
+                low = middle
+            else:
+                high = middle
+        if ahead:
+            b[S0] = high
+            if not inside:
+                a[S1] = high
+        elif inside:
+            b[S1] = high
+
+
+@njit(cache=True, nogil=True)
+def merge(a, b, length, tolerance):
+    """Make a stand for b too, if the two are neighbours and one wave fits both: true where it does."""
+    if abs(a[S1] - b[S0]) > 1e-6 * length:
+        return False
+    s0, between, s1 = a[S0], a[S1], b[S1]
+    ax, ay = ray(a, s0)
+    bx, by = ray(b, s1)
+    a_norm, b_norm = np.sqrt(ax * ax + ay * ay), np.sqrt(bx * bx + by * by)
+    if ay <= 1e-9 * a_norm or by <= 1e-9 * b_norm:
+        return False
+    ax, ay, bx, by = ax / a_norm, ay / a_norm, bx / b_norm, by / b_norm
+    turn = ax * by - ay * bx
+    begin, end = arrival(a, s0, 0.0), arrival(b, s1, 0.0)
+    middle = 0.5 * (arrival(a, between, 0.0) + arrival(b, between, 0.0))
+    merged = np.empty(6)
+    merged[S0], merged[S1] = s0, s1
+    if abs(turn) * 1e6 * length <= (s1 - s0) * by:
+        x, y = ax + bx, ay + by
+        norm = np.sqrt(x * x + y * y)
+        merged[P], merged[Q], merged[KIND] = x / norm, y / norm, BEAM
+        merged[SIGMA] = begin - s0 * x / norm
+    else:
+        away = (s1 - s0) * by / turn
+        if 0.0 < away < 4.0 * length:
+            return False
+        merged[P], merged[Q] = s0 + away * ax, away * ay
+        merged[KIND] = POINT if away < 0.0 else FOCUS
+        merged[SIGMA] = begin + away
+    error, other = arrival(merged, between, 0.0) - middle, arrival(merged, s1, 0.0) - end
+    if max(abs(error), abs(other)) > tolerance * length:
+        return False
+    merged[SIGMA] -= 0.5 * (max(error, other, 0.0) + min(error, other, 0.0))
+    a[:] = merged
+    return True
+
+
+@njit(cache=True, nogil=True)
+def clip(s0, s1, at_start, slope):
+    """The part of [s0, s1] where ``at_start + slope s ≤ 0``."""
+    if slope > 0.0:
+        s1 = min(s1, -at_start / slope)
+    elif slope < 0.0:
+        s0 = max(s0, -at_start / slope)
+    elif at_start > 0.0:
+        s1 = s0 - 1.0
+    return s0, s1
+
+
+@njit(cache=True, nogil=True)
+def hit(x0, dx, dy, ax, ay, bx, by):
+    """Where on the segment from a to b, as a fraction, the ray from (x0, 0) along (dx, dy) meets its line."""
+    ex, ey = bx - ax, by - ay
+    det = dx * ey - dy * ex
+    if det == 0.0:
+        return 0.0
+    return min(max((dy * (ax - x0) - dx * ay) / det, 0.0), 1.0)
