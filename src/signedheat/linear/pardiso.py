@@ -80,15 +80,17 @@ class _Call:
         self.parameters[1] = 3  # nested dissection in parallel
         self.parameters[4] = 0 if order is None else 1
         self.parameters[17] = -1  # report the nonzeros of the factor
-        self.parameters[23] = 0  # the two-level scheme solves wrongly, and silently, once the number of threads changes
-        self.parameters[33] = 1  # the same bits every time, on however many threads
+        self.parameters[23] = 1 if order is None else 0  # two levels solve in parallel, to the same bits every time
         self.parameters[34] = 1  # indices count from zero
+        self._threads = _library().MKL_Get_Max_Threads()
 
     def __call__(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
         integer = self._integer
         one, status = integer(1), integer(0)
         n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])
         empty = np.zeros(1, dtype=self._matrix[0].dtype)
+        # two-level factors solve wrongly, and silently, on one thread if made on several, and the other way round
+        others = _library().MKL_Set_Num_Threads_Local(self._threads)
         self._function(
             _address(self._handle),
             ctypes.byref(one),
@@ -105,6 +107,7 @@ class _Call:
             _address(empty if solution is None else solution),
             ctypes.byref(status),
         )
+        _library().MKL_Set_Num_Threads_Local(others)
         if status.value != 0:
             cause = _CAUSES.get(status.value, "see the PARDISO manual")
             raise FactorizationError(f"PARDISO failed with error {status.value} on {self._n} unknowns: {cause}")

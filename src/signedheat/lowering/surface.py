@@ -70,7 +70,7 @@ class SurfaceDiscretization:
 
     @cached_property
     def vertex_order(self) -> NDArray[np.int64]:
-        """Fill-reducing order of the vertices, from which that of the edges follows."""
+        """Fill-reducing order of the vertices, found once for all factors of C under constraints."""
         return elimination_order(self.stiffness)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
@@ -112,8 +112,7 @@ class SurfaceDiscretization:
         heat = self._heats.get(sources[0].time)
         if heat is None:
             self._heats.clear()
-            order = self.triangles.edges.elimination_order(self.vertex_order)
-            heat = self._heats[sources[0].time] = VectorHeat(self.triangles, sources[0].time, order)
+            heat = self._heats[sources[0].time] = VectorHeat(self.triangles, sources[0].time)
         return heat.solve([source.vectors for source in sources])
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:

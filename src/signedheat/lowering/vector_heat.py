@@ -31,21 +31,15 @@ class VectorHeat:
         The surface.
     time : float
         t.
-    order : (n_edges,) int
-        Fill-reducing order of the edges.
     """
 
     triangles: LaidOutTriangles
     time: float
-    order: NDArray[np.int64]
 
     @cached_property
     def factor(self) -> Factor:
         """Its factor."""
-        matrix = vector_heat_matrix(self.triangles, self.time)
-        if matrix.shape[0] == self.triangles.n_edges:
-            return factorize(matrix, order=self.order)
-        return factorize(matrix, order=(2 * self.order[:, None] + np.arange(2)).ravel())
+        return factorize(vector_heat_matrix(self.triangles, self.time))
 
     @cached_property
     def _smallest_mass(self) -> float:
