@@ -14,7 +14,7 @@ from scipy.sparse import csr_matrix
 
 from ..domains.polygon_mesh import PolygonMesh
 from ..errors import GeometryError
-from ..sources.places import EDGE, VERTEX, locate
+from ..sources.places import EDGE, VERTEX, Places, locate
 from .intrinsic_triangulation import IntrinsicTriangulation
 
 
@@ -50,6 +50,26 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     if not isinstance(triangulation, IntrinsicTriangulation):
         raise GeometryError(f"a {type(triangulation).__name__} is no IntrinsicTriangulation: see intrinsic_delaunay")
     triangles, n = triangulation.triangles, triangulation.n_vertices
+    polygons, _, where = subdivided(triangulation)
+    used = triangles.corner_vertices.ravel()
+    corner_of = np.full(n, -1)
+    corner_of[used] = np.arange(len(used))
+    own = corner_of >= 0
+    weights = np.concatenate([np.eye(3)[corner_of % 3] * own[:, None], where.barycentric])
+    faces = np.concatenate([corner_of // 3, where.faces])
+    matrix = csr_matrix(
+        (weights.ravel(), triangles.corner_vertices[faces].ravel(), 3 * np.arange(len(faces) + 1)), (len(faces), n)
+    )
+    matrix.eliminate_zeros()
+    return PolygonMesh(np.concatenate([triangulation.vertices, positions(triangulation, where)]), polygons), matrix
+
+
+def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], NDArray[np.int64], Places]:
+    """The polygons, the triangle that each lies in, and where on the triangulation's edges the mesh's edges cross them.
+
+    Corners of polygons are vertices of the triangulation, or n_vertices and more for crossings, in order.
+    """
+    triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
     starts = locate(triangles, lines.faces, lines.starts)
     ends = locate(triangles, lines.faces, lines.ends)
@@ -67,26 +87,17 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     for k in np.flatnonzero(inside & (begin != node)).tolist():
         chords[int(lines.faces[k])].append((int(begin[k]), int(node[k])))
 
-    polygons = []
+    polygons, owners = [], []
     table = triangles.edges
     rows = (a.tolist() for a in (triangles.corner_vertices, table.of_faces, table.forward))
     for face, (corners, edges, forward) in enumerate(zip(*rows, strict=True)):
         outline = []
         for corner, edge, ahead in zip(corners, edges, forward, strict=True):
             outline += [corner, *on_edge.get(edge, [])[:: 1 if ahead else -1]]
-        polygons += cut(outline, chords.get(face, []))
-
-    used = triangles.corner_vertices.ravel()
-    corner_of = np.full(n, -1)
-    corner_of[used] = np.arange(len(used))
-    own = corner_of >= 0
-    weights = np.concatenate([np.eye(3)[corner_of % 3] * own[:, None], where.barycentric])
-    faces = np.concatenate([corner_of // 3, where.faces])
-    matrix = csr_matrix(
-        (weights.ravel(), triangles.corner_vertices[faces].ravel(), 3 * np.arange(len(faces) + 1)), (len(faces), n)
-    )
-    matrix.eliminate_zeros()
-    return PolygonMesh(np.concatenate([triangulation.vertices, positions(triangulation, where)]), polygons), matrix
+        parts = cut(outline, chords.get(face, []))
+        polygons += parts
+        owners += [face] * len(parts)
+    return polygons, np.array(owners), where
 
 
 def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:

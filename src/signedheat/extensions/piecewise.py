@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..discretization import Diagnostics
+from ..discretization import Diagnostics, discretize
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError, UnreachedWarning
@@ -29,6 +29,8 @@ from ..operators.laid_out_triangles import LaidOutTriangles
 from ..solver import Progress, SignedHeatSolver, Stopwatch, as_list
 from ..sources.pieces import Pieces
 from ..sources.places import VERTEX, barycentric_in
+from .intrinsic_piecewise import IntrinsicPiecewiseField
+from .intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 
 SOURCE_WEIGHT = 100.0
@@ -36,7 +38,7 @@ SOURCE_WEIGHT = 100.0
 
 
 def piecewise_distance(
-    domain: TriangleMesh | PolygonMesh,
+    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation,
     sources: Any,
     *,
     diffusion: float = 1.0,
@@ -56,10 +58,11 @@ def piecewise_distance(
 
     Parameters
     ----------
-    domain : TriangleMesh or PolygonMesh
+    domain : TriangleMesh, PolygonMesh or IntrinsicTriangulation
         The surface.
     sources : Curve, SurfacePoints, or a sequence of them
-        Unoriented curves must run along edges.
+        Where unoriented curves do not run along edges, the surface is triangulated anew so that they do: the field is
+        then one on ``intrinsic_delaunay(surface, keep=sources)``, which can also be given in the first place.
     diffusion : float
         τ in ``t = τ h²``.
     exact : bool
@@ -82,9 +85,9 @@ def piecewise_distance(
     Raises
     ------
     SourceError
-        If a source does not fit the surface.
+        If a source does not fit the surface, or an unoriented curve was not kept by an intrinsic triangulation.
     TypeError
-        If the domain is neither a triangle nor a polygon mesh.
+        If the domain is none of these.
     ValueError
         If `diffusion` or `smoothing` is not positive and finite.
 
@@ -98,21 +101,23 @@ def piecewise_distance(
     >>> bool(phi.cut[0].height > 4)  # nearly the length of the way round, 2π
     True
     """
-    if not isinstance(domain, TriangleMesh | PolygonMesh):
-        raise TypeError(f"piecewise distance needs a TriangleMesh or a PolygonMesh, not a {type(domain).__name__}")
+    if not isinstance(domain, TriangleMesh | PolygonMesh | IntrinsicTriangulation):
+        raise TypeError(
+            "piecewise distance needs a TriangleMesh, a PolygonMesh or an IntrinsicTriangulation, not a "
+            f"{type(domain).__name__}"
+        )
     if smoothing is not None and not (np.isfinite(smoothing) and smoothing > 0):
         raise ValueError(f"smoothing must be positive and finite, not {smoothing}")
-    solver = SignedHeatSolver(domain, diffusion)
+    sources = as_list(sources)
     stopwatch = Stopwatch(progress, steps=4)
     with stopwatch("prepare"):
-        discretization = solver.discretization
+        discretization = SignedHeatSolver(domain, diffusion).discretization
+        if not holds(discretization, sources):
+            domain = intrinsic_delaunay(domain.triangulation, keep=sources)
+            discretization = discretize(domain)
         triangles = discretization.triangles
     with stopwatch("diffuse"):
-        adapted, groups = discretization.adapt(as_list(sources))
-        if adapted.triangles is not triangles:
-            raise SourceError(
-                "piecewise distance takes unoriented curves along edges only: move the curve there, or orient it"
-            )
+        _, groups = discretization.adapt(sources)
         source = discretization.lower(groups, diffusion)
         directions = normalize(discretization, diffuse(discretization, source))
     with stopwatch("integrate"):
@@ -124,7 +129,10 @@ def piecewise_distance(
         solution = minimize_exactly(problem) if exact else minimize_fast(problem, progress=inner)
         values = centered(triangles, pairs, slopes + solution.constants[:, None], parts)
     with stopwatch("finish"):
-        phi = PiecewiseField(domain, domain.triangulation, values, triangles)
+        if isinstance(domain, IntrinsicTriangulation):
+            phi = IntrinsicPiecewiseField(domain, domain, values, triangles)
+        else:
+            phi = PiecewiseField(domain, domain.triangulation, values, triangles)
         if smoothing is not None:
             phi = replace(phi, values=smoothed(phi, smoothing * 2 * discretization.spacing))
         error = integration_error(phi, directions)
@@ -143,6 +151,17 @@ def piecewise_distance(
         **discretization.notes,
     }
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
+
+
+def holds(discretization: Any, sources: Sequence[Any]) -> bool:
+    """Whether all sources have edges to run along, and vertices to lie at, where they need them."""
+    fits = discretization.adapt(sources)[0].triangles is discretization.triangles
+    if not fits and isinstance(discretization.domain, IntrinsicTriangulation):
+        raise SourceError(
+            "an unoriented curve runs across faces of the intrinsic triangulation: make it with "
+            "intrinsic_delaunay(mesh, keep=curve), or orient the curve"
+        )
+    return fits
 
 
 def corner_slopes(triangles: LaidOutTriangles, directions: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -68,7 +68,7 @@ def closed_level_set(mesh: TetMesh, values: NDArray[np.float64], level: float) -
 def level_triangles(
     vertices: NDArray[np.float64], tets: NDArray[np.int64], values: NDArray[np.float64], level: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """The level set itself: positions (n, 3), triangles (k, 3), and the tet of each. No lids; exact where φ is linear."""
+    """The level set itself: positions (n, 3), triangles (k, 3), their tets. No lids; exact where φ is linear."""
     known = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
     keys, owners = _triangles(tets[known], (values < level)[tets[known]], len(vertices), _CUTS)
     return *_crossings(vertices, values, level, keys, 0.0), known[owners]

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from os import PathLike
 
 
+FAR = 3.0
+"""A cut has a jump of at least this many times the longest side of a typical triangle."""
+
+
 @dataclass(frozen=True, eq=False)
 class Cut:
     """A line along edges of the surface across which a field jumps.
@@ -34,22 +38,24 @@ class Cut:
         Where they are.
     jumps : (k - 1, 2) float
         How much higher the field is on one side of each edge than on the other, at the edge's two ends. Not negative.
+    steps : (k - 1,) float
+        Length of each edge, along the surface.
     """
 
     vertices: NDArray[np.int64]
     points: NDArray[np.float64]
     jumps: NDArray[np.float64]
+    steps: NDArray[np.float64]
 
     @property
     def length(self) -> float:
         """Length of the line."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+        return float(self.steps.sum())
 
     @property
     def height(self) -> float:
         """Mean jump along the line."""
-        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
-        return float(np.average(self.jumps.mean(axis=1), weights=steps)) if steps.any() else float(self.jumps.mean())
+        return float(np.average(self.jumps.mean(axis=1), weights=self.steps))
 
     def __repr__(self) -> str:
         return f"Cut({len(self.vertices)} vertices, length {self.length:g}, mean jump {self.height:g})"
@@ -61,9 +67,9 @@ class PiecewiseField:
 
     Attributes
     ----------
-    domain : TriangleMesh or PolygonMesh
+    domain : TriangleMesh, PolygonMesh or IntrinsicTriangulation
         What distance was measured on.
-    surface : TriangleMesh
+    surface : TriangleMesh or IntrinsicTriangulation
         Its triangles: the domain itself, or the virtual refinement of its polygons.
     values : (m, 3) float
         φ at the corners of the triangles, in the units of the vertices; NaN where no source is connected.
@@ -74,7 +80,7 @@ class PiecewiseField:
     """
 
     domain: Any
-    surface: TriangleMesh
+    surface: Any
     values: NDArray[np.float64]
     triangles: LaidOutTriangles = field(repr=False)
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
@@ -115,9 +121,23 @@ class PiecewiseField:
 
     @cached_property
     def is_cut(self) -> NDArray[np.bool_]:
-        """(p,) where φ jumps by more than the longest side of the two triangles: more than it changes within one."""
-        longest = self.triangles.edge_lengths.max(axis=1)[self.pairs.faces].max(axis=1)
-        return np.abs(self.jumps).max(axis=1) > longest
+        """(p,) where φ jumps by more than it changes within a triangle, along lines on which it somewhere jumps by far.
+
+        Bad triangles err by about their size, which is no jump.
+        """
+        longest = self.triangles.edge_lengths.max(axis=1)
+        typical = float(np.average(longest, weights=self.triangles.face_areas))
+        height = np.abs(self.jumps).max(axis=1)
+        high = np.flatnonzero(height > np.maximum(longest[self.pairs.faces].max(axis=1), typical))
+        ends = self.triangles.edges.vertices[self.pairs.edges[high]]
+        n = self.triangles.n_vertices
+        graph = sparse.coo_matrix((np.ones(len(high), dtype=np.int8), tuple(ends.T)), shape=(n, n))
+        line = sparse.csgraph.connected_components(graph, directed=False)[1][ends[:, 0]]
+        far = np.zeros(n, dtype=bool)
+        far[line[height[high] > FAR * typical]] = True
+        result = np.zeros(len(height), dtype=bool)
+        result[high[far[line]]] = True
+        return result
 
     @cached_property
     def cut(self) -> list[Cut]:
@@ -128,13 +148,15 @@ class PiecewiseField:
         edges, first, which = np.unique(edges, return_index=True, return_inverse=True)
         largest = np.zeros((len(first), 2))
         np.maximum.at(largest, which, height)
+        lengths = np.empty(self.triangles.n_edges)
+        lengths[self.triangles.edges.of_faces] = self.triangles.edge_lengths
         lines = []
         for chain, forward in chains(self.triangles.edges.vertices[edges]):
             ends = self.triangles.edges.vertices[edges[chain]]
             ends = np.where(forward[:, None], ends, ends[:, ::-1])
             vertices = np.concatenate([ends[:, 0], ends[-1:, 1]])
             jumps = np.where(forward[:, None], largest[chain], largest[chain][:, ::-1])
-            lines.append(Cut(vertices, self.surface.vertices[vertices], jumps))
+            lines.append(Cut(vertices, self.surface.vertices[vertices], jumps, lengths[edges[chain]]))
         return sorted(lines, key=lambda line: -line.length)
 
     def split(self) -> VertexField:

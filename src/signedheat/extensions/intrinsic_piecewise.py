@@ -1,0 +1,66 @@
+"""Distance that may jump across the edges of an intrinsic triangulation."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.polygon_mesh import PolygonMesh
+from ..errors import GeometryError
+from ..fields.piecewise_field import PiecewiseField
+from ..fields.vertex_field import VertexField
+from ..sources.curves import SurfacePoints
+from ..sources.places import barycentric_in
+from .common_subdivision import positions, subdivided
+
+
+class IntrinsicPiecewiseField(PiecewiseField):
+    """A `PiecewiseField` on the triangles of an `IntrinsicTriangulation`, given and drawn on its mesh.
+
+    `domain` and `surface` are the triangulation. Points are those of the mesh.
+    """
+
+    @property
+    def gradient(self) -> NDArray[np.float64]:
+        """Of length one along the surface; triangles that are bent over edges of the mesh have none in space."""
+        raise GeometryError(
+            "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each: use "
+            "split().face_gradients"
+        )
+
+    def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
+        """φ at points of the mesh."""
+        faces, weights = self.domain.locate(points.faces, points.barycentric)
+        return (self.values[faces] * weights).sum(axis=1)
+
+    def split(self) -> VertexField:
+        """The same field on flat polygons, which the edges of mesh and triangulation cut out of each other.
+
+        Their vertices are doubled along the cut.
+        """
+        triangles, n = self.triangles, self.domain.n_vertices
+        polygons, owners, where = subdivided(self.domain)
+        sizes = [len(polygon) for polygon in polygons]
+        node, face = np.concatenate(polygons), np.repeat(owners, sizes)
+        crossing = node >= n
+        at, on = np.flatnonzero(~crossing), np.flatnonzero(crossing)
+
+        owner = self.glued[0]
+        means = np.bincount(owner, self.values.ravel()) / np.bincount(owner)
+        at_corners = means[owner].reshape(-1, 3)
+        corner = 3 * face[at] + (triangles.corner_vertices[face[at]] == node[at, None]).argmax(axis=1)
+        places = where[node[on] - n]
+        on_cut = np.zeros(triangles.n_edges, dtype=bool)
+        on_cut[self.pairs.edges[self.is_cut]] = True
+        values, keys = np.empty(len(node)), np.zeros((len(node), 2), dtype=np.int64)
+        values[at], keys[at, 1] = at_corners.ravel()[corner], owner[corner]
+        values[on] = (at_corners[face[on]] * barycentric_in(triangles, face[on], places)).sum(axis=1)
+        keys[on, 0], keys[on, 1] = 1 + node[on], np.where(on_cut[places.elements], face[on], -1)
+
+        _, first, vertex = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        space = np.concatenate([self.domain.vertices, positions(self.domain, where)])
+        ends = np.cumsum([0, *sizes])
+        mesh = PolygonMesh(space[node[first]], [vertex[a:b] for a, b in pairwise(ends)])
+        return VertexField(mesh, values[first], self.diagnostics)
