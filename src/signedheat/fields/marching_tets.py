@@ -37,11 +37,14 @@ _LIDS = {
 }
 
 
-def closed_level_set(mesh: TetMesh, values: NDArray[np.float64], level: float) -> TriangleMesh:
+def closed_level_set(
+    mesh: TetMesh, values: NDArray[np.float64], gradients: NDArray[np.float64], level: float
+) -> TriangleMesh:
     """The surface between the vertices below a level and the others, facing the others.
 
-    Where it meets the boundary of the mesh it is closed along the boundary, on the side below the level. Tets with NaN
-    count as outside the mesh.
+    Its own vertices lie where φ takes the level to second order, by its gradients at the vertices. Where it meets the
+    boundary of the mesh it is closed along the boundary, on the side below the level. Tets with NaN count as outside
+    the mesh.
 
     Raises
     ------
@@ -62,27 +65,38 @@ def closed_level_set(mesh: TetMesh, values: NDArray[np.float64], level: float) -
     walls = faces.vertices[faces.tet_counts == 1]
     if below[walls].any() and not below[walls].all():
         keys = np.concatenate([keys, _triangles(walls, below[walls], mesh.n_vertices, _LIDS)[0]])
-    return manifold(*_crossings(mesh.vertices, values, level, keys, CLEARANCE))
+    return manifold(*_crossings(mesh.vertices, values, gradients, level, keys, CLEARANCE))
 
 
 def level_triangles(
     vertices: NDArray[np.float64], tets: NDArray[np.int64], values: NDArray[np.float64], level: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """The level set itself: positions (n, 3), triangles (k, 3), their tets. No lids; exact where φ is linear."""
+    """The level set of the linear interpolant: positions (n, 3), triangles (k, 3), their tets. No lids."""
     known = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
     keys, owners = _triangles(tets[known], (values < level)[tets[known]], len(vertices), _CUTS)
-    return *_crossings(vertices, values, level, keys, 0.0), known[owners]
+    return *_crossings(vertices, values, np.zeros_like(vertices), level, keys, 0.0), known[owners]
 
 
 def _crossings(
-    vertices: NDArray[np.float64], values: NDArray[np.float64], level: float, keys: NDArray[np.int64], clearance: float
+    vertices: NDArray[np.float64],
+    values: NDArray[np.float64],
+    gradients: NDArray[np.float64],
+    level: float,
+    keys: NDArray[np.int64],
+    clearance: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Where the edges that keys name take the level, and the triangles between."""
+    """Where the edges that keys name take the level, and the triangles between.
+
+    A fraction s along an edge e from a to b, φ is ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
+    """
     crossings, triangles = np.unique(keys, return_inverse=True)
     low, high = crossings // len(vertices), crossings % len(vertices)
-    rise = values[high] - values[low]
-    along = np.clip((level - values[low]) / np.where(rise != 0, rise, 1), clearance, 1 - clearance)
-    return vertices[low] + along[:, None] * (vertices[high] - vertices[low]), triangles.reshape(-1, 3)
+    edges, below, rise = vertices[high] - vertices[low], level - values[low], values[high] - values[low]
+    bend = np.einsum("ei,ei->e", gradients[low] - gradients[high], edges) / 2
+    slope = rise + bend
+    divisor = slope + np.copysign(np.sqrt(np.maximum(slope**2 - 4 * bend * below, 0)), rise)
+    along = np.clip(2 * below / np.where(divisor != 0, divisor, 1), clearance, 1 - clearance)
+    return vertices[low] + along[:, None] * edges, triangles.reshape(-1, 3)
 
 
 def _triangles(

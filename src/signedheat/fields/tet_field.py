@@ -68,7 +68,7 @@ class TetField:
         return self.mesh
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """φ at points in space, linear within every tet.
+        """φ at points in space: from the values at the corners of their tets, and the gradients there, to second order.
 
         Outside the mesh φ continues straight from the nearest point of its boundary, along the gradient there.
 
@@ -83,8 +83,11 @@ class TetField:
             Signed distances; NaN where the nearest tet holds a vertex without a value.
         """
         points = _checked(points)
-        corners, weights, away = self._place(points.reshape(-1, 3))
-        values = np.einsum("pk,pk->p", weights, self.values[corners])
+        places = points.reshape(-1, 3)
+        corners, weights, away = self._place(places)
+        steps = (places - away)[:, None] - self.mesh.vertices[corners]
+        tangents = self.values[corners] + np.einsum("pki,pki->pk", self._vertex_gradients[corners], steps) / 2
+        values = np.einsum("pk,pk->p", weights, tangents)
         outside = np.flatnonzero(away.any(axis=1))
         if len(outside):
             slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
@@ -131,7 +134,7 @@ class TetField:
         """
         from .marching_tets import closed_level_set
 
-        return closed_level_set(self.mesh, self.values, level)
+        return closed_level_set(self.mesh, self.values, self._vertex_gradients, level)
 
     def offset(self, distance: float) -> TriangleMesh:
         """The surface at a signed distance from the shape: `contour`, but refused where the mesh is too small for it.

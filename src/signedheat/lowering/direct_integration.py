@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -52,7 +52,14 @@ class DirectIntegration:
 
     def solve(self, divergence: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² with nothing imposed."""
-        return self._centered(self.factor.solve(divergence), source)
+        return self.solve_many([divergence], [source])[0]
+
+    def solve_many(
+        self, divergences: Sequence[NDArray[np.float64]], sources: Sequence[SourceTerm]
+    ) -> list[NDArray[np.float64]]:
+        """The same for several sources at once."""
+        solved = self.factor.solve(np.stack(divergences).T)
+        return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
         """Impose levels exactly, but only where the source asks for it: see `SurfaceSource.pinned`."""
@@ -98,6 +105,14 @@ class DirectIntegration:
         """``(C + λ Aᵀ W A) φ = b``."""
         rows = source.rows
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
+
+    def anchored(self, source: SourceTerm) -> Factor:
+        """Factor of C with φ held at zero along the source."""
+        return self._pulled_factor(source.rows, self.springs(source))
+
+    def springs(self, source: SourceTerm) -> NDArray[np.float64]:
+        """(s,) stiffness that holds φ at each sample as firmly as it should be."""
+        return np.full(len(source.weights), self.spring * self.stiffness.diagonal().max())
 
     def _interpolate(
         self, rows: sparse.csr_matrix, forces: NDArray[np.float64], levels: NDArray[np.float64]
@@ -160,8 +175,13 @@ class DirectIntegration:
         part, n_parts = self._part_of(rows), len(self._first_vertices)
         weight = np.bincount(part, source.weights, n_parts)
         mean = np.full(n_parts, np.nan)
-        np.divide(np.bincount(part, source.weights * (rows @ values), n_parts), weight, out=mean, where=weight > 0)
+        at_samples = source.weights * self._at_samples(values, source)
+        np.divide(np.bincount(part, at_samples, n_parts), weight, out=mean, where=weight > 0)
         return values - mean[self.parts]
+
+    def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        """(s,) φ on the source."""
+        return source.rows @ values
 
 
 def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.csr_matrix:

@@ -91,8 +91,11 @@ class TetDiscretization:
         matrix = upper_triangle(self.mesh.geometry.vertex_laplacian(self.unknowns, self.n_unknowns))
         strength = SPRINGS / (3 * self.spacing)
         if self.n_unknowns <= DIRECT_VERTICES:
-            return TetIntegration(matrix, strength=strength)
-        return TetIntegration(matrix, factorize=from_first, spring=1e4, strength=strength)
+            return TetIntegration(matrix, strength=strength, gradients=self._gradients)
+        return TetIntegration(matrix, factorize=from_first, spring=1e4, strength=strength, gradients=self._gradients)
+
+    def _gradients(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
         """Tets hold sources in any position."""
@@ -219,7 +222,7 @@ class TetDiscretization:
         notes = {**diagnostics.notes, **source.notes}
         if len(self.mesh.reoriented):
             notes["tets turned"] = len(self.mesh.reoriented)
-        return TetField(self.mesh, at_vertices, replace(diagnostics, unreached=unreached, notes=notes))
+        return TetField(self.mesh, at_vertices, replace(diagnostics, unreached=unreached, notes=notes), source)
 
 
 def from_first(matrix: sparse.csr_matrix) -> IncompleteCholesky:

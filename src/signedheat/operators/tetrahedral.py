@@ -192,6 +192,14 @@ class Tetrahedra:
         sums = np.einsum("mki,mk->mi", self.area_vectors, corner_values)
         return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
 
+    def mean_gradients(self, values: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
+        """(n, 3) gradients at vertices: means over the tets around each, by volume."""
+        weights = self.weights / -3
+        sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * weights[:, None]
+        volumes = np.bincount(corners.ravel(), np.repeat(self.weights * self.volumes, 4), n)
+        totals = [np.bincount(corners.ravel(), np.repeat(column, 4), n) for column in sums.T]
+        return np.stack(totals, axis=1) / np.where(volumes > 0, volumes, 1)[:, None]
+
 
 def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:
     """(m,) volumes, negative for tets given inside out.

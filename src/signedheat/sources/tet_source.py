@@ -12,6 +12,7 @@ from scipy import sparse
 
 from ..domains.tet_mesh import TetMesh
 from ..errors import SourceError
+from ..method import unit
 from .area_elements import AreaElements, area_elements
 from .clipping import Pieces, Planes, barycentric, clip_triangles, locate
 
@@ -36,6 +37,9 @@ class TetSource:
     rows : (s, n) sparse
         Row i averages φ over patch i of the source: what lies nearest to one vertex of the tets that it crosses.
         Where the source follows faces of the mesh, the patch is the vertex itself.
+    bends : (s, 3n) sparse
+        What `rows` lack of being exact for quadratic φ, from the gradients of φ at the unknowns, x, y, z of each in
+        turn.
     weights : (s,) float
         Area of each patch.
     components, owners : (s,) int
@@ -49,6 +53,7 @@ class TetSource:
     centers: NDArray[np.float64]
     time: float
     rows: sparse.csr_matrix
+    bends: sparse.csr_matrix
     weights: NDArray[np.float64]
     components: NDArray[np.int64]
     owners: NDArray[np.int64]
@@ -83,8 +88,7 @@ def tet_source(
     SourceError
         If a source is of another kind, lies outside the mesh, has no normals, or cancels itself.
     """
-    loads = np.zeros((len(mesh.faces.vertices), 4))
-    patches, centers, notes, n_components, n_unknowns = [], [], {}, 0, int(unknowns.max()) + 1
+    cuts, components, notes, n_components, n_unknowns = [], [], {}, 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):
         elements = area_elements(source)
         if elements.corners.shape[2] != 3:
@@ -101,28 +105,25 @@ def tet_source(
         if outside > 1e-9:
             notes[f"source {number} outside the mesh"] = f"{100 * outside:.3g} % of its area, left out"
         spacing = max(spacing, elements.spacing)
-        # X₀ = ∫ ψ N, without the parts where ψ is negative: they would send out waves of the wrong sign. On a face of
-        # the mesh ψ is one there, and zero on the others.
-        psi = np.maximum(1 - 3 * pieces.barycentric, 0)
-        psi /= psi.sum(axis=1, keepdims=True)
-        faces = mesh.faces.of_tets[pieces.tets]
-        for column, values in enumerate([*pieces.area_vectors.T, pieces.areas]):
-            loads[:, column] += np.bincount(faces.ravel(), (psi * values[:, None]).ravel(), len(loads))
-        centers.append(np.einsum("pk,pki->pi", pieces.barycentric, mesh.vertices[mesh.tets[pieces.tets]]))
-        components = elements.components[pieces.parents] + n_components
-        patches.append((*_patches(mesh, unknowns, n_unknowns, pieces, components), number))
-        n_components = int(components.max()) + 1
+        cuts.append(pieces)
+        components.append(elements.components[pieces.parents] + n_components)
+        n_components = int(components[-1].max()) + 1
+    time = diffusion * spacing**2
+    loads = sum(_loads(mesh, pieces, np.sqrt(time)) for pieces in cuts)
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
         raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
+    patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
+    rows, bends, weights, members = zip(*patches, strict=True)
     return TetSource(
         vectors=loads[:, :3],
         strengths=loads[:, 3],
-        centers=np.concatenate(centers),
-        time=diffusion * spacing**2,
-        rows=sparse.vstack([rows for rows, *_ in patches], format="csr"),
-        weights=np.concatenate([weights for _, weights, *_ in patches]),
-        components=np.unique(np.concatenate([components for _, _, components, _ in patches]), return_inverse=True)[1],
-        owners=np.concatenate([np.full(len(weights), number) for _, weights, _, number in patches]),
+        centers=np.concatenate([_centers(mesh, pieces) for pieces in cuts]),
+        time=time,
+        rows=sparse.vstack(rows, format="csr"),
+        bends=sparse.vstack(bends, format="csr"),
+        weights=np.concatenate(weights),
+        components=np.unique(np.concatenate(members), return_inverse=True)[1],
+        owners=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
         notes=notes,
     )
 
@@ -139,12 +140,35 @@ def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> Pieces:
     return Pieces(tets[k], k, elements.vectors[k], elements.weights[k], centers, np.full(len(k), -1))
 
 
+def _loads(mesh: TetMesh, pieces: Pieces, width: float) -> NDArray[np.float64]:
+    """(f, 4) X₀ at the faces, and the same for areas without direction.
+
+    It is ∫ ψ N, without the parts where ψ is negative, which would send out waves of the wrong sign: on a face of the
+    mesh ψ is one, and zero on the others. But plane waves along the normal of a piece fall by e^(−r/√t), and a face
+    that lies δ √t in front of it sends e^δ times what is due ahead, and e^−δ times what is due backwards. Shares
+    weighted by a mean of e^−δ and e^δ send as much as the piece itself both ways, wherever such a mean exists.
+    """
+    shares = np.maximum(1 - 3 * pieces.barycentric, 0)
+    corners = mesh.vertices[mesh.tets[pieces.tets]]
+    face_centers = (corners.sum(axis=1, keepdims=True) - corners) / 3
+    away = np.einsum("pki,pi->pk", face_centers - _centers(mesh, pieces)[:, None], unit(pieces.area_vectors))
+    ahead = np.exp(np.clip(away / width, -20, 20))
+    sent = [(shares * weight * (ahead - 1 / ahead)).sum(axis=1) for weight in (1 / ahead, ahead)]
+    mean = [np.maximum(sign * excess, 1e-300)[:, None] for sign, excess in zip((1, -1), sent[::-1], strict=True)]
+    shares *= mean[0] / ahead + mean[1] * ahead
+    shares /= (shares * (ahead + 1 / ahead)).sum(axis=1, keepdims=True) / 2
+    faces, n = mesh.faces.of_tets[pieces.tets].ravel(), len(mesh.faces.vertices)
+    columns = [*pieces.area_vectors.T, pieces.areas]
+    return np.stack([np.bincount(faces, (shares * column[:, None]).ravel(), n) for column in columns], axis=1)
+
+
 def _patches(
     mesh: TetMesh, unknowns: NDArray[np.int64], n_unknowns: int, pieces: Pieces, components: NDArray[np.int64]
-) -> tuple[sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
-    """Rows, areas and components of the patches.
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
+    """Rows, bends, areas and components of the patches.
 
     One row for each piece would say more than φ, linear on every tet, can obey but by being flat around the source.
+    A quadratic φ is at x, of barycentric coordinates λ between corners v, ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
     """
     corners = unknowns[pieces.tets]
     conforming = _on_whole_faces(mesh, pieces, components)
@@ -168,7 +192,15 @@ def _patches(
         (entries / np.where(real, weights, 1)[index], (index, columns)), shape=(len(found), n_unknowns)
     )
     rows.eliminate_zeros()
-    return rows[real], weights[real], found[real] // n_unknowns
+    away = (_centers(mesh, pieces)[:, None] - mesh.vertices[mesh.tets[pieces.tets]])[inside].reshape(-1, 3)
+    steps = (entries / np.where(real, weights, 1)[index])[n_on:, None] * away / 2
+    places = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
+    bends = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
+    return rows[real], bends[real], weights[real], found[real] // n_unknowns
+
+
+def _centers(mesh: TetMesh, pieces: Pieces) -> NDArray[np.float64]:
+    return np.einsum("pk,pki->pi", pieces.barycentric, mesh.vertices[mesh.tets[pieces.tets]])
 
 
 def _on_whole_faces(mesh: TetMesh, pieces: Pieces, components: NDArray[np.int64]) -> NDArray[np.bool_]:
