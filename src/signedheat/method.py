@@ -5,13 +5,13 @@ Diffuse the source normals for a short time; normalise; integrate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .constraints import Constraint
+from .constraints import Constraint, Free
 from .discretization import Discretization, SourceTerm
 
 
@@ -20,11 +20,11 @@ def diffuse(discretization: Discretization, source: SourceTerm) -> Any:
     return discretization.diffuse(source)
 
 
-def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) -> Sequence[Any]:
+def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) -> Iterable[Any]:
     """Step 1 for each of several sources; at once, where the discretisation can."""
     if hasattr(discretization, "diffuse_many"):
         return discretization.diffuse_many(sources)
-    return [diffuse(discretization, source) for source in sources]
+    return (diffuse(discretization, source) for source in sources)
 
 
 def normalize(discretization: Discretization, vectors: Any) -> NDArray[Any]:
@@ -37,6 +37,20 @@ def integrate(
 ) -> NDArray[np.float64]:
     """Step 3, Eq. 13: ``C φ = b`` with b the divergence of Y, under the constraint (Sec. 7.1)."""
     return constraint.integrate(discretization.integration, discretization.divergence(directions), source)
+
+
+def integrate_many(
+    discretization: Discretization,
+    directions: Iterable[NDArray[Any]],
+    sources: Sequence[SourceTerm],
+    constraint: Constraint,
+) -> Iterable[NDArray[np.float64]]:
+    """Step 3 for each of several sources; at once, where nothing is imposed and the discretisation can."""
+    if isinstance(constraint, Free) and hasattr(discretization.integration, "solve_many"):
+        divergences = [discretization.divergence(each) for each in directions]
+        return discretization.integration.solve_many(divergences, sources)
+    each = zip(directions, sources, strict=True)
+    return (integrate(discretization, direction, source, constraint) for direction, source in each)
 
 
 def unit(vectors: NDArray[Any]) -> NDArray[Any]:

@@ -17,7 +17,7 @@ import numpy as np
 from .constraints import Constraint, ZeroSet
 from .discretization import Diagnostics, Discretization, discretize
 from .errors import SourceError
-from .method import diffuse, diffuse_many, integrate, normalize
+from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 
 logger = logging.getLogger("signedheat")
 
@@ -151,11 +151,12 @@ class SignedHeatSolver:
             for discretization, run in groupby(batch, key=itemgetter(0)):
                 lowered = [source for _, source in run]
                 stopwatch = Stopwatch(None, steps=1)
-                with stopwatch("diffuse"):
-                    solved = diffuse_many(discretization, lowered)
-                for source, vectors in zip(lowered, solved, strict=True):
-                    values = integrate(discretization, normalize(discretization, vectors), source, constraint)
-                    seconds = {"diffuse": stopwatch.seconds["diffuse"] / len(lowered)}
+                with stopwatch("together"):
+                    diffused = diffuse_many(discretization, lowered)
+                    directions = (normalize(discretization, vectors) for vectors in diffused)
+                    solved = list(integrate_many(discretization, directions, lowered, constraint))
+                seconds = {step: total / len(lowered) for step, total in stopwatch.seconds.items()}
+                for source, values in zip(lowered, solved, strict=True):
                     diagnostics = Diagnostics(timings=seconds, time=source.time)
                     fields.append(discretization.field(values, source, diagnostics))
         return fields

@@ -222,9 +222,10 @@ def from_faces(
 
 
 def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(n,) complex sums of values with the same index."""
-    flat, values = index.ravel(), values.ravel()
-    return np.bincount(flat, values.real, n) + 1j * np.bincount(flat, values.imag, n)
+    """(n,) complex sums of values with the same index, few beside n."""
+    sums = np.zeros(n, dtype=np.complex128)
+    np.add.at(sums, index.ravel(), values.ravel())
+    return sums
 
 
 def line_elements(part: Pieces, spacing: float) -> NDArray[np.float64]:
