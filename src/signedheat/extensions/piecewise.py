@@ -115,9 +115,9 @@ def piecewise_distance(
         if not holds(discretization, sources):
             domain = intrinsic_delaunay(domain.triangulation, keep=sources)
             discretization = discretize(domain)
-        triangles = discretization.triangles
     with stopwatch("diffuse"):
-        _, groups = discretization.adapt(sources)
+        discretization, groups = discretization.adapt(sources)
+        triangles = discretization.triangles
         source = discretization.lower(groups, diffusion)
         directions = normalize(discretization, diffuse(discretization, source))
     with stopwatch("integrate"):
@@ -155,7 +155,8 @@ def piecewise_distance(
 
 def holds(discretization: Any, sources: Sequence[Any]) -> bool:
     """Whether all sources have edges to run along, and vertices to lie at, where they need them."""
-    fits = discretization.adapt(sources)[0].triangles is discretization.triangles
+    adapted = discretization.adapt(sources)[0].triangles
+    fits = adapted.corner_vertices is discretization.triangles.corner_vertices
     if not fits and isinstance(discretization.domain, IntrinsicTriangulation):
         raise SourceError(
             "an unoriented curve runs across faces of the intrinsic triangulation: make it with "

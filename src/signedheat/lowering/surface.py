@@ -51,6 +51,7 @@ class SurfaceDiscretization:
     spacing: float | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
     _heats: dict[float, VectorHeat] = field(default_factory=dict, repr=False)
+    _turned: dict[bytes, SurfaceDiscretization] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if self.spacing is None:
@@ -74,16 +75,30 @@ class SurfaceDiscretization:
         return elimination_order(self.stiffness)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Unoriented curves and points inside faces get edges and vertices of their own."""
+        """Unoriented curves and points inside faces get edges and vertices; nonmanifold edges are told from where."""
         if self.bring is not None:
             sources = [self.bring(source) for source in sources]
         from ..sources.embedding import embed
+        from ..sources.facing import facing
         from ..sources.pieces import in_pieces
 
         positions = None if self.bring is not None else self.domain.triangulation.vertices
         groups = in_pieces(sources, self.triangles, positions)
         triangles, groups = embed(self.triangles, groups)
-        return self if triangles is self.triangles else self._cut_into(triangles), groups
+        surface = self if triangles is self.triangles else self._cut_into(triangles)
+        triangles, groups = facing(triangles, groups)
+        return surface._turned_to(triangles), groups
+
+    def _turned_to(self, triangles: LaidOutTriangles) -> SurfaceDiscretization:
+        """The same triangles with other first faces at nonmanifold edges; step 3 does not see them."""
+        if triangles is self.triangles:
+            return self
+        key = triangles.first_sides.tobytes()
+        if key not in self._turned:
+            self._turned.clear()
+            turned = self._turned[key] = replace(self, triangles=triangles, _heats={}, _turned={})
+            turned.__dict__.update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
+        return self._turned[key]
 
     def _cut_into(self, triangles: LaidOutTriangles) -> SurfaceDiscretization:
         """The same surface in more triangles, whose first vertices are those of this."""
@@ -95,6 +110,7 @@ class SurfaceDiscretization:
             bring=None,
             notes={**self.notes, "vertices added for sources": added},
             _heats={},
+            _turned={},
         )
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:

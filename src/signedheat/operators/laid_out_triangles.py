@@ -30,12 +30,15 @@ class LaidOutTriangles:
         Edge k of a face runs from corner k to corner k + 1. Two edges may join the same two vertices.
     n_vertices : int
         Number of vertices, used or not.
+    leading_sides : (e,) int, optional
+        Side 3 f + k of each edge whose face f counts as the edge's first; by default that of the lowest number.
     """
 
     corner_vertices: NDArray[np.int64]
     corner_positions: NDArray[np.complex128]
     edges: EdgeTable
     n_vertices: int
+    leading_sides: NDArray[np.int64] | None = None
 
     @classmethod
     def from_lengths(
@@ -114,14 +117,22 @@ class LaidOutTriangles:
     def reflected(self) -> NDArray[np.bool_]:
         """(m, 3) where the frame of edge k acts on the face with a conjugation.
 
-        The frame's second axis points into the first face of the edge and out of all others. The edge's direction
-        is that of its first face, so a frame is reflected in every other face that runs along it in the same direction.
+        The frame's second axis points into the first face of the edge and out of all others; a quarter turn from the
+        edge's direction points into the faces that run along it in that direction, and out of the others.
         """
+        is_first = np.zeros(3 * self.n_faces, dtype=bool)
+        is_first[self.first_sides] = True
+        return self.edges.forward != is_first.reshape(-1, 3)
+
+    @cached_property
+    def first_sides(self) -> NDArray[np.int64]:
+        """(k,) side 3 f + j of the first face of every edge that has one."""
+        if self.leading_sides is not None:
+            return self.leading_sides
         first = np.full(self.n_edges, -1, dtype=np.int64)
         flat = self.edges.of_faces.ravel()
         first[flat[::-1]] = np.arange(len(flat))[::-1]
-        is_first = (first[flat] == np.arange(len(flat))).reshape(-1, 3)
-        return self.edges.forward & ~is_first
+        return first[first >= 0]
 
     @cached_property
     def is_consistently_oriented(self) -> bool:
