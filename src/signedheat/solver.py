@@ -12,10 +12,9 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
-import numpy as np
-
 from .constraints import Constraint, ZeroSet
 from .discretization import Diagnostics, Discretization, discretize
+from .domains.validation import positive_number
 from .errors import SourceError
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 
@@ -58,8 +57,7 @@ class SignedHeatSolver:
     intrinsic: bool = False
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.diffusion) and self.diffusion > 0):
-            raise ValueError(f"diffusion must be positive and finite, not {self.diffusion}")
+        object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
 
     @cached_property
     def discretization(self) -> Discretization:
@@ -109,7 +107,7 @@ class SignedHeatSolver:
         ConstraintError
             If the constraint does not fit the sources.
         """
-        constraint = ZeroSet() if constraint is None else constraint
+        constraint = checked(constraint)
         stopwatch = Stopwatch(self.progress, steps=5)
         with stopwatch("prepare"):
             discretization = self.discretization
@@ -141,7 +139,7 @@ class SignedHeatSolver:
         list of VertexField, GridField or TetField
             What `distance` gives for each, up to rounding. Timings are those of each source's share.
         """
-        constraint = ZeroSet() if constraint is None else constraint
+        constraint = checked(constraint)
         fields: list[Any] = []
         for begin in range(0, len(sources), _BATCH):
             batch = []
@@ -160,6 +158,18 @@ class SignedHeatSolver:
                     diagnostics = Diagnostics(timings=seconds, time=source.time)
                     fields.append(discretization.field(values, source, diagnostics))
         return fields
+
+
+def checked(constraint: Constraint | None) -> Constraint:
+    """The constraint, or the default for none."""
+    if constraint is None:
+        return ZeroSet()
+    if isinstance(constraint, type) or not hasattr(constraint, "integrate"):
+        raise TypeError(
+            f"{constraint!r} is not a constraint: pass Free(), ZeroSet(), EachComponent(), LevelValues(values) or "
+            "Soft(weight)"
+        )
+    return constraint
 
 
 def as_list(sources: Any) -> list[Any]:

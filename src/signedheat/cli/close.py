@@ -5,13 +5,12 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from ..constraints import ZeroSet
-from ..io import CURVE_FORMATS, ensure_writable, read_curves, write_curves
+from ..extensions.close_curves import refuse_without_sides
+from ..io import CURVE_FORMATS, ensure_writable, write_curves
 from ..viewing import PICTURE_FORMATS
 from .computing import naming
-from .options import Summary, add_command, positive
-from .progress import ProgressBar
-from .surface import read_surface, surface_constraint
+from .options import Summary, add_command
+from .surface import add_curves_and_output, measured
 
 
 def add_to(commands: Any) -> None:
@@ -24,23 +23,7 @@ def add_to(commands: Any) -> None:
         description="The zero set of the signed distance to broken curves: closed, but for ends at the boundary of the "
         "surface.",
     )
-    parser.add_argument(
-        "mesh",
-        metavar="MESH",
-        help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti",
-    )
-    parser.add_argument("curves", metavar="CURVES", help="broken curves on it: .txt .obj .json .csv")
-    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="completed curves: .txt .obj .json")
-    parser.add_argument(
-        "--constraint",
-        type=surface_constraint,
-        default=ZeroSet(),
-        metavar="C",
-        help="free, zero-set (default: the result passes through the curves), each-component, soft:WEIGHT",
-    )
-    parser.add_argument(
-        "--diffusion", type=positive, default=1.0, metavar="T", help="larger values close gaps more roundly (1)"
-    )
+    add_curves_and_output(parser, "completed curves: .txt .obj .json")
     parser.add_argument("--preview", metavar="PNG", help="draw the distance, with the completed curves")
 
 
@@ -49,12 +32,9 @@ def run(arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, CURVE_FORMATS, "curves")
     if arguments.preview:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
-    surface = read_surface(arguments.mesh)
-    curves = read_curves(arguments.curves, surface)
-    from ..solver import SignedHeatSolver
-
-    with naming(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
-        field = SignedHeatSolver(surface, arguments.diffusion, progress).distance(curves, arguments.constraint)
+    surface, curves, field = measured(arguments)
+    with naming(arguments.curves):
+        refuse_without_sides(curves)
         found = field.contour(0.0)
     write_curves(arguments.output, found, surface)
     if arguments.preview:

@@ -28,11 +28,20 @@ def add_to(commands: Any) -> None:
         description="Signed distance on a mesh, a point cloud or the boundary of a set of voxels to curves, broken or "
         "not, and to points on it.",
     )
+    add_curves_and_output(parser, "field: .ply .vtp .obj .npz")
+    parser.add_argument(
+        "--contours", type=whole_number(1), metavar="N", help="write N isolines beside the output, as OUT.contours.obj"
+    )
+    parser.add_argument("--preview", metavar="PNG", help="draw the result")
+
+
+def add_curves_and_output(parser: Parser, output: str) -> None:
+    """What it takes to measure distance to curves on a surface, and where the result goes."""
     parser.add_argument(
         "mesh", metavar="MESH", help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti"
     )
     parser.add_argument("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json .csv")
-    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="field: .ply .vtp .obj .npz")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT", help=output)
     parser.add_argument(
         "--constraint",
         type=surface_constraint,
@@ -41,12 +50,23 @@ def add_to(commands: Any) -> None:
         help="free, zero-set (default), each-component, soft:WEIGHT, or levels:V,V,…, one for each curve of the file",
     )
     parser.add_argument(
-        "--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"
+        "--diffusion",
+        type=positive,
+        default=1.0,
+        metavar="T",
+        help="diffusion time in squared spacings (1); larger values close gaps more roundly",
     )
-    parser.add_argument(
-        "--contours", type=whole_number(1), metavar="N", help="write N isolines beside the output, as OUT.contours.obj"
-    )
-    parser.add_argument("--preview", metavar="PNG", help="draw the result")
+
+
+def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
+    """The surface, the curves, and the distance."""
+    surface = read_surface(arguments.mesh)
+    curves = read_curves(arguments.curves, surface)
+    from ..solver import SignedHeatSolver
+
+    with naming(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
+        field = SignedHeatSolver(surface, arguments.diffusion, progress).distance(curves, arguments.constraint)
+    return surface, curves, field
 
 
 def run(parser: Parser, arguments: Namespace) -> Summary:
@@ -54,12 +74,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
     if arguments.preview:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
-    surface = read_surface(arguments.mesh)
-    curves = read_curves(arguments.curves, surface)
-    from ..solver import SignedHeatSolver
-
-    with naming(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
-        field = SignedHeatSolver(surface, arguments.diffusion, progress).distance(curves, arguments.constraint)
+    surface, curves, field = measured(arguments)
     field.save(arguments.output)
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
     summary = {

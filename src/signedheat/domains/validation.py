@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import GeometryError
+from ..errors import GeometryError, SignedHeatError
 
 
 def frozen(array: NDArray[Any]) -> NDArray[Any]:
@@ -29,6 +30,31 @@ def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDA
             f"{len(bad)} of {len(array)} {name} hold NaN or infinity, first number {bad[0]}: remove or repair them"
         )
     return frozen(array)
+
+
+def finite_number(value: Any, name: str, least: float = -np.inf) -> float:
+    """`value` as a float, not NaN and not infinite, from `least` on.
+
+    Examples
+    --------
+    >>> finite_number(2, "the distance", least=0)
+    2.0
+    """
+    if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:
+        raise SignedHeatError(f"{name} must be a number, not {value!r}")
+    number = float(value)
+    if not (np.isfinite(number) and number >= least):
+        wanted = "finite" if least == -np.inf else "finite and not negative" if least == 0 else f"at least {least:g}"
+        raise SignedHeatError(f"{name} must be {wanted}, not {number:g}")
+    return number
+
+
+def positive_number(value: Any, name: str) -> float:
+    """`value` as a float above zero, not NaN and not infinite."""
+    number = finite_number(value, name)
+    if number <= 0:
+        raise SignedHeatError(f"{name} must be positive and finite, not {number:g}")
+    return number
 
 
 def element_ids(values: ArrayLike, name: str, corners: int, n_vertices: int) -> NDArray[np.int64]:

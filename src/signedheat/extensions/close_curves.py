@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from ..constraints import Constraint
+from ..errors import SourceError
 from ..solver import SignedHeatSolver, as_list
-from ..sources.curves import Curve
+from ..sources.curves import Curve, SurfacePoints
 
 
 def close_curves(
@@ -30,6 +32,11 @@ def close_curves(
     list of Curve
         Oriented as the given curves, closed but for ends at the boundary of the surface; one per connected line.
 
+    Raises
+    ------
+    SourceError
+        If no curve has sides, or one does not fit the surface.
+
     Examples
     --------
     A straight line with a gap, on a flat strip of triangles.
@@ -44,5 +51,13 @@ def close_curves(
     >>> whole
     [Curve(15 points, open, oriented)]
     """
-    phi = SignedHeatSolver(domain, diffusion=diffusion).distance(as_list(curves), constraint)
+    listed = as_list(curves)
+    refuse_without_sides(listed)
+    phi = SignedHeatSolver(domain, diffusion=diffusion).distance(listed, constraint)
     return phi.contour(0.0)
+
+
+def refuse_without_sides(curves: Sequence[Any]) -> None:
+    """Distance to curves that are not oriented, and to points, has no zero set but these."""
+    if all(isinstance(curve, Curve | SurfacePoints) and not getattr(curve, "oriented", False) for curve in curves):
+        raise SourceError("curves without sides, and points, bound nothing that could be completed: orient the curves")

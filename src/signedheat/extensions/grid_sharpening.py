@@ -9,11 +9,12 @@ import numpy as np
 
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
+from ..solver import Progress
 from .sharpening import sharpen
 
 
 @sharpen.register
-def _(field: GridField) -> GridField:
+def sharpen_grid(field: GridField, progress: Progress | None = None) -> GridField:
     """Distance of every node to the zero set; signs stay as they are. Second order on smooth shapes."""
     from ..operators.closest_points import distance_to_zero_set
 
@@ -22,7 +23,11 @@ def _(field: GridField) -> GridField:
             "a field around solid nodes, or with parts that no source reaches, cannot be sharpened: straight lines to "
             "its zero set would pass through what is solid; use it as it is"
         )
+    if progress is not None:
+        progress(0.0, "sharpen")
     begin = time.perf_counter()
     values = distance_to_zero_set(field.values, field.grid.spacing)
+    if progress is not None:
+        progress(1.0, "done")
     timings = {**field.diagnostics.timings, "sharpen": time.perf_counter() - begin}
     return GridField(field.grid, values, replace(field.diagnostics, timings=timings))

@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import finite_number
 from ..errors import SignedHeatError, SourceError
 from ..fields.grid_field import GridField
-from ..solver import SignedHeatSolver
-from ..sources.area_elements import area_elements
+from ..solver import SignedHeatSolver, as_list
+from ..sources.area_elements import area_elements, extent, grid_around
+from ..sources.curves import Curve
 from .sharpening import sharpen
 
 RESOLUTION = 128
@@ -27,7 +29,7 @@ def dilate(shape: Any, distance: float, domain: Any = None, *, resolution: int =
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh, PointCloud; on a surface, Curve or a sequence of them
+    shape : TriangleMesh, PolygonMesh, PointCloud, in the plane Polyline, on a surface Curve; or a sequence of them
         What is grown, broken or not. The inside is where φ < 0: behind the normals, or to the right of curves.
     distance : float
         How far, in the units of the shape; not negative.
@@ -38,11 +40,15 @@ def dilate(shape: Any, distance: float, domain: Any = None, *, resolution: int =
 
     Returns
     -------
-    TriangleMesh, or list of Curve
+    TriangleMesh, or list of Polyline or Curve
         The new boundary: closed, manifold, oriented like the shape.
 
     Raises
     ------
+    SignedHeatError
+        If the distance is no number, not finite, or negative.
+    SourceError
+        If the shape does not fit the domain.
     OutsideError
         If nothing is left, or the result leaves the domain.
 
@@ -53,7 +59,7 @@ def dilate(shape: Any, distance: float, domain: Any = None, *, resolution: int =
     >>> bool(abs(np.linalg.norm(dilate(ball, 0.5, resolution=32).vertices, axis=1) - 1.5).max() < 0.02)
     True
     """
-    _not_negative(distance)
+    distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (distance,), domain, resolution)
 
 
@@ -67,19 +73,19 @@ def erode(shape: Any, distance: float, domain: Any = None, *, resolution: int = 
     >>> bool(abs(np.linalg.norm(erode(ball, 0.5, resolution=48).vertices, axis=1) - 0.5).max() < 0.02)
     True
     """
-    _not_negative(distance)
+    distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (-distance,), domain, resolution)
 
 
 def opening(shape: Any, distance: float, domain: Any = None, *, resolution: int = RESOLUTION) -> Any:
     """Erode, then dilate: what is thinner than twice the distance goes, convex corners turn round; see `dilate`."""
-    _not_negative(distance)
+    distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (-distance, distance), domain, resolution)
 
 
 def closing(shape: Any, distance: float, domain: Any = None, *, resolution: int = RESOLUTION) -> Any:
     """Dilate, then erode: gaps narrower than twice the distance fill, concave corners turn round; see `dilate`."""
-    _not_negative(distance)
+    distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (distance, -distance), domain, resolution)
 
 
@@ -107,11 +113,14 @@ def shell(
     Raises
     ------
     SignedHeatError
-        If inner is not less than outer.
+        If inner is not less than outer, one of them is not finite, or the wall is thinner than a cell.
+    TypeError
+        If the domain is not a grid.
     """
-    if not (np.isfinite([inner, outer]).all() and inner < outer):
-        raise SignedHeatError(f"a shell needs finite inner < outer, not {inner} and {outer}")
-    grid = _room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else domain
+    inner, outer = finite_number(inner, "the inner distance"), finite_number(outer, "the outer distance")
+    if not inner < outer:
+        raise SignedHeatError(f"a shell needs inner < outer, not {inner:g} and {outer:g}: swap them, or set them apart")
+    grid = _room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else _grid(domain)
     phi = _distance(grid, shape)
     return _wall(grid, np.maximum(inner - phi.values, phi.values - outer), outer - inner)
 
@@ -146,15 +155,16 @@ def thicken(
     Raises
     ------
     SignedHeatError
-        If a reach is negative, or both are zero.
+        If a reach is negative or not finite, both are zero, or the wall is thinner than a cell.
+    TypeError
+        If the domain is not a grid.
     """
-    below = above if below is None else below
-    _not_negative(above)
-    _not_negative(below)
+    above = finite_number(above, "the reach above", least=0)
+    below = above if below is None else finite_number(below, "the reach below", least=0)
     reach = max(above, below)
     if reach == 0:
         raise SignedHeatError("a sheet thickened by nothing has no inside: give a reach above zero")
-    grid = _room(sheet, reach, resolution) if domain is None else domain
+    grid = _room(sheet, reach, resolution) if domain is None else _grid(domain)
     depth = _unsigned_distance(sheet, grid, reach) - reach
     if above != below:
         phi = _distance(grid, sheet).values
@@ -185,8 +195,20 @@ def _offsets(shape: Any, distances: tuple[float, ...], domain: Any, resolution: 
 
 def _room(shape: Any, reach: float, resolution: int) -> Grid:
     """A grid around a shape, with room for offsets."""
-    longest = float(np.ptp(shape.bounds, axis=0).max())
-    return Grid.around(shape.bounds, resolution=resolution, padding=0.15 * longest + 1.05 * reach)
+    shapes = as_list(shape)
+    if any(isinstance(part, Curve) for part in shapes):
+        raise SourceError("a Curve lies on a surface: pass that surface as the domain")
+    bounds = np.stack([extent(part) for part in shapes])
+    longest = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
+    return grid_around(shapes, resolution, padding=0.15 * longest + 1.05 * reach)
+
+
+def _grid(domain: Any) -> Grid:
+    if not isinstance(domain, Grid):
+        raise TypeError(
+            f"walls are made on a Grid, not on a {type(domain).__name__}: leave the domain out, or pass one"
+        )
+    return domain
 
 
 def _wall(grid: Grid, depth: NDArray[np.float64], thickness: float) -> TriangleMesh:
@@ -207,17 +229,16 @@ def _unsigned_distance(sheet: Any, grid: Grid, reach: float) -> NDArray[np.float
     from scipy.spatial import cKDTree
     from trimesh.remesh import subdivide_to_size
 
-    corners = area_elements(sheet).corners
-    if corners.shape[1] != 3:
-        raise SourceError(f"a sheet has faces, and a {type(sheet).__name__} has none: reconstruct a mesh first")
+    for part in as_list(sheet):
+        if area_elements(part).corners.shape[1:] != (3, grid.dimension):
+            raise SourceError(
+                f"a sheet has faces in the {grid.dimension} dimensions of the grid, and a {type(part).__name__} has "
+                "none: reconstruct a mesh first"
+            )
+    corners = np.concatenate([area_elements(part).corners for part in as_list(sheet)])
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     cell = float(grid.spacing.max())
     samples, _ = subdivide_to_size(corners.reshape(-1, 3), faces, 0.5 * float(grid.spacing.min()), max_iter=64)
     far = reach + 2 * cell
     distance = cKDTree(samples).query(grid.points.reshape(-1, 3), distance_upper_bound=far, workers=-1)[0]
     return np.minimum(distance, far).reshape(grid.shape)
-
-
-def _not_negative(distance: float) -> None:
-    if not (np.isfinite(distance) and distance >= 0):
-        raise SignedHeatError(f"a distance must be finite and not negative here, not {distance}")

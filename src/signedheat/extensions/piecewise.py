@@ -19,6 +19,7 @@ from scipy import sparse
 from ..discretization import Diagnostics, discretize
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import positive_number
 from ..errors import SourceError, UnreachedWarning
 from ..fields.piecewise_field import PiecewiseField
 from ..linear import factorize
@@ -106,8 +107,8 @@ def piecewise_distance(
             "piecewise distance needs a TriangleMesh, a PolygonMesh or an IntrinsicTriangulation, not a "
             f"{type(domain).__name__}"
         )
-    if smoothing is not None and not (np.isfinite(smoothing) and smoothing > 0):
-        raise ValueError(f"smoothing must be positive and finite, not {smoothing}")
+    if smoothing is not None:
+        smoothing = positive_number(smoothing, "smoothing")
     sources = as_list(sources)
     stopwatch = Stopwatch(progress, steps=4)
     with stopwatch("prepare"):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..discretization import Diagnostics, Discretization
+from ..errors import GeometryError, OutsideError
 from ..operators.linear_elements import LinearElements
 from ..solver import Progress
 
@@ -47,8 +48,8 @@ def sharpen(field: Any, **options: Any) -> Any:
     field : GridField, VertexField or TetField
         What `signed_distance` or `SignedHeatSolver.distance` returned.
     **options
-        Those of the kind of field; on surfaces and tets `method` (`Geodesic` or `Convex`) and `progress`, called as
-        ``progress(fraction, step)``; what it raises cancels.
+        `progress`, called as ``progress(fraction, step)``; what it raises cancels. On surfaces and tets also `method`:
+        `Geodesic` or `Convex`.
 
     Returns
     -------
@@ -58,9 +59,11 @@ def sharpen(field: Any, **options: Any) -> Any:
     Raises
     ------
     TypeError
-        If this kind of field cannot be sharpened.
+        If this kind of field cannot be sharpened, or not by this method.
     OutsideError
-        If a field has one sign everywhere.
+        If a field has one sign everywhere, or no value anywhere.
+    GeometryError
+        If a value is infinite, or there is not one for each vertex.
 
     Examples
     --------
@@ -86,10 +89,18 @@ def sharpened(
     """What fields on surfaces and on tets have in common: new values, and diagnostics that compare the slopes."""
     from .sharpening_methods import Geodesic
 
+    method = Geodesic() if method is None else method
+    if isinstance(method, type) or not hasattr(method, "sharpened"):
+        raise TypeError(f"{method!r} is no method of sharpening: pass Geodesic() or Convex()")
+    known = np.isfinite(values)
+    if not known.any():
+        raise OutsideError("the field has no value anywhere: pass one that a source reaches")
+    if not (known | np.isnan(values)).all():
+        raise GeometryError(f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}: compute it anew")
     begin = time.perf_counter()
     if progress is not None:
         progress(0.0, "sharpen")
-    new, notes = (method or Geodesic()).sharpened(discretization, elements, values, field.source, progress)
+    new, notes = method.sharpened(discretization, elements, values, field.source, progress)
     if progress is not None:
         progress(1.0, "done")
     old = field.diagnostics

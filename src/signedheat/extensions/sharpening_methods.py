@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..discretization import Discretization
-from ..errors import OutsideError, SourceError
+from ..domains.validation import finite_number, positive_number
+from ..errors import OutsideError, SignedHeatError, SourceError
 from ..operators.linear_elements import LinearElements
 from ..solver import Progress
 
@@ -45,8 +46,8 @@ class Geodesic:
     tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
-        if not 0 <= self.tolerance < 0.1:
-            raise ValueError(f"tolerance must be at least 0 and below 0.1, not {self.tolerance}")
+        if not 0 <= finite_number(self.tolerance, "tolerance") < 0.1:
+            raise SignedHeatError(f"tolerance must be at least 0 and below 0.1, not {self.tolerance}")
 
     def sharpened(
         self,
@@ -60,8 +61,8 @@ class Geodesic:
         distance, notes = straight_distance(discretization, values, source, self.tolerance)
         if not np.isfinite(distance).any():
             raise OutsideError(
-                "the field has one sign everywhere, hence no zero set to measure from: use method=Convex(), "
-                "which measures from the source"
+                "the field has one sign everywhere, hence no zero set to measure from: add an offset to its values, or "
+                "use method=Convex(), which measures from the source that it was computed from"
             )
         distance = np.where(np.isfinite(distance), distance, np.abs(values))
         sides = values if getattr(source, "oriented", True) else np.ones_like(values)
@@ -104,8 +105,11 @@ class Convex:
     relaxation: float = 1.6
 
     def __post_init__(self) -> None:
-        if not (self.tolerance > 0 and self.max_rounds > 0 and 1 <= self.relaxation < 2):
-            raise ValueError(f"tolerance and max_rounds must be positive, relaxation in [1, 2): not {self}")
+        positive_number(self.tolerance, "tolerance")
+        if positive_number(self.max_rounds, "max_rounds") % 1:
+            raise SignedHeatError(f"max_rounds must be a whole number, not {self.max_rounds}")
+        if not 1 <= finite_number(self.relaxation, "relaxation") < 2:
+            raise SignedHeatError(f"relaxation must be at least 1 and below 2, not {self.relaxation}")
 
     def sharpened(
         self,
@@ -121,9 +125,9 @@ class Convex:
         rows = getattr(source, "rows", None)
         if rows is None or rows.shape[1] != len(values):
             raise SourceError(
-                "the convex method holds φ at the source, and this field has none on the vertices of its domain: "
-                "pass what SignedHeatSolver.distance returned, for sources along edges or with two sides, on an "
-                "intrinsic_delaunay(mesh) of your own instead of intrinsic=True"
+                "the convex method holds φ at the source, and this field comes without one, or from one that lies on "
+                "other triangles: pass what SignedHeatSolver.distance returned for oriented curves or points, on "
+                "intrinsic_delaunay(mesh) if need be instead of with intrinsic=True"
             )
         sizes, total = elements.sizes, elements.sizes.sum()
         with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring

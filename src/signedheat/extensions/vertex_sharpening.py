@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..discretization import discretize
+from ..errors import GeometryError
 from ..fields.vertex_field import VertexField
 from ..lowering.surface import SurfaceDiscretization
 from ..operators.laid_out_triangles import LaidOutTriangles
@@ -37,8 +38,15 @@ def _(field: VertexField, method: Method | None = None, progress: Progress | Non
 def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[np.float64]:
     """Values at the vertices of the surface's triangles; averages at those that the domain does not have."""
     n = surface.triangles.n_vertices
+    values = np.asarray(field.values)
+    wanted = n if surface.restriction is None else len(surface.restriction)
+    if values.shape != (wanted,) or not np.issubdtype(values.dtype, np.number):
+        raise GeometryError(
+            f"the field has {values.dtype} values of shape {values.shape}, and its domain {wanted} vertices: give one "
+            "number for each"
+        )
     if surface.restriction is None:
-        return np.asarray(field.values)
+        return values.astype(np.float64)
     values = field.domain.on_triangulation(field.values)
     if len(values) != n:
         values = np.full(n, np.nan)

@@ -41,9 +41,7 @@ class TetIntegration(DirectIntegration):
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
         """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups."""
         rows = source.rows
-        at_vertex = np.diff(rows.indptr) == 1
-        springs = np.where(at_vertex, PIN * self.stiffness.diagonal().max(), self.strength * source.weights)
-        factor = self._pulled_factor(rows, springs)
+        springs, factor = self.springs(source), self.anchored(source)
         pull = sparse.csr_matrix(rows.T @ sparse.diags_array(springs))
         fitted = factor.solve(divergence + pull @ levels.values)
         values = levels.values - self._bend(fitted, source)
