@@ -207,7 +207,7 @@ class GridField:
         return slopes
 
     def __repr__(self) -> str:
-        low, high = (float(v) for v in (np.nanmin(self.values), np.nanmax(self.values)))
+        low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"GridField({self.grid!r}, values from {low:g} to {high:g})"
 
     def __reduce__(self) -> tuple[Any, ...]:

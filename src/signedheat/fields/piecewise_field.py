@@ -190,7 +190,7 @@ class PiecewiseField:
         self.split().save(path)
 
     def __repr__(self) -> str:
-        low, high = np.nanmin(self.values), np.nanmax(self.values)
+        low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"PiecewiseField({self.domain!r}, values from {low:g} to {high:g}, {len(self.cut)} cuts)"
 
 

@@ -215,7 +215,7 @@ class TetField:
         return corners, weights, away
 
     def __repr__(self) -> str:
-        low, high = (float(f(self.values)) for f in (np.nanmin, np.nanmax))
+        low, high = (float(f.reduce(self.values)) for f in (np.fmin, np.fmax))
         return f"TetField({self.mesh!r}, values from {low:g} to {high:g})"
 
 
