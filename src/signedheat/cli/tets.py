@@ -8,6 +8,7 @@ from typing import Any
 from ..domains.grid import Grid
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
+from ..extensions.sharpening import sharpen
 from ..extensions.tetrahedralize import tetrahedralize
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
@@ -42,6 +43,8 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
             mesh = tetrahedralize(shape, resolution=arguments.resolution or RESOLUTION, padding=arguments.padding)
         with ProgressBar(arguments.quiet or arguments.json) as progress:
             field = SignedHeatSolver(mesh, arguments.diffusion, progress).distance(shape, arguments.constraint)
+            if not arguments.plain:
+                field = sharpen(field)
     field.save(arguments.output)
     if arguments.preview:
         save_slices(on_grid(field), arguments.preview, shape)

@@ -44,13 +44,11 @@ def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: flo
     """
     import tetgen
 
-    corners, faces, spacing = _box_around(shape, resolution, padding)
-    mesher = tetgen.TetGen(corners, faces.astype(np.int32))
-    volume = 1.5 * spacing**3 / (6 * np.sqrt(2))  # TetGen stays below it: tets of this edge length in the mean
-    vertices, tets = mesher.tetrahedralize(order=1, mindihedral=15, minratio=1.3, maxvolume=volume, fixedvolume=True)[
-        :2
-    ]
-    return TetMesh(vertices, tets)
+    lower, upper, spacing = _box_around(shape, resolution, padding)
+    volume = 1.64 * spacing**3 / (6 * np.sqrt(2))  # TetGen stays below it: tets of this edge length in the mean
+    mesher = tetgen.TetGen(*box_walls(lower, upper, np.ceil((upper - lower) / (1.4 * spacing)).astype(np.int64)))
+    options = {"mindihedral": 10, "minratio": 1.4, "nobisect": True, "maxvolume": volume, "fixedvolume": True}
+    return TetMesh(*mesher.tetrahedralize(order=1, **options)[:2])
 
 
 def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
@@ -76,7 +74,8 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
 
     if isinstance(shape, PointCloud):
         raise GeometryError("fTetWild follows faces, and a point cloud has none: use tetrahedralize")
-    corners, faces, spacing = _box_around(shape, resolution, padding)
+    lower, upper, spacing = _box_around(shape, resolution, padding)
+    corners, faces = box_walls(lower, upper, np.ones(3, dtype=np.int64))
     triangles = area_elements(shape).corners
     vertices, ids = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     leftover = Path("__tracked_surface.stl")  # fTetWild leaves it in the working directory
@@ -93,14 +92,29 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
 
 def _box_around(
     shape: Any, resolution: int, padding: float | None
-) -> tuple[NDArray[np.float64], NDArray[np.int64], float]:
-    """Corners and outward faces of the padded box of a shape, and the edge length wanted."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Corners of the padded box of a shape, and the edge length wanted."""
     lower, upper = extent(shape)
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
         raise GeometryError(f"{shape!r} has no extent in space of three dimensions to put a mesh around")
     padding = longest / 5 if padding is None else padding
-    bits = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])
-    corners = np.where(bits, upper + padding, lower - padding)
-    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
-    return corners, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), longest / resolution
+    return lower - padding, upper + padding, longest / resolution
+
+
+def box_walls(
+    lower: NDArray[np.float64], upper: NDArray[np.float64], counts: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """A box in triangles: its sides cut into counts of rectangles along x, y and z, and each of these in two."""
+    stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
+    faces = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        i, j = (a.ravel() for a in np.meshgrid(np.arange(counts[u]), np.arange(counts[v]), indexing="ij"))
+        first = i * stride[u] + j * stride[v]
+        quads = np.stack([first, first + stride[u], first + stride[u] + stride[v], first + stride[v]], axis=1)
+        faces += [quads[:, [0, 3, 2, 1]], quads + counts[axis] * stride[axis]]
+    quads = np.concatenate(faces)
+    ids, triangles = np.unique(np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), return_inverse=True)
+    places = np.stack([ids // stride[0], ids % stride[0] // stride[1], ids % stride[1]], axis=1)
+    return lower + places * (upper - lower) / counts, triangles.reshape(-1, 3).astype(np.int32)
