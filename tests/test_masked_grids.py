@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from grid_cases import assert_closed_manifold, enclosed_volume
 
 import signedheat as sh
 from signedheat.linear.stages import solve_in_stages
@@ -188,6 +189,26 @@ def test_lines_of_sight():
     assert {tuple(place) for place in np.argwhere(~seen).tolist()} == hidden
     corner = nodes.see(np.broadcast_to([3.0, 0.0], (24, 2)))  # (0, 3) to (3, 0) touches the box in a corner only
     assert corner[nodes.numbers[3]]
+
+
+def test_contours_in_space_are_closed_along_solid_nodes():
+    """A slab, less what a pillar takes of it up to the last free nodes, two edges of which are cut by half a cell."""
+    solid = np.zeros((11, 11, 11), dtype=bool)
+    solid[4:7, 4:7, :] = True
+    grid = sh.Grid((0, 0, 0), 1.0, solid.shape, solid)
+    source = sh.TriangleMesh([[1.3, -1, -1], [1.3, 12, -1], [1.3, 12, 12], [1.3, -1, 12]], [[0, 1, 2], [0, 2, 3]])
+    surface = sh.signed_distance(source, grid).offset(4.2)
+    assert_closed_manifold(surface)
+    assert surface.vertices[:, 0].max() == pytest.approx(5.5, abs=0.05)
+    assert enclosed_volume(surface) == pytest.approx((5.5 * 10 - 2.5 * 4 + 2 * 0.5) * 10, rel=0.01)
+
+
+@pytest.mark.parametrize("level", [-0.8, 0.0, 0.9])
+def test_contours_among_any_solid_nodes_are_closed_manifold_surfaces(level):
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=(12, 13, 14))
+    values[rng.random(values.shape) < 0.3] = np.nan
+    assert_closed_manifold(sh.GridField(sh.Grid((0, 0, 0), 0.1, values.shape), values).contour(level))
 
 
 def test_masks_are_checked():

@@ -35,7 +35,17 @@ from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField
 from .fields.tet_field import TetField
 from .fields.vertex_field import VertexField
-from .io import load_field, read, read_curves, read_polylines, save, write_curves, write_polylines
+from .io import (
+    load_field,
+    read,
+    read_curves,
+    read_mask,
+    read_polylines,
+    read_volume,
+    save,
+    write_curves,
+    write_polylines,
+)
 from .lowering import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
 from .lowering import grid as _grid  # noqa: F401  registers the lowering
 from .lowering import point_clouds as _point_clouds  # noqa: F401  registers the lowering
@@ -92,7 +102,9 @@ __all__ = [
     "piecewise_distance",
     "read",
     "read_curves",
+    "read_mask",
     "read_polylines",
+    "read_volume",
     "save",
     "sharpen",
     "shell",

@@ -12,7 +12,7 @@ import numpy as np
 from ..domains.grid import Grid
 from ..errors import SignedHeatError
 from ..fields.grid_field import GridField
-from ..io import POLYLINE_FORMATS, read, read_polylines
+from ..io import POLYLINE_FORMATS, read, read_mask, read_polylines
 from ..io.files import extension
 from ..solver import SignedHeatSolver
 from .options import Parser
@@ -42,6 +42,10 @@ def check_grid_options(parser: Parser, arguments: Namespace) -> None:
     for name, numbers in (("--origin", arguments.origin), ("--shape", arguments.grid_shape)):
         if numbers is not None and len(numbers) != dimension:
             parser.error(f"argument {name}: {dimension} numbers, not {len(numbers)}")
+    if arguments.mask is not None:
+        if any(given is not None for given in (arguments.resolution, arguments.padding, arguments.grid_shape)):
+            parser.error("--resolution, --padding and --shape do not go with --mask, whose nodes are the grid's")
+        return
     if own and (arguments.origin is None or arguments.grid_shape is None or spacing is None):
         parser.error("a grid of your own needs all of --origin, --spacing and --shape")
     if own and (arguments.resolution is not None or arguments.padding is not None):
@@ -65,6 +69,9 @@ def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
     spacing = arguments.spacing
     if spacing is not None and len(spacing) == 1:
         spacing = spacing[0]
+    if arguments.mask is not None:
+        with naming(arguments.mask):
+            return read_mask(arguments.mask, origin=arguments.origin, spacing=spacing)
     if arguments.origin is not None:
         return Grid(arguments.origin, spacing, arguments.grid_shape)
     options = {"resolution": arguments.resolution or RESOLUTION, "spacing": spacing}
@@ -84,14 +91,15 @@ def bounds_of(shape: Any) -> Any:
 
 
 def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
-    """The field, sharpened unless the options say otherwise."""
+    """The field, sharpened unless the options say otherwise, or the grid has walls."""
     from .. import sharpen
 
+    plain = arguments.plain or grid.mask is not None
     with ProgressBar(arguments.quiet or arguments.json) as progress:
-        share = 0.8 if not arguments.plain else 1.0
+        share = 1.0 if plain else 0.8
         solver = SignedHeatSolver(grid, arguments.diffusion, lambda done, step: progress(share * done, step))
         field = solver.distance(shape, arguments.constraint)
-        if arguments.plain:
+        if plain:
             return field
         progress(share, "sharpen")
         return sharpen(field)

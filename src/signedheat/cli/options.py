@@ -56,6 +56,12 @@ def add_grid_options(parser: Parser) -> None:
         dest="grid_shape",
         help="its nodes: NX NY NZ, or NX NY",
     )
+    grid.add_argument(
+        "--mask",
+        metavar="FILE",
+        help="a grid with walls, which distance goes around (it is not sharpened then): .npy .nrrd .vti, solid where "
+        "not 0; in the plane also .png .bmp .tif, solid where dark",
+    )
     method = parser.add_argument_group("method")
     method.add_argument("--plain", action="store_true", help="the paper's field, not sharpened")
     method.add_argument(

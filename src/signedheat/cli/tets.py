@@ -26,8 +26,8 @@ PREVIEW_NODES = 64
 
 def run(parser: Parser, arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, write."""
-    if arguments.spacing is not None or arguments.origin is not None or arguments.grid_shape is not None:
-        parser.error("--spacing, --origin and --shape are for grids, and do not go with --tets")
+    if any(x is not None for x in (arguments.spacing, arguments.origin, arguments.grid_shape, arguments.mask)):
+        parser.error("--spacing, --origin, --shape and --mask are for grids, and do not go with --tets")
     given = arguments.tets
     if given and (arguments.resolution is not None or arguments.padding is not None):
         parser.error("--resolution and --padding do not go with a mesh of your own")

@@ -22,9 +22,9 @@ def closed_surface(grid: Grid, values: NDArray[np.float64], level: float) -> Tri
 
     if grid.dimension != 3:
         raise GeometryError(f"fields are contoured in 2 and 3 dimensions, and this grid has {grid.dimension}")
-    if not np.isfinite(values).all():
-        raise GeometryError("values that are not finite, as those of solid nodes, have no closed contour in space")
-    height = heights_above(grid, values, level)
+    if np.isinf(values).any():
+        raise GeometryError("infinite values have no contour")
+    height = closed_at_unknown(heights_above(grid, values, level))
     shift = 0
     if wall_signs(height) == {True, False}:
         height, shift = capped(height), 1
@@ -64,6 +64,21 @@ def heights_above(grid: Grid, values: NDArray[np.float64], level: float) -> NDAr
     height[(height >= 0) & (height < least)] = least
     height[(height < 0) & (height > -least)] = -least
     return height
+
+
+def closed_at_unknown(height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Nodes without a value made positive, such that crossings lie about `CAP` cells from the nodes beside them."""
+    unknown = np.isnan(height)
+    if not unknown.any():
+        return height
+    depth = np.pad(np.where(height < 0, -height, 0.0), 1)
+    sums, counts = np.zeros_like(height), np.zeros_like(height)
+    for shift in np.ndindex((3,) * height.ndim):
+        beside = depth[tuple(slice(i, i + n) for i, n in zip(shift, height.shape, strict=True))]
+        sums += beside
+        counts += beside > 0
+    filling = np.where(counts > 0, (1 / CAP - 1) * sums / np.maximum(counts, 1), 1.0)
+    return np.where(unknown, filling, height)
 
 
 def wall_signs(height: NDArray[np.float64]) -> set[bool]:

@@ -108,7 +108,8 @@ class GridField:
         """Where φ = level.
 
         In space, a surface: closed, manifold, normals pointing to greater φ. Where it runs out of the grid, as it does
-        for an open shape whose completion has no end, it is closed along the box of the grid (1 % of a cell outside).
+        for an open shape whose completion has no end, it is closed along the box of the grid (1 % of a cell outside);
+        where it meets solid nodes, or others without a value, along the last nodes before them, likewise.
 
         In the plane, polylines, one for each connected line: greater φ to the left, closed where they close; they end
         at the box of the grid, and at nodes without a value.
@@ -127,7 +128,7 @@ class GridField:
         OutsideError
             If φ does not take the level anywhere on the grid.
         GeometryError
-            If the grid has neither 2 nor 3 dimensions, or, in space, values are NaN.
+            If the grid has neither 2 nor 3 dimensions, or values are infinite.
         """
         from .contouring import closed_surface, level_lines
 

@@ -5,6 +5,7 @@ from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable
 from .polylines import POLYLINE_FORMATS, read_polylines, write_polylines
 from .shapes import SHAPE_FORMATS, read, save
+from .volumes import read_mask, read_volume
 
 __all__ = [
     "CURVE_FORMATS",
@@ -16,7 +17,9 @@ __all__ = [
     "load_field",
     "read",
     "read_curves",
+    "read_mask",
     "read_polylines",
+    "read_volume",
     "save",
     "save_field",
     "write_curves",

@@ -1,4 +1,4 @@
-"""Volumes of voxels from files."""
+"""Volumes of voxels, and walls, from images."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..domains.digital_surface import DigitalSurface
+from ..domains.grid import Grid
 from ..errors import FileFormatError
 from .fields import _read_npy, _read_nrrd
 from .files import PathLike, contents, extension, unknown_extension
@@ -43,13 +44,58 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     ...     read_volume(f"{folder}/one.npy").n_vertices
     8
     """
-    reader = VOLUME_READERS.get(extension(path))
-    if reader is None:
-        raise unknown_extension(path, VOLUME_READERS, "a volume")
-    values, origin, spacing = reader(path)
-    if np.iscomplexobj(values) or values.dtype.kind not in "biuf":
-        raise FileFormatError(f"{path}: the values are no real numbers but {values.dtype}: it holds no volume")
+    values, origin, spacing = _read(path, VOLUME_READERS, "a volume")
+    if values.ndim != 3:
+        raise FileFormatError(f"{path}: the image has {values.ndim} axes, and a volume has 3")
     return DigitalSurface(values if level is None else values > level, spacing, origin, radius)
+
+
+def read_mask(
+    path: PathLike, level: float = 0.5, origin: ArrayLike | None = None, spacing: ArrayLike | None = None
+) -> Grid:
+    """Read a grid with walls: every voxel or pixel is a node, solid or free.
+
+    Parameters
+    ----------
+    path : str or path
+        ``.npy``, ``.nrrd`` or ``.vti`` in the plane or in space, as for `read_volume`; pictures (``.png``, ``.bmp``,
+        ``.tif``), the lower left pixel first, on which y runs upwards.
+    level : float
+        Voxels with larger values are solid. In pictures those are that are darker than this, 0 being black, 1 white.
+    origin, spacing : (d,) float, optional
+        Position of the first node, and distance between nodes, instead of those of the file; pixels are of size 1 from
+        0 on.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown kind, truncated or damaged.
+    GeometryError
+        If all nodes are solid, or origin or spacing make no sense.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(f"{folder}/wall.npy", np.array([[0, 0, 0], [0, 1, 1]]))
+    ...     read_mask(f"{folder}/wall.npy", spacing=0.5)
+    Grid(origin=[0.0, 0.0], spacing=[0.5, 0.5], shape=(2, 3), 2 solid nodes)
+    """
+    values, first, steps = _read(path, MASK_READERS, "a mask")
+    solid = values < level if extension(path) in PICTURES else values > level
+    return Grid(first if origin is None else origin, steps if spacing is None else spacing, solid.shape, solid)
+
+
+def _read(
+    path: PathLike, readers: dict[str, Any], what: str
+) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
+    reader = readers.get(extension(path))
+    if reader is None:
+        raise unknown_extension(path, readers, what)
+    values, origin, spacing = reader(path)
+    if values.dtype.kind not in "biuf":
+        raise FileFormatError(f"{path}: the values are no real numbers but {values.dtype}: it holds no image")
+    return values, origin, spacing
 
 
 def _read_plain_npy(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
@@ -60,7 +106,24 @@ def _read_plain_npy(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], 
         values = np.load(io.BytesIO(contents(path)), allow_pickle=False)
     except ValueError as error:
         raise FileFormatError(f"{path}: it is no .npy file, or is truncated ({error}): write it again") from error
-    return values, np.zeros(3), np.ones(3)
+    return values, np.zeros(values.ndim), np.ones(values.ndim)
+
+
+def _read_picture(path: PathLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Brightness from 0 to 1 along x and y; what is transparent is white."""
+    from PIL import Image
+
+    try:
+        picture = Image.open(io.BytesIO(contents(path))).convert("RGBA")
+        white = Image.new("RGBA", picture.size, "white")
+        brightness = np.asarray(Image.alpha_composite(white, picture).convert("L")) / 255
+    except (OSError, Image.DecompressionBombError) as error:
+        raise FileFormatError(f"{path}: it is no picture, or is damaged ({error}): write it again") from error
+    return brightness[::-1].T, np.zeros(2), np.ones(2)
 
 
 VOLUME_READERS = {".npy": _read_plain_npy, ".nrrd": _read_nrrd, ".vti": read_vti}
+
+PICTURES = frozenset({".bmp", ".png", ".tif", ".tiff"})
+
+MASK_READERS = {**VOLUME_READERS, **dict.fromkeys(sorted(PICTURES), _read_picture)}
