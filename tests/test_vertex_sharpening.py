@@ -156,7 +156,7 @@ AWKWARD = {
 @pytest.mark.parametrize("curve", ["star", "circle"])
 @pytest.mark.parametrize("kind", AWKWARD)
 def test_never_much_worse_than_before_on_awkward_triangles(kind, curve, diffusion):
-    """At most 10 % worse. Measured: 0.01 to 0.8 times as bad, but 1.03 times for the circle on jittered triangles, t = 100 h².
+    """At most 10 % worse. Measured: 0.01 to 0.8 times as bad; 1.03 for the circle on jittered triangles, t = 100 h².
 
     The convex method would not pass: there it is 11 times worse.
     """
