@@ -198,6 +198,21 @@ def test_given_normals_make_a_moebius_strip_indifferent_to_faces_turned_over():
     assert phi[:, 2] == pytest.approx(0.4, abs=0.03)
 
 
+def test_given_normals_make_a_moebius_strip_of_squares_indifferent_to_squares_turned_over():
+    strip = band(60, 4, twisted=True)
+    squares = np.column_stack([strip.faces[0::2], strip.faces[1::2, 2]])
+    over = np.random.default_rng(3).random(len(squares)) < 0.5
+    u = 2 * np.pi * 20 / 60
+    found = []
+    for polygons in (squares, np.where(over[:, None], squares[:, ::-1], squares)):
+        mesh = sh.PolygonMesh(strip.vertices, polygons)
+        arc = mesh.path([20 * 5 + j for j in range(5)])
+        given = sh.Curve(arc.faces, arc.barycentric, normals=np.tile([-np.sin(u), np.cos(u), 0.0], (4, 1)))
+        found.append(sh.SignedHeatSolver(mesh).distance(given).values.reshape(60, 5))
+    assert np.abs(found[1] - found[0]).max() < 1e-10
+    assert (found[0][22:26] > 0.02).all() and (found[0][15:19] < -0.02).all()
+
+
 def test_curves_on_a_nonmanifold_spine():
     pages = book(3, 8)
     phi = sh.SignedHeatSolver(pages).distance(pages.path(np.arange(9), oriented=False))

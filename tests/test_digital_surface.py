@@ -71,6 +71,20 @@ def test_flattened_area_is_that_of_the_ball_and_raw_area_is_not():
     assert raw == pytest.approx(6 * np.pi, rel=0.03)
 
 
+def test_given_normals_are_seen_in_the_corrected_planes():
+    surface = ball_surface(32)
+    exact = latitude(surface)
+    (curve,) = surface.level_set(exact)
+    corners = surface.triangulation.vertices[surface.triangulation.faces[curve.faces]]
+    along = np.einsum("pk,pkd->pd", curve.barycentric, corners)
+    middle = 0.5 * (along + np.roll(along, -1, axis=0))
+    north = AXIS - (middle @ AXIS / (middle**2).sum(axis=1))[:, None] * middle
+    given = sh.Curve(curve.faces, curve.barycentric, closed=True, normals=north)
+    solver = sh.SignedHeatSolver(surface)
+    errors = [cases.error(solver.distance(c, sh.Free()).values, exact) for c in (curve, given)]
+    assert errors[1] < 1.1 * errors[0]  # four times as large if normals are seen in the planes of voxel faces
+
+
 def test_distance_converges_with_corrected_normals_and_not_without():
     sizes = [1 / 12, 1 / 24, 1 / 48]
     corrected = [error_on_a_ball(n) for n in (12, 24, 48)]

@@ -19,13 +19,13 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
     known of the surface, and heat feels the directions of the lattice instead.
     """
     first, last = flattened_sides(domain.surfels, domain.spacing, domain.normals)
-    side = [np.linalg.norm(v, axis=1) for v in (first, last)]
-    diagonal = [0.5 * np.linalg.norm(v, axis=1) for v in (first - last, first + last)]  # from corners 1 and 3, 0 and 2
-    lengths = np.stack(
-        [np.stack([side[k % 2], diagonal[k % 2], diagonal[1 - k % 2]], axis=1) for k in range(4)], axis=1
-    ).reshape(-1, 3)
+    around = np.stack([np.zeros_like(first), first, first + last, last], axis=1)
+    middle = np.broadcast_to(0.5 * (first + last)[:, None], around.shape)
+    corners = np.stack([around, np.roll(around, -1, axis=1), middle], axis=2).reshape(-1, 3, 3)
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     mesh = domain.triangulation
     edges = separated_edges(mesh.edges, domain.surfels)
     triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
     spacing = max(0.5 * domain.radius, float(domain.spacing.mean()))
-    return SurfaceDiscretization(domain, triangles, restriction=np.arange(domain.n_vertices), spacing=spacing)
+    own = np.arange(domain.n_vertices)
+    return SurfaceDiscretization(domain, triangles, restriction=own, positions=corners, spacing=spacing)

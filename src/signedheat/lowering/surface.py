@@ -38,6 +38,9 @@ class SurfaceDiscretization:
         Vertex of the triangles that stands for each vertex of the domain, where they are not the same.
     bring : callable, optional
         Takes a source on the domain to the same source on the triangles, where their faces are not the domain's.
+    positions : (n_vertices, 3) or (m, 3, 3) float, optional
+        Where in space vertices lie, or the corners of each face, up to translation, where faces lie in planes of their
+        own: for curves whose normals are given. By default what the domain's triangulation says.
     spacing : float, optional
         h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
     notes : mapping
@@ -48,6 +51,7 @@ class SurfaceDiscretization:
     triangles: LaidOutTriangles
     restriction: NDArray[np.int64] | None = None
     bring: Callable[[Any], Any] | None = None
+    positions: NDArray[np.float64] | None = None
     spacing: float | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
     _heats: dict[float, VectorHeat] = field(default_factory=dict, repr=False)
@@ -82,7 +86,9 @@ class SurfaceDiscretization:
         from ..sources.facing import facing
         from ..sources.pieces import in_pieces
 
-        positions = None if self.bring is not None else self.domain.triangulation.vertices
+        positions = self.positions
+        if positions is None and self.bring is None:
+            positions = self.domain.triangulation.vertices
         groups = in_pieces(sources, self.triangles, positions)
         triangles, groups = embed(self.triangles, groups)
         surface = self if triangles is self.triangles else self._cut_into(triangles)

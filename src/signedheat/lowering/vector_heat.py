@@ -49,8 +49,8 @@ class VectorHeat:
 
     def solve(self, sources: Sequence[NDArray[np.complex128]]) -> list[list[NDArray[np.complex128]]]:
         """X for each X₀, in stages: each is known up to a factor of its own, and NaN nearer than where it begins."""
-        starts = [self._raised(vectors) for vectors in sources]
-        together = self._solve(np.stack(starts).T)
+        starts = np.stack([self._raised(vectors) for vectors in sources])
+        together = self._solve(starts.T)
         return [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
 
     def _carried_on(self, start: NDArray[np.complex128], near: NDArray[np.complex128]) -> list[NDArray[np.complex128]]:

@@ -68,8 +68,9 @@ def pieces(
         Face ids refer to `triangles`. Points of a curve that share no face are joined by a shortest line.
     triangles : LaidOutTriangles
         The surface.
-    positions : (n_vertices, 3) float, optional
-        Vertices in space, for curves whose normals are given.
+    positions : (n_vertices, 3) or (m, 3, 3) float, optional
+        Vertices in space, or the corners of each face where faces lie in planes of their own, for curves whose normals
+        are given.
     number : int
         Which of the sources this is, for messages.
 
@@ -185,7 +186,8 @@ def in_layout(
     vectors: NDArray[np.float64],
 ) -> NDArray[np.complex128]:
     """(k,) vectors in space as their faces see them, in layout coordinates."""
-    a, b, c = (positions[triangles.corner_vertices[faces, k]] for k in range(3))
+    of_faces = positions[faces] if positions.ndim == 3 else positions[triangles.corner_vertices[faces]]
+    a, b, c = of_faces.transpose(1, 0, 2)
     first = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
     normal = np.cross(first, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
