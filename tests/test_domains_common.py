@@ -1,4 +1,4 @@
-"""What every surface domain must do: one list of cases, run over all of them."""
+"""What every domain must do: one list of cases, run over all of them."""
 
 import warnings
 from dataclasses import dataclass
@@ -6,202 +6,212 @@ from dataclasses import dataclass
 import domain_cases as cases
 import numpy as np
 import pytest
+import tet_cases
+from domain_kinds import APART, KINDS, TILT, TURN, Kind, Surface, positions
+from scipy.spatial import cKDTree
 
 import signedheat as sh
-
-TILT = np.array([0.3, 0.2, 0.9]) / np.linalg.norm([0.3, 0.2, 0.9])
-
-
-def globe_triangles(n=24):
-    vertices, polygons = cases.globe(n)
-    return sh.TriangleMesh(vertices, [t for p in polygons for t in ([p[0], p[1], p[2]], [p[0], *p[2:]]) if len(t) == 3])
-
-
-def voxels_of_balls(n_balls, n=26):
-    volume, spacing, first = cases.ball(n)
-    return sh.DigitalSurface(np.concatenate([volume] * n_balls), spacing, first)
-
-
-def copies(make, n_copies):
-    """A domain of vertices and cells, several times, 4 apart along x."""
-    vertices, cells = make()
-    vertices = np.concatenate([np.add(vertices, [4.0 * k, 0, 0]) for k in range(n_copies)])
-    n = len(vertices) // n_copies
-    return vertices, [[i + k * n for i in cell] for k in range(n_copies) for cell in cells]
-
-
-def triangle_balls(n_balls):
-    mesh = globe_triangles()
-    return sh.TriangleMesh(*copies(lambda: (mesh.vertices, mesh.faces.tolist()), n_balls))
-
-
-def polygon_balls(n_balls):
-    return sh.PolygonMesh(*copies(lambda: cases.globe(24), n_balls))
-
-
-def cloud_of_balls(n_balls):
-    points = cases.sphere_points(1200)
-    return sh.PointCloud(np.concatenate([np.add(points, [4.0 * k, 0, 0]) for k in range(n_balls)]))
-
-
-BALLS = {
-    "triangles": triangle_balls,
-    "polygons": polygon_balls,
-    "points": cloud_of_balls,
-    "voxels": voxels_of_balls,
-}
-
-
-def positions(domain):
-    return domain.points if isinstance(domain, sh.PointCloud) else domain.vertices
-
-
-def latitude(domain, height=0.3):
-    """Distance to a circle on the unit ball at the origin, growing along `TILT`."""
-    unit = positions(domain) / np.linalg.norm(positions(domain), axis=1, keepdims=True)
-    return np.arcsin(np.clip(unit @ TILT, -1, 1)) - np.arcsin(height)
 
 
 @dataclass(frozen=True)
 class Ball:
     name: str
+    kind: Kind
     domain: object
     solver: sh.SignedHeatSolver
 
-    def circle(self, height=0.3):
-        return self.domain.level_set(latitude(self.domain, height))
+    def distance(self, sources, constraint=None):
+        """At the vertices, or nodes, that have one."""
+        return known(self.solver.distance(sources, constraint).values)
 
-    def distance(self, *arguments):
-        return self.solver.distance(*arguments).values
+    @property
+    def source(self):
+        return self.kind.source(self.domain)
+
+    def exact(self, height=0.3):
+        return self.kind.exact(self.domain, height)[free(self.domain)]
+
+    @property
+    def is_surface(self):
+        return isinstance(self.kind, Surface)
 
 
-@pytest.fixture(scope="module", params=BALLS)
+def free(domain):
+    """Which values a field has where every part is reached."""
+    mask = getattr(domain, "mask", None)
+    return slice(None) if mask is None else ~mask.ravel()
+
+
+def known(values):
+    return values.ravel()[~np.isnan(values.ravel())]
+
+
+@pytest.fixture(scope="module", params=KINDS)
 def ball(request):
-    domain = BALLS[request.param](1)
-    return Ball(request.param, domain, sh.SignedHeatSolver(domain))
+    domain = KINDS[request.param].make(1)
+    return Ball(request.param, KINDS[request.param], domain, sh.SignedHeatSolver(domain))
 
 
-def test_a_circle_has_its_distance(ball):
-    assert cases.error(ball.distance(ball.circle()), latitude(ball.domain)) < 6e-3
+def test_the_source_has_its_distance(ball):
+    assert cases.error(ball.distance(ball.source), ball.exact()) < 8e-3
 
 
-def test_a_reversed_curve_changes_the_sign_alone(ball):
-    there = ball.circle()
-    back = [curve.reversed() for curve in there]
-    assert ball.distance(back) == pytest.approx(-ball.distance(there), abs=1e-9)
+def test_a_reversed_source_changes_the_sign_alone(ball):
+    back = ball.kind.reversed(ball.source)
+    assert ball.distance(back) == pytest.approx(-ball.distance(ball.source), abs=1e-8)
 
 
 def test_the_same_input_gives_the_same_bits(ball):
-    again = sh.SignedHeatSolver(BALLS[ball.name](1))
-    assert np.array_equal(again.distance(ball.circle()).values, ball.distance(ball.circle()))
+    again = sh.SignedHeatSolver(ball.kind.make(1))
+    assert np.array_equal(known(again.distance(ball.source).values), ball.distance(ball.source))
 
 
-def test_a_broken_circle_is_nearly_as_good(ball):
-    (whole,) = ball.circle()
-    n = whole.n_points
-    parts = [slice(0, int(0.3 * n)), slice(int(0.42 * n), int(0.6 * n)), slice(int(0.7 * n), int(0.95 * n))]
-    broken = [sh.Curve(whole.faces[p], whole.barycentric[p]) for p in parts]
-    assert cases.error(ball.distance(broken), latitude(ball.domain)) < 0.02
+def test_a_broken_source_is_nearly_as_good(ball):
+    assert cases.error(ball.distance(ball.kind.broken(ball.domain)), ball.exact()) < 0.02
 
 
 @pytest.mark.parametrize(
     "constraint", [sh.Free(), sh.ZeroSet(), sh.ZeroSet(hard=True), sh.EachComponent(), sh.Soft(20.0)]
 )
-def test_constraints_keep_a_circle_where_it_is(ball, constraint):
-    phi = ball.distance(ball.circle(), constraint)
-    assert cases.error(phi, latitude(ball.domain)) < 1e-2
+def test_constraints_keep_a_source_where_it_is(ball, constraint):
+    assert cases.error(ball.distance(ball.source, constraint), ball.exact()) < 1e-2
 
 
 def test_levels_may_be_given(ball):
-    circles = [ball.circle(0.0)[0], ball.circle(0.5)[0]]
-    levels = [0.0, np.arcsin(0.5)]
-    phi = ball.distance(circles, sh.LevelValues(levels))
-    assert cases.error(phi, latitude(ball.domain, 0.0)) < 1e-2
+    heights = (0.0, 0.5)
+    sources = [ball.kind.source(ball.domain, height)[0] for height in heights]
+    levels = ball.kind.levels(*heights)
+    phi = ball.distance(sources, sh.LevelValues(levels))
+    assert cases.error(phi, ball.exact(0.0)) < 1e-2
 
 
-def test_isolated_points_and_unoriented_curves_have_unsigned_distance(ball):
-    pole = int(np.argmax(positions(ball.domain) @ TILT))
-    phi = ball.distance(ball.domain.points_at(pole))
-    exact = np.arccos(
-        np.clip((positions(ball.domain) / np.linalg.norm(positions(ball.domain), axis=1)[:, None]) @ TILT, -1, 1)
-    )
-    assert cases.error(phi, exact) < 0.05
-    (circle,) = ball.circle()
-    unoriented = sh.Curve(circle.faces, circle.barycentric, closed=circle.closed, oriented=False)
-    assert cases.error(ball.distance(unoriented), np.abs(latitude(ball.domain))) < 0.06
+def test_several_sources_at_once_are_as_one_after_the_other(ball):
+    several = [ball.kind.source(ball.domain, height) for height in (0.1, 0.4)]
+    together = ball.solver.distance_many(several)
+    for field, sources in zip(together, several, strict=True):
+        assert known(field.values) == pytest.approx(ball.distance(sources), abs=1e-6)
 
 
-def test_scale(ball):
-    if ball.name == "voxels":
-        large = sh.DigitalSurface(ball.domain.volume, 8 * ball.domain.spacing, 8 * ball.domain.origin)
-    elif ball.name == "points":
-        large = sh.PointCloud(8 * ball.domain.points)
-    elif ball.name == "polygons":
-        large = sh.PolygonMesh(8 * ball.domain.vertices, ball.domain.polygons)
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 8.0])
+def test_rigid_motion_and_scale(ball, scale):
+    shift = np.array([7.0, -3.0, 5.0]) * scale
+    moved = ball.kind.moved(ball.domain, scale, shift)
+    phi = sh.SignedHeatSolver(moved).distance(ball.kind.source_moved(moved, scale, shift)).values.ravel()
+    there = scale * positions(ball.domain) @ TURN.T + shift
+    gap, same = cKDTree(positions(moved)).query(there[free(ball.domain)])
+    assert gap.max() < 1e-9 * scale
+    if ball.name == "points":  # among points nearly at one distance, rounding says which are neighbours
+        assert np.median(np.abs(phi[same] / scale - ball.distance(ball.source))) < 1e-9
     else:
-        large = sh.TriangleMesh(8 * ball.domain.vertices, ball.domain.faces)
-    phi = sh.SignedHeatSolver(large).distance(ball.circle()).values
-    assert phi / 8 == pytest.approx(ball.distance(ball.circle()), abs=1e-9)
+        assert phi[same] / scale == pytest.approx(ball.distance(ball.source), abs=ball.kind.deviation)
+
+
+@pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if kind.mixed])
+def test_the_order_of_vertices_and_cells_does_not_matter(name):
+    kind = KINDS[name]
+    domain = kind.make(1)
+    mixed, order = kind.mixed(domain, np.random.default_rng(0))
+    phi = sh.SignedHeatSolver(domain).distance(kind.source(domain)).values
+    again = sh.SignedHeatSolver(mixed).distance(kind.source(mixed)).values
+    assert again == pytest.approx(phi[order], abs=1e-4)
 
 
 def test_fields_have_values_gradients_and_contours_anywhere(ball):
-    field = ball.solver.distance(ball.circle())
-    assert field(positions(ball.domain)[:9]) == pytest.approx(field.values[:9], abs=1e-9)
-    if ball.name != "voxels":  # whose squares are no tangent planes
-        assert np.median(np.linalg.norm(field.face_gradients, axis=1)) == pytest.approx(1, abs=0.02)
-    (contour,) = field.contour(0.2)
-    assert contour.closed
-    assert field(contour) == pytest.approx(0.2, abs=1e-9)
-    with pytest.raises(sh.OutsideError, match="nowhere"):
+    field = ball.solver.distance(ball.source)
+    places = positions(ball.domain)[free(ball.domain)][100:109]
+    assert field(places) == pytest.approx(known(field.values)[100:109], abs=1e-9)
+    level = 0.2
+    if not ball.is_surface:
+        assert np.median(np.linalg.norm(field.gradient(places), axis=1)) == pytest.approx(1, abs=0.03)
+        surface = field.contour(level)
+        assert np.linalg.norm(surface.vertices, axis=1) == pytest.approx(1.2, abs=0.05)
+        assert field(surface.vertices) == pytest.approx(level, abs=0.02)
+    else:
+        if ball.name != "voxels":  # whose squares are no tangent planes
+            assert np.median(np.linalg.norm(field.face_gradients, axis=1)) == pytest.approx(1, abs=0.02)
+        (contour,) = field.contour(level)
+        assert contour.closed
+        assert field(contour) == pytest.approx(level, abs=1e-9)
+    with pytest.raises(sh.OutsideError, match=r"nowhere|outside the values"):
         field.contour(9.0)
 
 
-@pytest.mark.parametrize("name", BALLS)
+@pytest.mark.parametrize("name", [name for name in KINDS if name != "grid"])  # which is one part
 def test_a_part_without_source_is_nan_with_one_warning_and_the_rest_as_without_it(name):
-    one, two = BALLS[name](1), BALLS[name](2)
-    first = positions(two)[:, 0] < 1.1
-    exact = latitude(two)
-    (circle,) = two.level_set(np.where(first, exact, np.nan))
+    kind = KINDS[name]
+    one, two = kind.make(1), kind.make(2)
+    has_value = np.zeros(len(positions(two)), dtype=bool)
+    has_value[free(two)] = True
+    first = (positions(two)[:, 0] < APART / 2) & has_value
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        phi = sh.SignedHeatSolver(two).distance(circle).values
+        phi = sh.SignedHeatSolver(two).distance(kind.source(two)).values.ravel()
     assert [w.category for w in caught] == [sh.UnreachedWarning]
     assert np.array_equal(np.isnan(phi), ~first)
-    alone = sh.SignedHeatSolver(one).distance(one.level_set(latitude(one))).values
-    assert cases.error(phi[first], exact[first]) == pytest.approx(cases.error(alone, latitude(one)), abs=2e-3)
+    alone = known(sh.SignedHeatSolver(one).distance(kind.source(one)).values)
+    exact = kind.exact(two)
+    assert cases.error(phi[first], exact[first]) == pytest.approx(
+        cases.error(alone, kind.exact(one)[free(one)]), abs=2e-3
+    )
 
 
 @pytest.mark.parametrize(
-    ("sources", "match"),
-    [
-        ([], "no source"),
-        (sh.Curve([0, 10**7], np.eye(3)[:2]), "face ids go from 0 to"),
-        (sh.PointCloud([[0, 0, 0]]), "Curve or SurfacePoints"),
-    ],
+    "sources", [[], sh.Curve([0, 10**7], np.eye(3)[:2]), sh.PointCloud([[0, 0, 0]]), "a circle", None]
 )
-def test_sources_that_do_not_fit_are_refused(ball, sources, match):
-    with pytest.raises(sh.SourceError, match=match):
+def test_sources_that_do_not_fit_are_refused(ball, sources):
+    said = r"no source|face ids go from 0 to|Curve or SurfacePoints|no normals|not (to )?a"
+    with pytest.raises(sh.SourceError, match=said):
         ball.solver.distance(sources)
 
 
 def test_a_vertex_that_does_not_exist_is_refused(ball):
-    with pytest.raises(sh.SourceError):
-        ball.domain.path([0, 10**7])
+    if ball.is_surface:
+        with pytest.raises(sh.SourceError):
+            ball.domain.path([0, 10**7])
+
+
+def test_level_values_must_be_as_many_as_the_sources(ball):
+    with pytest.raises(sh.ConstraintError, match="3 level values were given for 1 source"):
+        ball.distance(ball.source, sh.LevelValues([0.0, 1.0, 2.0]))
+
+
+def test_isolated_points_and_unoriented_curves_have_unsigned_distance_on_surfaces(ball):
+    if not ball.is_surface:
+        return
+    unit = positions(ball.domain) / np.linalg.norm(positions(ball.domain), axis=1, keepdims=True)
+    pole = int(np.argmax(positions(ball.domain) @ TILT))
+    phi = ball.distance(ball.domain.points_at(pole))
+    assert cases.error(phi, np.arccos(np.clip(unit @ TILT, -1, 1))) < 0.05
+    (circle,) = ball.source
+    unoriented = sh.Curve(circle.faces, circle.barycentric, closed=circle.closed, oriented=False)
+    assert cases.error(ball.distance(unoriented), np.abs(ball.exact())) < 0.06
+
+
+LINE = [[-1, 0.21, 0], [1, 0.21, 0]]
+SHEET = sh.TriangleMesh(np.array([[-1, 0.21, -1], [-1, 0.21, 1], [1, 0.21, 1], [1, 0.21, -1]]), [[0, 1, 2], [0, 2, 3]])
+
+
+def tet_plate(n=(10, 10, 3)):
+    mesh = tet_cases.boxes(n, 0.2, jitter=0.1)
+    return sh.TetMesh(mesh.vertices - [1, 1, 0.3], mesh.tets)
 
 
 PLATES = {
     "triangles": lambda: sh.TriangleMesh(*cases.triangles(20)),
     "polygons": lambda: sh.PolygonMesh(*cases.bricks(20)),
     "points": lambda: sh.PointCloud(cases.quads(20, 0.3)[0], np.tile([0.0, 0, 1], (441, 1))),
+    "tets": tet_plate,
+    "grid": lambda: sh.Grid((-1, -1, -0.3), 0.1, (21, 21, 7)),
+    "walled grid": lambda: sh.Grid((-1, -1, -0.3), 0.1, (21, 21, 7), np.arange(7) * np.ones((21, 21, 1)) > 4),
 }
 
 
 @pytest.mark.parametrize("name", PLATES)
 def test_distance_runs_straight_into_a_boundary(name):
     plate = PLATES[name]()
-    line = plate.polyline([[-1, 0.21, 0], [1, 0.21, 0]])
-    phi = sh.SignedHeatSolver(plate).distance(line).values
-    assert phi == pytest.approx(positions(plate)[:, 1] - 0.21, abs=0.01)
+    line = SHEET if name in ("tets", "grid", "walled grid") else plate.polyline(LINE)
+    phi = known(sh.SignedHeatSolver(plate).distance(line).values)
+    assert phi == pytest.approx(positions(plate)[free(plate)][:, 1] - 0.21, abs=0.01)
 
 
 def ugly_triangles():
@@ -241,15 +251,54 @@ def ugly_voxels():
     return sh.DigitalSurface(volume, 0.1, (-0.95, -0.95, -0.15))
 
 
-@pytest.mark.parametrize("make", [ugly_triangles, ugly_polygons, ugly_points, ugly_voxels], ids=lambda f: f.__name__)
-def test_ugly_but_valid_surfaces_work(make):
+def ugly_tets():
+    """A plate of tets with flat, double and overlapping ones, others inside out, a vertex that none uses, and more tets
+    that hang on an edge and on a vertex."""
+    plate = tet_plate()
+    vertices, tets = plate.vertices.copy(), plate.tets.tolist()
+    middle = vertices[tets[300]].mean(axis=0)
+    flat = int(np.argmin(np.linalg.norm(vertices - [0.6, -0.6, 0], axis=1)))
+    vertices[flat] = vertices[plate.tets[(plate.tets == flat).any(axis=1)][0]].mean(axis=0)
+    n = len(vertices)
+    more = [
+        [1, 5, 9, 9],
+        tets[50],
+        tets[51][::-1],
+        [*tets[300][:3], n],
+        [0, 1, n + 1, n + 2],
+        [3, *range(n + 3, n + 6)],
+    ]
+    hanging = [[-1.5, -1, -1], [-1.5, -0.8, -1], [-1.5, -1.3, -0.3], [-1.3, -1.5, -0.3], [-1.3, -1.3, -0.5]]
+    return sh.TetMesh(np.concatenate([vertices, [middle], hanging, [[9, 9, 9]]]), [*tets, *more])
+
+
+def ugly_grid():
+    """A plate of flat cells with solid nodes that touch along edges and at corners, a hole, and a closed chamber."""
+    solid = np.zeros((41, 41, 7), dtype=bool)
+    solid[8, 8, 3], solid[9, 9, 3], solid[10, 10, 4] = True, True, True
+    solid[18:22, 18:22] = True
+    solid[30:35, 4:9, 1:6] = True
+    solid[31:34, 5:8, 2:5] = False
+    return sh.Grid((-1, -1, -0.15), (0.05, 0.05, 0.05), solid.shape, solid)
+
+
+UGLY = [ugly_triangles, ugly_polygons, ugly_points, ugly_voxels, ugly_tets, ugly_grid]
+
+
+@pytest.mark.parametrize("make", UGLY, ids=lambda f: f.__name__)
+def test_ugly_but_valid_domains_work(make):
     domain = make()
-    line = domain.polyline([[-0.9, 0.33, 0], [0.9, 0.33, 0]], max_distance=1.0)
+    if isinstance(domain, sh.Grid | sh.TetMesh):
+        line = sh.TriangleMesh(SHEET.vertices * [2, 1, 2] + [0, 0.12, 0], SHEET.faces)
+    else:
+        line = domain.polyline([[-0.9, 0.33, 0], [0.9, 0.33, 0]], max_distance=1.0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sh.UnreachedWarning)
-        phi = sh.SignedHeatSolver(domain).distance(line, sh.Free()).values
+        phi = sh.SignedHeatSolver(domain).distance(line, sh.Free()).values.ravel()
     place = positions(domain)
-    plate = (np.abs(place) < 0.8).all(axis=1) & (np.abs(place[:, 2]) < 0.2)
+    plate = np.zeros(len(place), dtype=bool)
+    plate[free(domain)] = True
+    plate &= (np.abs(place) < 0.8).all(axis=1) & (np.abs(place[:, 2]) < 0.2)
     assert np.isfinite(phi[plate]).mean() > 0.98
     beside = plate & np.isfinite(phi) & (np.abs(place[:, 1] - 0.33) < 0.5) & (np.abs(place[:, 1] - 0.33) > 0.2)
     if not isinstance(domain, sh.DigitalSurface):  # whose plate has two sides
