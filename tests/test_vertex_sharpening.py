@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 import signedheat as sh
 from signedheat.discretization import discretize
-from signedheat.operators.exact_geodesics import distance_to_zero_line
+from signedheat.operators.exact_geodesics import distance_to_edges_and_points, distance_to_zero_line
 from signedheat.samples import sphere, torus
 
 
@@ -86,6 +86,26 @@ def test_merging_hardly_changes_curved_surfaces(build):
     values = mesh.vertices @ [0.3, 0.2, 0.9] - 0.21
     exact, fast = (zero_line(mesh, values, tolerance) for tolerance in (0.0, 1e-4))
     assert np.abs(fast - exact).max() < 1e-3 * mesh.edge_lengths.mean()
+
+
+def test_no_vertex_is_lost_between_merged_windows():
+    """A capsule, whose regular triangles put vertices right where windows meet.
+
+    One vertex used to be reached 2.5 edges too late, by way of its neighbours.
+    """
+    import trimesh
+
+    shape = trimesh.creation.capsule(1, 0.3)
+    triangles = discretize(sh.TriangleMesh(shape.vertices, shape.faces)).triangles
+    none, edge = np.empty(0, dtype=int), triangles.edge_lengths.mean()
+    for seed in (3, 7, 11, 15, 21):
+        rng = np.random.default_rng(seed)
+        points = rng.integers(0, triangles.n_vertices, rng.integers(1, 9))
+        exact, fast = (
+            distance_to_edges_and_points(triangles, none, points, none, np.empty(0, complex), tolerance)[0]
+            for tolerance in (0.0, 1e-4)
+        )
+        assert np.abs(fast - exact).max() < 0.01 * edge
 
 
 def test_sphere_converges_with_order_two():

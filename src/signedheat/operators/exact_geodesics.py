@@ -196,9 +196,13 @@ def _propagate(faces, bends, lamps, tolerance):
             d1x, d1y = ray(w, s1)
             left = d0x * cy - d0y * (cx - s0)  # negative: the ray leaves the apex to its right
             right = d1x * cy - d1y * (cx - s1)
-            blur = _ROUND * length
-            if left <= blur * np.hypot(d0x, d0y) and right >= -blur * np.hypot(d1x, d1y):
-                _reach(faces.vertices[face, (side + 2) % 3], arrival(w, cx, cy), heap, distance, bends)
+            if left > 0.0:  # the apex lies beside the light, in a gap between windows perhaps: by way of their end
+                to_apex = arrival(w, s0, 0.0) + np.hypot(cx - s0, cy)
+            elif right < 0.0:
+                to_apex = arrival(w, s1, 0.0) + np.hypot(cx - s1, cy)
+            else:
+                to_apex = arrival(w, cx, cy)
+            _reach(faces.vertices[face, (side + 2) % 3], to_apex, heap, distance, bends)
             turned = unit * (w[P] + up * w[Q])
             source, normal = (origin, turned) if w[KIND] == BEAM else (origin + turned, 0j)
             if left < 0.0:  # light on the side from tail to apex
