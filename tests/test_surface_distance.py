@@ -167,6 +167,61 @@ def test_dependent_rows_are_no_obstacle():
     assert np.abs(field.source.rows @ field.values).max() < 1e-8 * 0.05
 
 
+def level_sets(mesh, rng):
+    heights = mesh.vertices @ rng.normal(size=3)
+    return mesh.level_set(heights, float(np.median(heights)))
+
+
+def zigzag(mesh, rng):
+    """Nine crossings of one edge, back and forth between its faces."""
+    edge = rng.integers(len(mesh.edges.vertices))
+    face, side = np.argwhere(mesh.edges.of_faces == edge)[0]
+    other = np.flatnonzero((mesh.edges.of_faces == edge).any(axis=1))[1]
+    crossings = np.zeros((9, 3))
+    crossings[:, (side + 1) % 3] = np.linspace(0.1, 0.9, 9)
+    crossings[:, side] = 1 - crossings[:, (side + 1) % 3]
+    weights = np.stack([crossings, np.tile([0.3, 0.3, 0.4], (9, 1))], axis=1).reshape(-1, 3)
+    return sh.Curve(np.ravel([[face, (face, other)[k % 2]] for k in range(9)]), weights)
+
+
+def there_and_back(mesh, rng):
+    return [
+        level_sets(mesh, rng)[0],
+        mesh.path(mesh.edges.vertices[rng.integers(len(mesh.edges.vertices))], closed=True),
+    ]
+
+
+def round_a_vertex(mesh, rng):
+    vertex = rng.integers(mesh.n_vertices)
+    around = np.flatnonzero((mesh.faces == vertex).any(axis=1))
+    corner = np.eye(3)[(mesh.faces[around] == vertex).argmax(axis=1)]
+    loop = sh.Curve(around, corner + 1e-7 * (1 / 3 - corner), closed=True)
+    return [level_sets(mesh, rng)[0], loop]
+
+
+def random_polyline(mesh, rng):
+    return mesh.polyline(mesh.vertices[rng.integers(mesh.n_vertices, size=40)] + 0.02 * rng.normal(size=(40, 3)))
+
+
+def almost_the_same(mesh, rng):
+    points = mesh.vertices[rng.integers(mesh.n_vertices, size=5)]
+    curve = mesh.polyline(points)
+    return [curve, curve, mesh.polyline(points + 1e-6)]
+
+
+@pytest.mark.parametrize("make", [level_sets, zigzag, there_and_back, round_a_vertex, random_polyline, almost_the_same])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_zero_set_holds_to_rounding_however_curves_cross_the_mesh(make, seed):
+    mesh = sphere(3)
+    curve = make(mesh, np.random.default_rng(seed))
+    solver = sh.SignedHeatSolver(mesh)
+    usual, hard = (solver.distance(curve, constraint) for constraint in (sh.ZeroSet(), sh.ZeroSet(hard=True)))
+    tolerance = 1e-8 * solver.discretization.spacing
+    assert np.abs((usual.source.rows @ usual.values)[usual.source.pinned]).max() < tolerance
+    assert np.abs(hard.source.rows @ hard.values).max() < tolerance
+    assert np.ptp(usual.values) > 0.1
+
+
 def test_levels_that_contradict_each_other_are_refused():
     mesh = bumpy()
     x, y, _ = mesh.vertices.T

@@ -168,7 +168,7 @@ class SurfaceDiscretization:
     def _reached_by(self, vectors: NDArray[np.complex128]) -> NDArray[np.bool_]:
         """(n_vertices,) whether a vertex has a face on a part that holds vectors. Vectors only pass along edges."""
         parts = self.triangles.face_parts
-        if not parts.any() or not vectors.any():
+        if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
         lit = np.zeros(self.triangles.n_faces, dtype=bool)
         lit[parts[(vectors != 0)[self.triangles.edges.of_faces].any(axis=1)]] = True

@@ -85,7 +85,7 @@ def surface_source(
     Raises
     ------
     SourceError
-        If there is no source, or one does not fit the surface.
+        If there is no source, one does not fit the surface, or they cancel.
 
     Examples
     --------
@@ -109,6 +109,11 @@ def surface_source(
         at_vertex = nodes.kinds == VERTEX
         vectors += spacing * vertex_point_vectors(triangles, nodes.elements[at_vertex])
         vectors += np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
+    elif np.abs(vectors).max() <= 1e-12 * max(part.lengths.max() for part in parts):
+        raise SourceError(
+            "the curves cancel: all of them run both ways, or close inside single faces, so that no side is positive; "
+            "make them unoriented (oriented=False), or the faces smaller"
+        )
 
     components = connected(parts)
     outside = np.concatenate([p.nodes.kinds != FACE for p in parts])
