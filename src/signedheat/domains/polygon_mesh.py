@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -53,7 +54,7 @@ class PolygonMesh(Exchangeable, Surface):
         if (counts < 3).any():
             first = int(np.argmax(counts < 3))
             raise GeometryError(f"polygon {first} has {counts[first]} corners, and needs at least 3")
-        corners = np.concatenate([np.asarray(p) for p in polygons])
+        corners = np.array(list(itertools.chain.from_iterable(polygons)))
         if not np.issubdtype(corners.dtype, np.integer):
             raise GeometryError(f"polygons must hold integer vertex ids, not {corners.dtype}")
         offsets = np.concatenate([[0], np.cumsum(counts)])
