@@ -198,7 +198,7 @@ def _sums(values: NDArray[np.float64], groups: NDArray[np.int64], n_groups: int)
 
 
 def _solve_symmetric(matrices: NDArray[np.float64], loads: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solutions of positive semidefinite systems, nearly of least norm: a flat polygon knows no way out of its plane."""
+    """Solutions of semidefinite systems, nearly of least norm: a flat polygon knows no way out of its plane."""
     size = np.trace(matrices, axis1=1, axis2=2)
     held = matrices + (1e-11 * np.where(size > 0, size, 1))[:, None, None] * np.eye(3)
     return np.linalg.solve(held, loads[..., None])[..., 0]
