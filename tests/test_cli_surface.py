@@ -60,6 +60,12 @@ def test_levels(files, capsys):
         ({"constraint": "hopeful"}, 2, "none of"),
         ({"diffusion": "-1"}, 2, "not positive"),
         ({"constraint": "levels:a"}, 2, "no finite number"),
+        ({"constraint": "soft:-1"}, 2, "argument --constraint: -1 is not positive ("),
+        (
+            {"constraint": "zero"},
+            2,
+            "'zero' is none of free, zero-set, hard, each-component, soft:WEIGHT, l",
+        ),
     ],
 )
 def test_failures_are_one_line(files, capsys, change, status, message):

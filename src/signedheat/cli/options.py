@@ -77,14 +77,14 @@ def add_grid_options(parser: Parser) -> None:
     parser.add_argument("--preview", metavar="PNG", help="draw the result: in space, three slices")
 
 
-def constraint(word: str) -> Constraint:
-    """A constraint from its name on the command line."""
+def constraint(word: str, with_numbers: str = "soft:WEIGHT") -> Constraint:
+    """A constraint from its name on the command line; messages also name those `with_numbers`."""
     name, _, weight = word.partition(":")
     known = {"free": Free(), "zero-set": ZeroSet(), "hard": ZeroSet(hard=True), "each-component": EachComponent()}
     if name == "soft":
         return Soft(positive(weight))
     if word not in known:
-        raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(known)}, soft:WEIGHT")
+        raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(known)}, {with_numbers}")
     return known[word]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from argparse import Namespace
 from typing import Any
 
@@ -47,7 +46,7 @@ def add_curves_and_output(parser: Parser, output: str) -> None:
         type=surface_constraint,
         default=ZeroSet(),
         metavar="C",
-        help="free, zero-set (default), each-component, soft:WEIGHT, or levels:V,V,…, one for each curve of the file",
+        help="free, zero-set (default), hard, each-component, soft:WEIGHT, or levels:V,V,…, one for each curve",
     )
     parser.add_argument(
         "--diffusion",
@@ -115,7 +114,4 @@ def surface_constraint(word: str) -> Any:
     name, _, values = word.partition(":")
     if name == "levels":
         return LevelValues([finite(value) for value in values.split(",")])
-    try:
-        return constraint(word)
-    except argparse.ArgumentTypeError as error:
-        raise argparse.ArgumentTypeError(f"{error}, levels:V,V,…") from None
+    return constraint(word, with_numbers="soft:WEIGHT, levels:V,V,…")
