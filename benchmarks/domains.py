@@ -1,9 +1,10 @@
-"""Every surface domain beside its peer, on shapes with a known answer: time, memory, error, in one run.
+"""Every domain beside its peer, on shapes with a known answer: time, memory, error, in one run.
 
-    python benchmarks/domains.py [--sizes 4000 16000 64000]
+    python benchmarks/domains.py [--sizes 4000 16000 64000] [--volumes 70000 260000]
 
-Polygons and points: potpourri3d. Voxels have no peer: without corrected normals is the comparison. Every measurement
-runs in a process of its own, so that its peak memory is its own; numba kernels are compiled before any clock starts.
+Polygons and points: potpourri3d. The others have no peer here (signedheat3d has no wheel), but a comparison: voxels
+without corrected normals; tets and grids, with and without solid corners, plain beside sharpened. Each measurement runs
+in a process of its own, so that its peak memory is its own; numba kernels are compiled before any clock starts.
 """
 
 from __future__ import annotations
@@ -80,8 +81,65 @@ POLYGONS = {"sphere of quads": globe, "plate of hexagons": brick_plate}
 CLOUDS = {"sphere": sphere_cloud, "open cylinder": cylinder_cloud, "plane": plane_cloud}
 
 
+def lattice(size: int):
+    """About so many tets of a lattice in [−1.6, 1.6]³."""
+    import signedheat as sh
+
+    diagonal = sh.TriangleMesh(1.6 * np.array([[-1, -1, -1], [1, 1, 1], [-1, 1, 0]]), [[0, 1, 2]])
+    return sh.tetrahedralize(diagonal, resolution=round((size / 12) ** (1 / 3)), padding=0, grading=np.inf)
+
+
+def box_grid(size: int):
+    """About so many nodes in the same box."""
+    import signedheat as sh
+
+    n = round(size ** (1 / 3))
+    return sh.Grid((-1.6, -1.6, -1.6), 3.2 / (n - 1), (n, n, n))
+
+
+def walled_grid(size: int):
+    """The same, with solid corners, behind which nothing lies."""
+    import signedheat as sh
+
+    grid = box_grid(size)
+    return sh.Grid(grid.origin, grid.spacing, grid.shape, (np.abs(grid.points) > 1.15).all(axis=-1))
+
+
+VOLUMES = {"sphere in tets": lattice, "sphere in a grid": box_grid, "sphere in a walled grid": walled_grid}
+
+
+def measured_volume(program: str, make, size: int) -> dict:
+    """Distance to the unit sphere; "peer" is the plain field, "ours" the sharpened one where it can be."""
+    import trimesh
+
+    import signedheat as sh
+
+    ball = trimesh.creation.icosphere(subdivisions=5)
+    ball = sh.TriangleMesh(ball.vertices, ball.faces)
+
+    def run(domain):
+        field = sh.SignedHeatSolver(domain).distance(ball)
+        return field if program == "peer" or getattr(domain, "mask", None) is not None else sh.sharpen(field)
+
+    run(make(8000))
+    run(make(60000))  # beyond factorisation
+    domain = make(size)
+    before, begin = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
+    values = run(domain).values.ravel()
+    seconds, known = time.perf_counter() - begin, ~np.isnan(values)
+    places = domain.points.reshape(-1, 3) if isinstance(domain, sh.Grid) else domain.vertices
+    return {
+        "vertices": domain.n_tets if isinstance(domain, sh.TetMesh) else int(known.sum()),
+        "seconds": seconds,
+        "megabytes": (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024,
+        "error": cases.error(values[known], np.linalg.norm(places, axis=1)[known] - 1),
+    }
+
+
 def measured(program: str, kind: str, name: str, size: int) -> dict:
     """One measurement, in this process."""
+    if kind == "volumes":
+        return measured_volume(program, VOLUMES[name], size)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     if kind == "voxels":
         n = round(np.sqrt(size / 5.0))
@@ -157,20 +215,27 @@ def main() -> None:
     """Print one line per case, with ratios (below 1: ours is better)."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sizes", type=int, nargs="+", default=[4000, 16000, 64000])
+    parser.add_argument("--volumes", type=int, nargs="+", default=[70000, 260000], help="tets, or nodes")
     parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
         program, kind, name, size = arguments.one
         print(json.dumps(measured(program, kind, name, int(size))))
         return
-    print(f"{'case':32}{'vertices':>9} | {'ours s':>7}{'MB':>7}{'ε':>9} | {'peer s':>7}{'MB':>7}{'ε':>9} | ratios s, ε")
+    print(f"{'case':33}{'unknowns':>8} | {'ours s':>7}{'MB':>7}{'ε':>9} | {'peer s':>7}{'MB':>7}{'ε':>9} | ratios s, ε")
     table = [("polygons", n) for n in POLYGONS] + [("points", n) for n in CLOUDS] + [("voxels", "ball (raw as peer)")]
+    table += [("volumes", name) for name in VOLUMES]
     for kind, name in table:
-        for size in arguments.sizes:
+        previous = None
+        for size in arguments.volumes if kind == "volumes" else arguments.sizes:
             ours, peer = (in_process_of_its_own(p, kind, name, str(size)) for p in ("ours", "peer"))
             columns = [f"{r['seconds']:7.2f}{r['megabytes']:7.0f}{r['error']:9.1e}" for r in (ours, peer)]
             ratio = f"{ours['seconds'] / peer['seconds']:.2f}, {ours['error'] / max(peer['error'], 1e-15):.3f}"
-            print(f"{kind + ': ' + name:32}{ours['vertices']:9} | {columns[0]} | {columns[1]} | {ratio}", flush=True)
+            if previous is not None:
+                steps = [np.log(ours[key] / previous[key]) for key in ("seconds", "vertices")]
+                ratio += f", growth {steps[0] / steps[1]:.2f}"
+            previous = ours
+            print(f"{kind + ': ' + name:33}{ours['vertices']:8} | {columns[0]} | {columns[1]} | {ratio}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """Digital surfaces: surfels, corrected normals, and distance that converges because of them."""
 
+import contextlib
+
 import domain_cases as cases
 import numpy as np
 import pytest
@@ -135,6 +137,21 @@ def test_voxels_that_touch_along_an_edge_are_connected(offset):
     far = surface.vertices @ np.array(offset) > 17
     assert np.isfinite(phi).all()
     assert phi[far].min() > 2 and phi[far].mean() > 5
+
+
+@pytest.mark.parametrize("offset", [(1, 1, 1), (1, 0, 1)])
+def test_heat_passes_where_voxels_touch_along_an_edge_and_not_at_a_corner(offset):
+    """A corner has no width for heat to pass; on both sides of it lie surfaces of their own, which share a vertex."""
+    surface = sh.DigitalSurface(touching(offset), radius=1.5)
+    belt = surface.polyline([[1, 0.5, 1.3], [3, 0.5, 1.3], [5, 0.5, 1.3]])
+    at_corner = offset == (1, 1, 1)
+    with pytest.warns(sh.UnreachedWarning) if at_corner else contextlib.nullcontext():
+        phi = sh.SignedHeatSolver(surface).distance(belt).values
+    second = (surface.vertices > 5.4).all(axis=1) if at_corner else np.zeros(len(phi), dtype=bool)
+    shared = (surface.vertices == 5.5).all(axis=1)
+    assert np.array_equal(np.isnan(phi), second & ~shared)
+    assert shared.sum() == at_corner
+    assert np.isfinite(phi[shared]).all()
 
 
 def test_voxels_at_random_work():
