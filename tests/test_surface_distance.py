@@ -230,6 +230,11 @@ def test_levels_that_contradict_each_other_are_refused():
         sh.SignedHeatSolver(mesh).distance(crossing, sh.LevelValues([0.0, 0.0, 1.0]))
 
 
+def test_a_zero_set_at_every_vertex_leaves_zero():
+    square = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    assert np.abs(sh.SignedHeatSolver(square).distance(square.boundary_curves()).values).max() < 1e-15
+
+
 def test_soft_lies_between_free_and_zero_set():
     mesh = bumpy()
     solver, curves = sh.SignedHeatSolver(mesh), [mesh.region_boundary(mesh.vertices[mesh.faces[:, 0], 2] > 0.2)[0]]

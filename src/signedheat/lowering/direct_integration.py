@@ -217,7 +217,7 @@ def _conjugate_gradients(
 def _refuse_contradictions(rows: sparse.csr_matrix, levels: NDArray[np.float64], values: NDArray[np.float64]) -> None:
     gap = np.abs(levels - rows @ values)
     worst = int(gap.argmax())
-    if gap[worst] > 1e-4 * (np.abs(levels).max() + np.ptp(values)):
+    if np.ptp(levels) > 0 and gap[worst] > 1e-4 * (np.abs(levels).max() + np.ptp(values)):
         raise ConstraintError(
             f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: sources that meet or "
             "cross need the same level"
