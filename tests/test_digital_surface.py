@@ -149,9 +149,8 @@ def test_heat_passes_where_voxels_touch_along_an_edge_and_not_at_a_corner(offset
         phi = sh.SignedHeatSolver(surface).distance(belt).values
     second = (surface.vertices > 5.4).all(axis=1) if at_corner else np.zeros(len(phi), dtype=bool)
     shared = (surface.vertices == 5.5).all(axis=1)
+    assert shared.sum() == 1
     assert np.array_equal(np.isnan(phi), second & ~shared)
-    assert shared.sum() == at_corner
-    assert np.isfinite(phi[shared]).all()
 
 
 def test_voxels_at_random_work():
