@@ -229,6 +229,7 @@ def _write_vdb(field: GridField, path: Path) -> None:
     volume.transform = openvdb.createLinearTransform(matrix.tolist())
     volume.name = NAME
     volume["convention"] = CONVENTION
+    volume["spacing"] = " ".join(map(repr, field.grid.spacing.tolist()))  # the transform rounds it
     openvdb.write(str(path), grids=[volume])
 
 
@@ -242,7 +243,10 @@ def _read_vdb(path: PathLike) -> Parts:
         values = np.empty(tuple(upper - lower + 1), dtype=np.float32)
         volume.copyToArray(values, ijk=tuple(int(i) for i in lower))
         origin = np.array(volume.transform.indexToWorld(tuple(float(i) for i in lower)))
-        return values, origin, np.array(volume.transform.voxelSize())
+        spacing = np.array(volume.transform.voxelSize())
+        written = np.array(str(volume.metadata.get("spacing", "")).split(), dtype=np.float64)
+        same = written.shape == spacing.shape and np.allclose(written, spacing, rtol=1e-9, atol=0)
+        return values, origin, written if same else spacing
     except Exception as error:
         raise FileFormatError(f"{path}: it cannot be read as a VDB volume ({error}): write it again") from error
 
