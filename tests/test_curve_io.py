@@ -36,6 +36,17 @@ def test_curves_read_back_the_same(extension, tmp_path):
         assert np.abs(positions(mesh, old) - positions(mesh, new)).max() < 1e-15
 
 
+def test_strict_reading_refuses_points_that_share_no_face(tmp_path):
+    mesh = square(5)
+    walk = mesh.path([6, 7, 12, 11], closed=True)
+    sh.write_curves(tmp_path / "walk.txt", walk, mesh)
+    sh.write_curves(tmp_path / "jump.txt", [walk, mesh.path([0, 1, 24])], mesh)
+    assert len(sh.read_curves(tmp_path / "walk.txt", mesh, strict=True)) == 1
+    assert len(sh.read_curves(tmp_path / "jump.txt", mesh)) == 2
+    with pytest.raises(sh.SourceError, match=r"jump.txt: curve 1: points 1 and 2 share no face, nor .* 0 more"):
+        sh.read_curves(tmp_path / "jump.txt", mesh, strict=True)
+
+
 def test_obj_lines_read_back_as_the_same_lines(tmp_path):
     mesh = sphere(2)
     curves = [c for c in some_curves(mesh) if not isinstance(c, sh.Curve) or c.oriented][1:]

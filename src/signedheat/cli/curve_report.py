@@ -10,7 +10,8 @@ import numpy as np
 from ..operators.laid_out_triangles import LaidOutTriangles
 from ..sources.curves import Curve
 from ..sources.pieces import pieces
-from ..sources.places import EDGE, FACE, VERTEX, locate, shared_faces
+from ..sources.places import EDGE, FACE, VERTEX, locate
+from ..sources.tracing import gaps
 
 NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 
@@ -18,8 +19,7 @@ NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
     """One row per source: where its points lie, how its segments run, length, open ends."""
     mesh = surface.triangulation
-    corners = mesh.vertices[mesh.faces]
-    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    lengths = mesh.edge_lengths[mesh.edges.of_faces]
     triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     return [report(triangles, source, number) for number, source in enumerate(sources)]
 
@@ -37,8 +37,7 @@ def report(triangles: LaidOutTriangles, source: Any, number: int) -> dict[str, A
     }
     if not isinstance(source, Curve):
         return row
-    start = np.arange(source.n_segments)
-    apart = np.flatnonzero(shared_faces(triangles, places[start], places[(start + 1) % source.n_points]) < 0)
+    apart = gaps(triangles, places, source.closed)
     parts = pieces(source, triangles, number=number)
     degree = np.bincount(parts.ends.ravel(), minlength=len(parts.nodes))
     ends = [

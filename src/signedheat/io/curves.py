@@ -14,8 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, SourceError
+from ..operators.laid_out_triangles import LaidOutTriangles
 from ..sources.curves import Curve, SurfacePoints
+from ..sources.places import locate
+from ..sources.tracing import gaps
 from .curve_readers import (
     POINTS,
     SIGNED,
@@ -32,7 +36,7 @@ from .curve_readers import (
 from .files import PathLike, extension, replacing, unknown_extension
 
 
-def read_curves(path: PathLike, domain: Any) -> list[Curve | SurfacePoints]:
+def read_curves(path: PathLike, domain: Any, strict: bool = False) -> list[Curve | SurfacePoints]:
     """Read curves and points on a surface.
 
     Parameters
@@ -47,6 +51,8 @@ def read_curves(path: PathLike, domain: Any) -> list[Curve | SurfacePoints]:
         both projected onto the surface.
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface that the ids refer to.
+    strict : bool
+        Refuse curves with consecutive points that share no face, which are otherwise joined by shortest lines.
 
     Returns
     -------
@@ -58,7 +64,7 @@ def read_curves(path: PathLike, domain: Any) -> list[Curve | SurfacePoints]:
     FileFormatError
         If the file is missing, of unknown kind, or holds what the format does not have.
     SourceError
-        If the curves do not fit the surface.
+        If the curves do not fit the surface, or have gaps that `strict` forbids.
 
     Examples
     --------
@@ -74,11 +80,28 @@ def read_curves(path: PathLike, domain: Any) -> list[Curve | SurfacePoints]:
     try:
         found = READERS[extension(path)](path, domain)
         sources = [source if isinstance(source, Curve) else placed(source, domain) for source in found]
+        if strict:
+            refuse_gaps(sources, domain.triangulation)
     except SourceError as error:
         raise SourceError(f"{path}: {error}") from error
     if not sources:
         raise FileFormatError(f"{path}: there is no curve and no point: check that it is a file of curves")
     return sources
+
+
+def refuse_gaps(sources: Sequence[Curve | SurfacePoints], mesh: TriangleMesh) -> None:
+    """Raise a `SourceError` if consecutive points of a curve share no face."""
+    lengths = mesh.edge_lengths[mesh.edges.of_faces]
+    triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
+    for number, source in enumerate(sources):
+        if isinstance(source, Curve):
+            places = locate(triangles, source.faces, source.barycentric, f"curve {number}: point")
+            apart = gaps(triangles, places, source.closed)
+            if len(apart):
+                raise SourceError(
+                    f"curve {number}: points {apart[0]} and {(apart[0] + 1) % source.n_points} share no face, nor do "
+                    f"the ends of {len(apart) - 1} more segments: add points, or read without strict to join them"
+                )
 
 
 def write_curves(path: PathLike, curves: Any, domain: Any) -> None:

@@ -32,6 +32,12 @@ def join(
     return chained([places, middle]), starts, ends, pair
 
 
+def gaps(triangles: LaidOutTriangles, places: Places, closed: bool) -> NDArray[np.int64]:
+    """Which segments of a curve through places have ends that share no face."""
+    start = np.arange(len(places) if closed else len(places) - 1)
+    return np.flatnonzero(shared_faces(triangles, places[start], places[(start + 1) % len(places)]) < 0)
+
+
 def trace(triangles: LaidOutTriangles, start: Places, end: Places, name: str = "curve") -> tuple[Places, NDArray]:
     """Places on the shortest lines between starts and ends, where they cross edges or pass vertices.
 
