@@ -113,7 +113,7 @@ def test_vdb_keeps_single_precision_and_the_exact_grid(tmp_path):
     np.testing.assert_array_equal(back.grid.origin, grid.origin)
     np.testing.assert_array_equal(back.grid.spacing, grid.spacing)
     (tmp_path / "phi.vdb").write_bytes((tmp_path / "phi.vdb").read_bytes()[:200])
-    with pytest.raises(sh.FileFormatError, match="phi.vdb"):
+    with pytest.raises(sh.FileFormatError, match=r"phi\.vdb"):
         sh.load_field(tmp_path / "phi.vdb")
 
 
