@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from awful_cases import stretched_square
 from surface_cases import sphere
 
 import signedheat as sh
@@ -202,7 +203,7 @@ def test_surface_needs_something_that_curves_lie_on(ball, capsys):
 def test_close_completes_curves(ball, capsys):
     out, picture = ball / "whole.json", ball / "whole.png"
     text = succeed(capsys, "close", ball / "ball.ply", ball / "half.csv", "-o", out, "--preview", picture)
-    assert "1 curves, 1 of them closed" in text
+    assert "1 curve, 1 of them closed" in text
     mesh = sh.read(ball / "ball.ply")
     [whole] = sh.read_curves(out, mesh)
     [wanted] = sh.close_curves(mesh, sh.read_curves(ball / "half.csv", mesh))
@@ -248,3 +249,25 @@ def test_walls_come_from_pictures_and_volumes(tmp_path, capsys):
     (tmp_path / "bad.png").write_bytes(b"no picture")
     message = fail(capsys, "volume", tmp_path / "line.csv", "--mask", tmp_path / "bad.png", "-o", tmp_path / "x.npz")
     assert "bad.png: it is no picture" in message
+
+
+def test_intrinsic_triangles_for_meshes_with_large_angles(tmp_path, capsys):
+    mesh = stretched_square(300, 30.0)
+    mesh.save(tmp_path / "square.ply")
+    (tmp_path / "line.csv").write_text("-1 0.1 0\n1 0.1 0\n")
+    out = tmp_path / "phi.npz"
+    task = ("surface", tmp_path / "square.ply", tmp_path / "line.csv", "-o", out)
+    plain = succeed(capsys, *task)
+    assert "exceed 120°: --intrinsic is more accurate" in plain
+    worse = np.load(out)["values"]
+    assert "--intrinsic" not in succeed(capsys, *task, "--intrinsic")
+    better, exact = np.load(out)["values"], mesh.vertices[:, 1] - 0.1
+    assert np.abs(better - exact).max() < 1e-6 < np.abs(worse - exact).max()
+    np.save(tmp_path / "volume.npy", np.pad(np.ones((4, 4, 4), dtype=bool), 2))
+    assert "--intrinsic is for triangle meshes" in fail(
+        capsys, "surface", tmp_path / "volume.npy", tmp_path / "line.csv", "-o", out, "--intrinsic"
+    )
+
+
+def test_version(capsys):
+    assert sh.__version__ in succeed(capsys, "--version")

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 
+from .. import __version__
 from ..errors import SignedHeatError
 from . import close, contour, demo, info, morph, offset, surface, view, volume
 from .options import Parser
@@ -50,6 +51,7 @@ def _parser() -> Parser:
         description="Generalized signed distance to broken geometry: negative inside, positive outside, "
         "in the units of the file.",
     )
+    parser.add_argument("--version", action="version", version=f"signedheat {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
     for command in COMMANDS:
         command.add_to(commands)

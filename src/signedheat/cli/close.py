@@ -10,7 +10,7 @@ from ..io import CURVE_FORMATS, ensure_writable, write_curves
 from ..viewing import PICTURE_FORMATS
 from .computing import naming
 from .options import Summary, add_command
-from .surface import add_curves_and_output, measured
+from .surface import add_curves_and_output, advice, measured
 
 
 def add_to(commands: Any) -> None:
@@ -49,4 +49,5 @@ def run(arguments: Namespace) -> Summary:
         "n_curves": len(found),
         "n_closed": closed,
     }
-    return summary, f"{arguments.output}: {len(found)} curves, {closed} of them closed"
+    curve = "curve" if len(found) == 1 else "curves"
+    return summary, f"{arguments.output}: {len(found)} {curve}, {closed} of them closed{advice(field)}"

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints import LevelValues, ZeroSet
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
@@ -55,17 +56,31 @@ def add_curves_and_output(parser: Parser, output: str) -> None:
         metavar="T",
         help="diffusion time in squared spacings (1); larger values close gaps more roundly",
     )
+    parser.add_argument(
+        "--intrinsic",
+        action="store_true",
+        help="measure on better triangles of the same surface: for meshes with large angles, curves across faces",
+    )
 
 
 def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     """The surface, the curves, and the distance."""
     surface = read_surface(arguments.mesh)
+    if arguments.intrinsic and not isinstance(surface, TriangleMesh):
+        raise SourceError(f"{arguments.mesh}: --intrinsic is for triangle meshes; this is a {type(surface).__name__}")
     curves = read_curves(arguments.curves, surface)
     from ..solver import SignedHeatSolver
 
     with naming(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
-        field = SignedHeatSolver(surface, arguments.diffusion, progress).distance(curves, arguments.constraint)
+        solver = SignedHeatSolver(surface, arguments.diffusion, progress, arguments.intrinsic)
+        field = solver.distance(curves, arguments.constraint)
     return surface, curves, field
+
+
+def advice(field: Any) -> str:
+    """What would make the result more accurate."""
+    share = field.diagnostics.notes.get("large angles", 0.0)
+    return f"; {share:.0%} of the angles exceed 120°: --intrinsic is more accurate" if share else ""
 
 
 def run(parser: Parser, arguments: Namespace) -> Summary:
@@ -98,7 +113,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     text = f"{arguments.output}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
     if summary["unreached"]:
         text += f", {summary['unreached']} vertices without any source"
-    return summary, text
+    return summary, text + advice(field)
 
 
 def read_surface(path: str) -> Any:

@@ -183,4 +183,11 @@ def _(domain: TriangleMesh) -> SurfaceDiscretization:
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
     triangles = LaidOutTriangles.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)
-    return SurfaceDiscretization(domain, triangles, notes={"added to edge lengths": added} if added else {})
+    notes = {"added to edge lengths": added, "large angles": large_angles(triangles)}
+    return SurfaceDiscretization(domain, triangles, notes={name: note for name, note in notes.items() if note})
+
+
+def large_angles(triangles: LaidOutTriangles) -> float:
+    """Share of angles above 120°; 0 below 1 %. Where they are many, step 1 may turn directions far from the source."""
+    share = float((triangles.corner_cotangents < -(3**-0.5)).mean())
+    return share if share >= 0.01 else 0.0
