@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .laid_out_triangles import LaidOutTriangles
 from .lamps import Faces, Lamps, emit, light
-from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, hit, merge, outrun, ray, trim
+from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, hit, merge, outrun, put, ray, trim
 
 _ROUND = 1e-10
 
@@ -118,18 +118,19 @@ def _collect(state, latest, halfedge, at_tail, at_head, length, slack, tolerance
         count += 1
         number = following[number]
     chosen = np.empty((count, 6))
-    starts = np.empty(count)
     count, number = 0, latest[halfedge]
     while number >= 0:
         if not outrun(windows[number], at_tail, at_head, length, slack):
-            chosen[count] = windows[number]
-            starts[count] = windows[number, S0]
+            k = count
+            while k > 0 and chosen[k - 1, S0] > windows[number, S0]:
+                put(chosen[k - 1], chosen, k)
+                k -= 1
+            put(windows[number], chosen, k)
             count += 1
         number = following[number]
     latest[halfedge] = -1
-    chosen = chosen[:count][np.argsort(starts[:count])]
     if tolerance == 0.0:
-        return chosen
+        return chosen, count
     kept = 0
     for k in range(count):
         if kept > 0:
@@ -140,9 +141,9 @@ def _collect(state, latest, halfedge, at_tail, at_head, length, slack, tolerance
             continue
         if kept > 0 and merge(chosen[kept - 1], chosen[k], length, tolerance):
             continue
-        chosen[kept] = chosen[k]
+        put(chosen[k], chosen, kept)
         kept += 1
-    return chosen[:kept]
+    return chosen, kept
 
 
 @njit(cache=True, nogil=True)
@@ -151,7 +152,7 @@ def _propagate(faces, bends, lamps, tolerance):
     distance = np.full(n, np.inf)
     heap = [(0.0, 0)]
     heap.pop()
-    state = (np.empty((1024, 6)), np.empty(1024, dtype=np.int64), 0)
+    state = (np.empty((1024, 6)), np.empty(1024, dtype=np.int64), len(heap))  # none; a literal 0 compiles twice
     latest = np.full(3 * len(faces.vertices), -1, dtype=np.int64)  # window queued for each halfedge; others follow it
     slack = _ROUND + 2.0 * tolerance
     state = light(faces, lamps, state, heap, latest, distance, slack)
@@ -182,7 +183,9 @@ def _propagate(faces, bends, lamps, tolerance):
         edge = faces.edges[face, side]
         length = faces.lengths[edge]
         tail, head = faces.edge_vertices[edge]
-        here = _collect(state, latest, halfedge, distance[tail], distance[head], length, slack * length, tolerance)
+        here, n_here = _collect(
+            state, latest, halfedge, distance[tail], distance[head], length, slack * length, tolerance
+        )
         a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
         ahead = faces.forward[face, side]
         origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)
@@ -190,7 +193,8 @@ def _propagate(faces, bends, lamps, tolerance):
         apex = (faces.positions[face, (side + 2) % 3] - origin) * unit.conjugate()
         cx, cy = apex.real, abs(apex.imag)
         tail_side, head_side = ((side + 2) % 3, (side + 1) % 3) if ahead else ((side + 1) % 3, (side + 2) % 3)
-        for w in here:
+        for k in range(n_here):
+            w = here[k]
             s0, s1 = w[S0], w[S1]
             d0x, d0y = ray(w, s0)
             d1x, d1y = ray(w, s1)

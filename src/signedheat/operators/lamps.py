@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .laid_out_triangles import LaidOutTriangles
-from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun
+from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun, put
 
 
 class Faces(NamedTuple):
@@ -78,10 +78,10 @@ def emit(faces, state, heap, latest, distance, face, side, kind, t0, t1, point, 
         return state
     begin, end = faces.first_halfedge[edge], faces.first_halfedge[edge + 1]
     if count + end - begin >= len(windows):
-        more = np.empty((2 * len(windows), 6))
-        more[:count] = windows[:count]
-        links = np.empty(2 * len(windows), dtype=np.int64)
-        links[:count] = following[:count]
+        more, links = np.empty((2 * len(windows), 6)), np.empty(2 * len(windows), dtype=np.int64)
+        for k in range(count):
+            put(windows[k], more, k)
+            links[k] = following[k]
         windows, following = more, links
     w = windows[count]
     w[S0], w[S1], w[KIND] = t0 * length, t1 * length, kind
@@ -101,7 +101,7 @@ def emit(faces, state, heap, latest, distance, face, side, kind, t0, t1, point, 
     for k in range(begin, end):
         halfedge = faces.halfedges[k]
         if halfedge != 3 * face + side:
-            windows[count] = windows[first]
+            put(windows[first], windows, count)
             following[count] = latest[halfedge]
             if latest[halfedge] < 0:
                 heapq.heappush(heap, (near + 1.5 * length, halfedge))

@@ -16,6 +16,13 @@ S0, S1, P, Q, SIGMA, KIND = range(6)
 
 
 @njit(cache=True, nogil=True)
+def put(window, rows, k):
+    """Write a window to row k. By hand, as below: slices of arrays take long to compile."""
+    for i in range(6):
+        rows[k, i] = window[i]
+
+
+@njit(cache=True, nogil=True)
 def arrival(w, x, y):
     """From the source of a window to a point in the frame of its edge."""
     if w[KIND] == BEAM:
@@ -102,7 +109,8 @@ def merge(a, b, length, tolerance):
     if max(abs(error), abs(other)) > tolerance * length:
         return False
     merged[SIGMA] -= 0.5 * (max(error, other, 0.0) + min(error, other, 0.0))
-    a[:] = merged
+    for i in range(6):
+        a[i] = merged[i]
     return True
 
 
