@@ -77,8 +77,14 @@ def _foot(triangles, triangles_at, first_triangle, corners, near, x, y, z):
             square, a, b, g = _place(triangles[triangles_at[i]], x, y, z)
             if square < best:
                 best, found = square, triangles_at[i]
-                place[:] = a * triangles[found, 0] + b * triangles[found, 1] + g * triangles[found, 2]
+                for d in range(3):
+                    place[d] = a * triangles[found, 0, d] + b * triangles[found, 1, d] + g * triangles[found, 2, d]
     return found, place
+
+
+@njit(cache=True, nogil=True)
+def _length(point, x, y, z):
+    return np.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)
 
 
 @njit(cache=True, nogil=True)
@@ -126,7 +132,8 @@ def bent_distance(walls, points, first_tet, tets_at, triangles, corners, first_t
             x, y, z = points[v]
             square, a, b, g = _place(triangles[nearest[v]], x, y, z)
             t = triangles[nearest[v]]
-            feet[v] = a * t[0] + b * t[1] + g * t[2]
+            for d in range(3):
+                feet[v, d] = a * t[0, d] + b * t[1, d] + g * t[2, d]
             if _seen(walls, points, first_tet, tets_at, v, feet[v], slack):
                 distance[v], known[v] = np.sqrt(square), True
     heap = [(0.0, 0)]
@@ -158,14 +165,14 @@ def bent_distance(walls, points, first_tet, tets_at, triangles, corners, first_t
                 else:
                     near, foot = _foot(triangles, triangles_at, first_triangle, corners, nearest[u], x, y, z)
                     via, length, target = -1, 0.0, foot
-                length += np.sqrt((target[0] - x) ** 2 + (target[1] - y) ** 2 + (target[2] - z) ** 2)
+                length += _length(target, x, y, z)
                 if length >= distance[v]:
                     continue
                 if not _seen(walls, points, first_tet, tets_at, v, target, slack):
-                    step = points[u] - points[v]
-                    via, near, length = u, nearest[u], distance[u] + np.sqrt((step * step).sum())
-                    foot = feet[u]
+                    via, near, foot, length = u, nearest[u], feet[u], distance[u] + _length(points[u], x, y, z)
                 if length < distance[v]:
-                    distance[v], bend[v], nearest[v], feet[v] = length, via, near, foot
+                    distance[v], bend[v], nearest[v] = length, via, near
+                    for d in range(3):
+                        feet[v, d] = foot[d]
                     heapq.heappush(heap, (length, v))
     return distance, nearest, feet, hidden
