@@ -49,7 +49,9 @@ class VectorHeat:
 
     def solve(self, sources: Sequence[NDArray[np.complex128]]) -> list[list[NDArray[np.complex128]]]:
         """X for each X₀, in stages: each is known up to a factor of its own, and NaN nearer than where it begins."""
-        starts = np.stack([self._raised(vectors) for vectors in sources])
+        starts = np.zeros((len(sources), self.triangles.n_edges), dtype=np.complex128)
+        for vectors, start in zip(sources, starts, strict=True):
+            self._raise(vectors, start)
         together = self._solve(starts.T)
         return [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
 
@@ -69,7 +71,8 @@ class VectorHeat:
             border = self._at_border(stages[-1], faint, start)
             if not border.any():
                 return stages
-            start = self._raised(border)
+            start = np.zeros_like(border)
+            self._raise(border, start)
             stages.append(self._solve(start[:, None])[:, 0])
             stages[-1][~faint] = np.nan
             unknown = faint
@@ -86,16 +89,13 @@ class VectorHeat:
         forces = vector_heat_forces(self.triangles, self.time, np.where(faint, vectors, 0), around)
         return np.where(near_border, forces, np.where(faint, start, 0))
 
-    def _raised(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Scaled by a power of two, so that the largest X is about one."""
+    def _raise(self, vectors: NDArray[np.complex128], start: NDArray[np.complex128]) -> None:
+        """Put vectors into zeros, scaled by a power of two, so that the largest X is about one."""
         held = np.flatnonzero(vectors)
         largest = _size(vectors[held]).max(initial=0.0)
-        if largest == 0:
-            return vectors
-        raised = np.zeros_like(vectors)
-        steps = int(np.frexp(self._smallest_mass)[1] - np.frexp(largest)[1])
-        raised[held] = np.ldexp(vectors[held].view(np.float64), steps).view(np.complex128)
-        return raised
+        if largest > 0:
+            steps = int(np.frexp(self._smallest_mass)[1] - np.frexp(largest)[1])
+            start[held] = np.ldexp(vectors[held].view(np.float64), steps).view(np.complex128)
 
     def _solve(self, columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
         if self.factor.n == len(columns):
