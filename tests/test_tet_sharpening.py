@@ -90,6 +90,20 @@ def test_walls_without_thickness_between_are_not_seen_through():
     assert (sharp[above] <= low[above] + 1e-9).all()  # … and no longer than along axes
 
 
+def test_a_zero_set_beyond_a_gap_does_not_count():
+    """Two slabs with a narrow gap between; the zero set of the other one is nearer to every vertex of the upper."""
+    one = boxes((6, 6, 2), 0.25)
+    n = one.n_vertices
+    two = sh.TetMesh(
+        np.concatenate([one.vertices, one.vertices + np.array([0, 0, 0.51])]), np.concatenate([one.tets, one.tets + n])
+    )
+    x, z = two.vertices[:, 0], two.vertices[:, 2]
+    own = np.arange(2 * n) >= n
+    sharp = sh.sharpen(sh.TetField(two, np.where(own, x - 0.3, z - 0.48))).values
+    assert sharp[own] == pytest.approx((x - 0.3)[own], abs=1e-9)
+    assert sharp[~own] == pytest.approx((z - 0.48)[~own], abs=1e-9)
+
+
 def test_broken_source_is_measured_to_its_completion():
     whole = sphere(4)
     broken = sh.TriangleMesh(whole.vertices, whole.faces[np.random.default_rng(0).random(whole.n_faces) > 0.2])
@@ -100,7 +114,7 @@ def test_broken_source_is_measured_to_its_completion():
 
 
 def test_convex_method_holds_slopes_and_signs():
-    """It is no better than the plain field here (NUMERICS.md D: biased low), but it is what it says: |∇φ| ≤ 1."""
+    """It is no better than the plain field here (biased low), but it is what it says: |∇φ| ≤ 1."""
     mesh = lattice(12)
     plain = sh.SignedHeatSolver(mesh).distance(sphere(4))
     seen = []

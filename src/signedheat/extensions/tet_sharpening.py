@@ -26,15 +26,9 @@ LARGEST_BEND = 1.0
 @sharpen.register
 def _(field: TetField, method: Method | None = None, progress: Progress | None = None) -> TetField:
     lowered = discretize(field.mesh)
-    mesh, unknowns, n = field.mesh, lowered.unknowns, lowered.n_unknowns
-    elements = LinearElements.on_tets(mesh.geometry, unknowns, n)
-    vertices = np.empty(n, dtype=np.int64)
-    vertices[unknowns] = mesh.tets
-    new, diagnostics = sharpened(field, lowered, elements, field.values[vertices], method, progress)
-    known = np.flatnonzero(~np.isnan(new))  # parts that touch at a vertex may differ there, as in any field on tets
-    counts, sums = (np.bincount(vertices[known], w, mesh.n_vertices) for w in (None, new[known]))
-    values = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
-    return replace(field, values=values, diagnostics=diagnostics)
+    elements = LinearElements.on_tets(field.mesh.geometry, lowered.unknowns, lowered.n_unknowns)
+    new, diagnostics = sharpened(field, lowered, elements, field.values[lowered.vertices], method, progress)
+    return replace(field, values=lowered.at_vertices(new), diagnostics=diagnostics)
 
 
 @straight_distance.register
@@ -53,15 +47,13 @@ def _(
     from ..sources.clipping import barycentric
 
     mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
-    at_corners = values[unknowns]
-    points = np.empty((len(values), 3))
-    points[unknowns] = mesh.vertices[mesh.tets] - planes.center
+    points = mesh.vertices[lowered.vertices] - planes.center
     positions, corners, owners = level_triangles(points, unknowns, values, 0.0)
     if not len(corners):
         return np.full(len(values), np.inf), {}
     triangles = positions[corners]
     nearest, _ = nearest_on_triangles(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)), points)
-    nearest[unknowns[np.isnan(at_corners)]] = -1
+    nearest[np.isnan(values)] = -1
     walls = Walls(unknowns, tet_neighbors(mesh.faces), mesh.faces.of_tets, planes.normals, planes.offsets, planes.signs)
     distance, nearest, feet, hidden = bent_distance(
         walls,
@@ -70,6 +62,7 @@ def _(
         triangles,
         corners,
         *by_element(corners, len(positions), 3),
+        owners,
         nearest,
         GRAZING * lowered.spacing,
     )

@@ -203,19 +203,28 @@ class TetDiscretization:
         """b, the right-hand side of ``C φ = b``."""
         return self.mesh.geometry.divergence(directions, self.unknowns, self.n_unknowns)
 
+    @cached_property
+    def vertices(self) -> NDArray[np.int64]:
+        """(n,) vertex of the mesh at which each unknown is."""
+        vertices = np.empty(self.n_unknowns, dtype=np.int64)
+        vertices[self.unknowns] = self.mesh.tets
+        return vertices
+
+    def at_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of the mesh: means where parts of it touch, NaN where nothing is known."""
+        known = np.flatnonzero(~np.isnan(values))
+        vertices, n = self.vertices[known], self.mesh.n_vertices
+        counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[known], n)
+        return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+
     def field(self, values: NDArray[np.float64], source: TetSource, diagnostics: Diagnostics) -> TetField:
         """φ at the vertices of the mesh."""
-        at_corners = values[self.unknowns].ravel()
-        known = np.flatnonzero(~np.isnan(at_corners))
-        vertices, n = self.mesh.tets.ravel()[known], self.mesh.n_vertices
-        counts = np.bincount(vertices, minlength=n)
-        sums = np.bincount(vertices, weights=at_corners[known], minlength=n)
-        at_vertices = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+        at_vertices = self.at_vertices(values)
         unreached = np.flatnonzero(np.isnan(at_vertices))
-        if len(known) < len(at_corners):
+        if np.isnan(values).any():
             warnings.warn(
-                f"{(len(at_corners) - len(known)) // 4} of {self.mesh.n_tets} tets are not connected to any source "
-                "through faces: the distance there is NaN",
+                f"{np.isnan(values[self.unknowns]).any(axis=1).sum()} of {self.mesh.n_tets} tets are not connected to "
+                "any source through faces: the distance there is NaN",
                 UnreachedWarning,
                 stacklevel=2,
             )

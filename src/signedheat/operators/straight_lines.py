@@ -88,7 +88,9 @@ def _length(point, x, y, z):
 
 
 @njit(cache=True, nogil=True)
-def bent_distance(walls, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, nearest, slack):
+def bent_distance(
+    walls, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, owners, nearest, slack
+):
     """Distance of every vertex from triangles in the mesh.
 
     Parameters
@@ -107,6 +109,8 @@ def bent_distance(walls, points, first_tet, tets_at, triangles, corners, first_t
         Which of its corners coincide.
     first_triangle, triangles_at : int arrays
         Triangles by corner.
+    owners : (k,) int
+        The tet that each lies in.
     nearest : (n,) int
         The triangle nearest to each vertex; −1 for vertices that have no distance.
     slack : float
@@ -138,6 +142,17 @@ def bent_distance(walls, points, first_tet, tets_at, triangles, corners, first_t
                 distance[v], known[v] = np.sqrt(square), True
     heap = [(0.0, 0)]
     heap.pop()
+    for i in range(len(triangles)):  # what lies in a tet is seen from its corners, though it may not be the nearest
+        for k in range(4):
+            v = walls.tets[owners[i], k]
+            if not known[v] and nearest[v] >= 0:
+                x, y, z = points[v]
+                square, a, b, g = _place(triangles[i], x, y, z)
+                if square < distance[v] ** 2:
+                    distance[v], nearest[v] = np.sqrt(square), i
+                    for d in range(3):
+                        feet[v, d] = a * triangles[i, 0, d] + b * triangles[i, 1, d] + g * triangles[i, 2, d]
+                    heapq.heappush(heap, (distance[v], v))
     hidden = 0
     for v in range(n):
         if not known[v] and nearest[v] >= 0:
