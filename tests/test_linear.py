@@ -24,7 +24,7 @@ def surface():
 @pytest.mark.parametrize("ordered", [False, True])
 def test_solves_vector_heat(surface, backend, ordered):
     matrix = vector_heat_matrix(surface.triangles, surface.spacing**2)
-    order = elimination_order(matrix) if ordered else None
+    order = surface.triangles.edges.elimination_order(surface.vertex_order) if ordered else None
     rng = np.random.default_rng(0)
     truth = rng.normal(size=(matrix.shape[0], 3)) + 1j * rng.normal(size=(matrix.shape[0], 3))
     factor = factorize(matrix, backend, order)

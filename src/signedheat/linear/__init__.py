@@ -35,7 +35,9 @@ def available_backends() -> list[str]:
     ]
 
 
-def factorize(matrix: Any, backend: str | None = None, order: NDArray[np.integer] | None = None) -> Factor:
+def factorize(
+    matrix: Any, backend: str | None = None, order: NDArray[np.integer] | None = None, reused: bool = False
+) -> Factor:
     """Factorise a sparse Hermitian positive definite matrix.
 
     Parameters
@@ -46,6 +48,8 @@ def factorize(matrix: Any, backend: str | None = None, order: NDArray[np.integer
         One of `available_backends`; by default the environment variable ``SIGNEDHEAT_BACKEND``, or else the best.
     order : (n,) int, optional
         Fill-reducing elimination order, where one is known: ``order[k]`` is the unknown eliminated k-th.
+    reused : bool
+        Whether many solutions are wanted. PARDISO then finds an order of its own, for which it solves on all cores.
 
     Raises
     ------
@@ -66,7 +70,7 @@ def factorize(matrix: Any, backend: str | None = None, order: NDArray[np.integer
     if name == "pardiso":
         from .pardiso import PardisoFactor
 
-        return PardisoFactor(upper, order)
+        return PardisoFactor(upper, None if reused else order)
     if name == "cholmod":
         from .cholmod import CholmodFactor
 

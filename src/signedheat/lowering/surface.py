@@ -75,7 +75,7 @@ class SurfaceDiscretization:
 
     @cached_property
     def vertex_order(self) -> NDArray[np.int64]:
-        """Fill-reducing order of the vertices, found once for all factors of C under constraints."""
+        """Fill-reducing order of the vertices, from which that of the edges follows."""
         return elimination_order(self.stiffness)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
@@ -134,7 +134,8 @@ class SurfaceDiscretization:
         heat = self._heats.get(sources[0].time)
         if heat is None:
             self._heats.clear()
-            heat = self._heats[sources[0].time] = VectorHeat(self.triangles, sources[0].time)
+            order = self.triangles.edges.elimination_order(self.vertex_order)
+            heat = self._heats[sources[0].time] = VectorHeat(self.triangles, sources[0].time, order)
         return heat.solve([source.vectors for source in sources])
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:

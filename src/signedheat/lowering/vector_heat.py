@@ -31,15 +31,20 @@ class VectorHeat:
         The surface.
     time : float
         t.
+    order : (n_edges,) int
+        Fill-reducing order of the edges.
     """
 
     triangles: LaidOutTriangles
     time: float
+    order: NDArray[np.int64]
 
     @cached_property
     def factor(self) -> Factor:
         """Its factor."""
-        return factorize(vector_heat_matrix(self.triangles, self.time))
+        matrix = vector_heat_matrix(self.triangles, self.time)
+        parts = np.arange(matrix.shape[0] // self.triangles.n_edges)  # real and imaginary, or both in one
+        return factorize(matrix, order=(len(parts) * self.order[:, None] + parts).ravel(), reused=True)
 
     @cached_property
     def _smallest_mass(self) -> float:

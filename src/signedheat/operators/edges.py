@@ -31,6 +31,18 @@ class EdgeTable:
         """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
         return np.bincount(self.of_faces.ravel(), minlength=len(self.vertices))
 
+    def elimination_order(self, vertex_order: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Order that suits unknowns at edges, from a fill-reducing order of the vertices.
+
+        An edge goes with its end that is eliminated first. Edges from two parts that a set of vertices separates never
+        share a face, so the edges within that set separate them just as well: the order dissects edges as it does
+        vertices, for a fraction of the cost of finding one anew.
+        """
+        rank = np.empty(len(vertex_order), dtype=np.int64)
+        rank[vertex_order] = np.arange(len(vertex_order))
+        a, b = rank[self.vertices].T
+        return np.argsort((np.minimum(a, b) + 1) * len(rank) - np.maximum(a, b), kind="stable")
+
 
 def face_edges(faces: NDArray[np.int64]) -> EdgeTable:
     """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face).
