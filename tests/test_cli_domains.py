@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -271,3 +273,32 @@ def test_intrinsic_triangles_for_meshes_with_large_angles(tmp_path, capsys):
 
 def test_version(capsys):
     assert sh.__version__ in succeed(capsys, "--version")
+
+
+def test_tets_from_the_command_line(tmp_path, capsys):
+    """Around the shape, sharpened unless told otherwise; contoured, looked at and described again."""
+    sphere(4).save(tmp_path / "ball.stl")
+    flags = ("--tets", "--resolution", "8", "--padding", "0.3")
+    fields = []
+    for name, more in (("sharp.vtu", ()), ("plain.vtu", ("--plain",))):
+        succeed(capsys, "volume", tmp_path / "ball.stl", *flags, *more, "-o", tmp_path / name)
+        fields.append(sh.load_field(tmp_path / name))
+    errors = [np.abs(phi.values - np.linalg.norm(phi.mesh.vertices, axis=1) + 1).mean() for phi in fields]
+    assert errors[0] < 0.6 * errors[1] < 0.02
+    succeed(capsys, "contour", tmp_path / "sharp.vtu", "0.1", "-o", tmp_path / "shell.stl")
+    assert "open edges             0" in succeed(capsys, "info", tmp_path / "shell.stl")
+    for name in ("sharp.vtu", "shell.stl"):
+        succeed(capsys, "view", tmp_path / name, "-o", tmp_path / "picture.png")
+    fields[0].mesh.save(tmp_path / "bare.vtu")
+    succeed(capsys, "view", tmp_path / "bare.vtu", "-o", tmp_path / "picture.png")
+    message = fail(capsys, "volume", tmp_path / "ball.stl", *flags, "--mask", "x.npy", "-o", tmp_path / "x.vtu", code=2)
+    assert "do not go with --tets" in message
+
+
+def test_who_reads_the_output_may_stop_reading(tmp_path):
+    sphere(1).save(tmp_path / "ball.stl")
+    command = [sys.executable, "-m", "signedheat.cli", "info", str(tmp_path / "ball.stl")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait() == 0

@@ -190,7 +190,7 @@ def draw_shape(shape: Any, axes: Any, view: tuple[float, float] = (18, -58), max
     extent = np.maximum(upper - lower, 1e-3 * max(float((upper - lower).max()), np.finfo(float).tiny))
     axes.set(xlim=(lower[0], lower[0] + extent[0]), ylim=(lower[1], lower[1] + extent[1]))
     axes.set(zlim=(lower[2], lower[2] + extent[2]))
-    axes.set_box_aspect(extent, zoom=1.35)
+    axes.set_box_aspect(extent, zoom=0.75 * np.linalg.norm(extent) / extent.max())  # long shapes fit, too
     axes.view_init(*view)
     axes.set_axis_off()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Sequence
 
@@ -38,10 +39,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("signedheat: stopped; nothing half-written is left behind", file=sys.stderr)
         return 130
-    if arguments.json:
-        print(json.dumps(summary))
-    elif text and not arguments.quiet:
-        print(text)
+    try:
+        if arguments.json:
+            print(json.dumps(summary))
+        elif text and not arguments.quiet:
+            print(text)
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever was reading, such as `head`, has read enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
 
 

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from contextlib import suppress
 from typing import Any
 
+from ..domains.tet_mesh import TetMesh
+from ..errors import FileFormatError
+from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
 from ..io import FIELD_FORMATS, ensure_writable, load_field, read
 from ..io.files import extension
+from ..io.tets import TET_FIELD_FORMATS
 from ..viewing import PICTURE_FORMATS, save_scene, save_slices
 from .computing import naming
 from .options import Summary, add_command
+from .tets import on_grid
 
 
 def add_to(commands: Any) -> None:
@@ -29,13 +36,27 @@ def add_to(commands: Any) -> None:
 def run(arguments: Namespace) -> Summary:
     """Draw."""
     ensure_writable(arguments.output, PICTURE_FORMATS, "a picture")
-    is_field = extension(arguments.file) in FIELD_FORMATS
-    thing = load_field(arguments.file) if is_field else read(arguments.file)
+    thing = shape_or_field(arguments.file)
     with naming(arguments.file):
         if isinstance(thing, VertexField):
             from ..surface_pictures import save_surface
 
             save_surface(thing, arguments.output)
+        elif isinstance(thing, GridField):
+            save_slices(thing, arguments.output)
+        elif isinstance(thing, TetField):
+            save_slices(on_grid(thing), arguments.output)
         else:
-            (save_slices if is_field else save_scene)(thing, arguments.output)
+            save_scene(thing.boundary if isinstance(thing, TetMesh) else thing, arguments.output)
     return {"input": arguments.file, "output": arguments.output}, arguments.output
+
+
+def shape_or_field(path: str) -> Any:
+    """What a file holds; those of tets may hold either."""
+    if extension(path) in FIELD_FORMATS:
+        return load_field(path)
+    thing = read(path)
+    if isinstance(thing, TetMesh) and extension(path) in TET_FIELD_FORMATS:
+        with suppress(FileFormatError):
+            return load_field(path)
+    return thing
