@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from domain_cases import fitted_order
-from tet_cases import boxes, lattice, rectangle, rms, sphere
+from scipy.spatial import cKDTree
+from tet_cases import boxes, lattice, plain_recipe, rectangle, rms, sphere
 
 import signedheat as sh
 from signedheat.lowering import tets as lowering
+from signedheat.method import unit
 
 
 def distance(mesh, sources, constraint=None, diffusion=1.0):
@@ -79,6 +81,32 @@ def test_curved_sources_leave_no_offset(constraint):
     middles = ball.vertices[ball.faces].mean(axis=1)
     assert abs(phi(middles).mean()) < 0.001
     assert np.abs(np.linalg.norm(phi.contour().vertices, axis=1) - 1).mean() < 0.007
+
+
+def test_on_faces_of_the_mesh_it_is_the_plain_recipe():
+    """Two routes: what bounds the tets of a lattice that lie in a ball, as a source."""
+    mesh = lattice(12)
+    inside = np.linalg.norm(mesh.tet_barycenters, axis=1) < 1
+    shape = sh.TetMesh(mesh.vertices, mesh.tets[inside]).boundary
+    gap = distance(mesh, sh.TriangleMesh(mesh.vertices, same_vertices(mesh, shape)), sh.Free()).values
+    gap -= plain_recipe(mesh, sh.TriangleMesh(mesh.vertices, same_vertices(mesh, shape)))
+    assert np.ptp(gap) < 1e-4  # directions by conjugate gradients there, by elimination here
+
+
+def same_vertices(mesh, shape):
+    """Faces of a shape by the ids of a mesh that has its vertices."""
+    return cKDTree(mesh.vertices).query(shape.vertices)[1][shape.faces]
+
+
+def test_faint_vectors_point_where_elimination_says():
+    found = []
+    for direct in (False, True):
+        lowered = lowering.TetDiscretization(lattice(14), direct=direct)
+        vectors = lowered.diffuse(lowered.lower([sphere(3, 0.2)], 0.3))
+        found.append(unit(vectors))
+    sizes = np.linalg.norm(vectors, axis=1)
+    assert sizes.min() < 1e-20 * sizes.max()
+    assert np.linalg.norm(found[0] - found[1], axis=1).max() < np.radians(0.05)
 
 
 def test_a_source_that_follows_faces_is_pinned_to_their_vertices():

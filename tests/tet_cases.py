@@ -5,8 +5,10 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+from scipy import sparse
 
 import signedheat as sh
+from signedheat.linear import factorize
 
 
 def boxes(counts: tuple[int, int, int], size: float, keep=None, jitter: float = 0.0) -> sh.TetMesh:
@@ -52,3 +54,42 @@ def sphere(subdivisions: int = 4, radius: float = 1.0) -> sh.TriangleMesh:
 def rms(values: np.ndarray) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+def plain_recipe(mesh: sh.TetMesh, shape: sh.TriangleMesh) -> np.ndarray:
+    """φ at the vertices by Sec. 8.1 and App. B, on its own, step by step.
+
+    The faces of the shape, which are some of the mesh, name their vertices by the same ids. Its mean over them is zero.
+    """
+    vertices, tets = mesh.vertices, mesh.tets
+    corners = tets[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]]
+    p = vertices[corners]
+    normals = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0]) / 2
+    volumes = mesh.tet_volumes
+    triples, of_tets = np.unique(np.sort(corners.reshape(-1, 3)), axis=0, return_inverse=True)
+    of_tets = of_tets.reshape(-1, 4)
+    centers = vertices[triples].mean(axis=1)
+    products = np.einsum("mai,mbi->mab", normals, normals)
+
+    def assembled(ids, n, factors):
+        entries = (products * factors[:, None, None]).ravel()
+        return sparse.csr_matrix((entries, (np.repeat(ids, 4), np.tile(ids, 4).ravel())), shape=(n, n))
+
+    pairs = [(a, b) for a in range(4) for b in range(a)]
+    h = np.mean([np.linalg.norm(centers[of_tets[:, a]] - centers[of_tets[:, b]], axis=1) for a, b in pairs])
+    facing = {tuple(sorted(face)): face for face in shape.faces.tolist()}
+    on = np.array([tuple(triple) in facing for triple in triples.tolist()])
+    faces = np.array([facing[tuple(triple)] for triple in triples[on].tolist()])
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    sources = np.zeros((len(triples), 3))
+    sources[on] = np.cross(b - a, c - a) / 2
+    mass = sparse.diags_array(np.bincount(of_tets.ravel(), np.repeat(volumes / 4, 4)))
+    heat = sparse.csr_matrix(mass + h**2 * assembled(of_tets, len(triples), 1 / volumes))
+    y = factorize(heat).solve(sources)[of_tets].mean(axis=1)
+    y /= np.abs(y).max(axis=1, keepdims=True)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    right = -np.bincount(tets.ravel(), np.einsum("mai,mi->ma", normals, y).ravel() / 3, len(vertices))
+    laplacian = assembled(tets, len(vertices), 1 / (9 * volumes))
+    laplacian += sparse.csr_matrix(([1.0], ([0], [0])), shape=laplacian.shape)  # one vertex held
+    phi = factorize(sparse.csr_matrix(laplacian)).solve(right)
+    return phi - phi[np.unique(faces)].mean()

@@ -57,9 +57,9 @@ def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float | None = 
 
     Notes
     -----
-    On lattices, waves of heat are a little faster along some directions than others. Diffusing four times as long
-    (``diffusion=4``) halves the error that this makes on smooth shapes. Unstructured tets do not have it: see
-    `signedheat.extensions.tet_meshers` for those of TetGen and fTetWild.
+    On lattices, waves of heat are a little faster along some directions than others. `sharpen` mends the error that
+    this makes; diffusing four times as long (``diffusion=4``) halves it on smooth shapes. Unstructured tets have less
+    of it: see `signedheat.extensions.tet_meshers` for those of TetGen and fTetWild.
 
     Examples
     --------
