@@ -328,6 +328,20 @@ def test_vertices_all_but_on_a_boundary_do_not_need_hundreds_of_others():
         assert better.n_vertices < 40
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_refinement_ends_on_anything(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(5):
+        n, m = rng.integers(4, 60), rng.integers(2, 150)
+        vertices = rng.standard_normal((n, 3)) * 10.0 ** rng.integers(-8, 2, 3)
+        vertices[rng.integers(0, n, n // 3)] = vertices[rng.integers(0, n, n // 3)]
+        soup = sh.TriangleMesh(vertices, rng.integers(0, n, (m, 3)))  # some faces with a corner twice
+        better = sh.intrinsic_delaunay(soup, refine=True, max_vertices=800)
+        area, size = better.base.face_areas.sum(), better.base.edge_lengths.max()
+        assert better.triangles.face_areas.sum() == pytest.approx(area, rel=1e-5, abs=1e-9 * size**2 * better.n_faces)
+        assert np.isfinite(better.vertices).all() and (better.triangles.edge_lengths > 0).all()
+
+
 def test_progress_and_cancelling():
     mesh = squashed(sphere(5))
     seen = []

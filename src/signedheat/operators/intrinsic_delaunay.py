@@ -74,6 +74,7 @@ def glue(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = No
         start=start,
         length=lengths / unit,
         fixed=fixed,
+        flips=np.zeros(n_edges, dtype=np.int64),
         counts=np.array([triangles.n_faces, n_edges, triangles.n_vertices, 0, 0]),
         steps=np.empty((2 * n_edges + 64, 4), dtype=np.int64),
         weights=np.empty((2 * n_edges + 64, 4)),

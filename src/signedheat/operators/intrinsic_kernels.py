@@ -17,6 +17,9 @@ kernel = njit(cache=True, error_model="numpy")  # without exceptions to unwind i
 FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
 """Kinds of steps in a history."""
 
+MOST_FLIPS = 1000
+"""An edge flipped as often goes round in a circle, for rounding; it stays as it is then."""
+
 
 class Gluing(NamedTuple):
     """An intrinsic triangulation under construction; arrays are longer than what is used of them.
@@ -24,10 +27,10 @@ class Gluing(NamedTuple):
     `tail`, `edge`, `forward`, `front` and `ring` have one entry per halfedge: its tail vertex; its edge; whether it
     runs along the edge's own direction; which of the edge's two sides it is on (moved along, so that the two sides of
     a source keep their names); and the next halfedge of the same edge, cyclically: itself at a boundary.
-    `start`, `length` and `fixed` have one entry per edge: one of its halfedges; its length, in multiples of `unit`;
-    whether it must not be flipped. `counts` holds the number of faces, edges, vertices, steps and edges to be looked
-    at. `steps` and `weights` are the history: kind, two halfedges or faces, the
-    new vertex; and four numbers that say how points move.
+    `start`, `length`, `fixed` and `flips` have one entry per edge: one of its halfedges; its length, in multiples of
+    `unit`; whether it must not be flipped; how often it has been. `counts` holds the number of faces, edges, vertices,
+    steps and edges to be looked at. `steps` and `weights` are the history: kind, two halfedges or faces, the new
+    vertex; and four numbers that say how points move.
     `scratch` is room to work in.
     """
 
@@ -39,6 +42,7 @@ class Gluing(NamedTuple):
     start: NDArray[np.int64]
     length: NDArray[np.float64]
     fixed: NDArray[np.bool_]
+    flips: NDArray[np.int64]
     counts: NDArray[np.int64]
     steps: NDArray[np.int64]
     weights: NDArray[np.float64]
@@ -206,8 +210,11 @@ def settle(g, stack, stacked):
         e = stack[g.counts[4]]
         stacked[e] = False
         h = g.start[e]
-        if g.fixed[e] or not is_interior(g, h) or not violates_delaunay(g, h) or not flip(g, h):
+        if g.fixed[e] or g.flips[e] >= MOST_FLIPS or not is_interior(g, h) or not violates_delaunay(g, h):
             continue
+        if not flip(g, h):
+            continue
+        g.flips[e] += 1
         t = g.ring[h]
         for side in (following(h), preceding(h), following(t), preceding(t)):
             look_at(g, stack, stacked, g.edge[side])
@@ -228,7 +235,7 @@ def new_edge(g, length, fixed):
     """Add an edge."""
     e = g.counts[1]
     g.counts[1] = e + 1
-    g.length[e], g.fixed[e] = length, fixed
+    g.length[e], g.fixed[e], g.flips[e] = length, fixed, 0
     return e
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .refinement_kernels import Agenda
 
 PER_FACE = ("tail", "edge", "forward", "front", "ring")
-PER_EDGE = ("start", "length", "fixed")
+PER_EDGE = ("start", "length", "fixed", "flips")
 TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
 
 PATIENCE = 5000

@@ -172,12 +172,27 @@ def improve(g, agenda, f, goal):
     if outcome == LOST:
         return True
     segment = place if outcome == BLOCKED else encroached(g, place, x, y, agenda.room, agenda.halfedges)
+    if segment < 0 and too_near(g, h, place, x, y):
+        return True
     if segment >= 0:
         return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
     if not has_room(g, agenda, 2):
         return False
     insert(g, agenda, place, x, y)
     return True
+
+
+@kernel
+def too_near(g, h, f, px, py):
+    """Whether the circumcentre of the face with shortest side h, p in the frame of face f, is near a corner of f.
+
+    No vertex is nearer than the radius in a Delaunay triangulation; what rounding has kept from it is left alone.
+    """
+    n, d = tangent_at(g, preceding(h))
+    radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
+    x, y = apex_position(g, 3 * f)
+    nearest = min(np.hypot(px, py), np.hypot(px - g.length[g.edge[3 * f]], py), np.hypot(px - x, py - y))
+    return not nearest > 0.5 * radius
 
 
 @kernel
@@ -313,6 +328,19 @@ def vertex_beside(g, h):
 
 
 @kernel
+def room_beside(g, h, fraction):
+    """How far the vertices opposite to an edge are from a place along h."""
+    nearest, length, y = np.inf, g.length[g.edge[h]], h
+    while True:
+        along, above = apex_position(g, y)
+        here = fraction if g.forward[y] == g.forward[h] else 1.0 - fraction
+        nearest = min(nearest, np.hypot(along - here * length, above))
+        y = g.ring[y]
+        if y == h:
+            return nearest
+
+
+@kernel
 def split_segment(g, agenda, h, f, goal):
     """Split a segment that stands in the way of healing face f; False if there is no room for it.
 
@@ -337,6 +365,8 @@ def split_segment(g, agenda, h, f, goal):
         if nearby < 0 and at_tail != at_head:
             shell = 2.0 ** np.round(np.log2(0.5 * length)) / length
             fraction = shell if at_tail else 1.0 - shell
+        if not room_beside(g, h, fraction) > 1e-13 * length:
+            return True
         new = split_edge(g, h, fraction)
         agenda.on_segment[new], agenda.group[new] = segment, -1
         if nearby >= 0:
