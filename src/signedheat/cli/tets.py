@@ -56,7 +56,12 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         "notes": {name: str(note) for name, note in field.diagnostics.notes.items()},
     }
     text = f"{arguments.output}: {mesh.n_tets} tets, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
-    return summary, "; ".join([text, *(f"{name}: {note}" for name, note in summary["notes"].items())])
+    notes = field.diagnostics.notes.items()
+    told = (
+        f"{name.replace('_', ' ')}: {note:.3g}" if isinstance(note, float) else f"{name}: {note}"
+        for name, note in notes
+    )
+    return summary, "; ".join([text, *told])
 
 
 def on_grid(field: TetField) -> GridField:
