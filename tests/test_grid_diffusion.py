@@ -10,8 +10,9 @@ from scipy.sparse.linalg import spsolve
 import signedheat as sh
 from signedheat.discretization import discretize
 from signedheat.method import unit
+from signedheat.operators.node_sources import NodeSources
 from signedheat.operators.stencil import divergence, laplacian, solve_poisson
-from signedheat.operators.sweeps import STRETCH, diffuse_by_sweeps
+from signedheat.operators.sweeps import diffuse_by_sweeps
 
 
 def path_laplacian(n):
@@ -27,8 +28,9 @@ def test_sweeps_converge_to_the_direct_solution_in_any_dimension(shape):
     rng = np.random.default_rng(0)
     ratios = rng.uniform(0.3, 2.0, 4) * (np.array(shape) > 1)
     sources = (rng.random((*shape, 4)) * (rng.random(shape) < 0.1)[..., None]).astype(np.float32)
-    everywhere = np.ones((*shape[:3], -(-shape[3] // STRETCH)), dtype=bool)
-    swept = diffuse_by_sweeps(sources, everywhere, everywhere, ratios, rounds=40)
+    nodes = np.flatnonzero(sources.any(axis=-1))[:, None]
+    given = NodeSources.scattered(shape, np.ones(4), nodes, np.ones(nodes.shape), sources.reshape(-1, 4)[nodes[:, 0]])
+    swept = diffuse_by_sweeps(given, np.ones(given.places.shape, dtype=bool), ratios, rounds=40)
     matrix = eye(np.prod(shape))
     for axis in range(4):
         factors = [path_laplacian(n) if k == axis else eye(n) for k, n in enumerate(shape)]

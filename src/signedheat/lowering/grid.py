@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the pieces into which faces are cut."""
-BYTES_PER_NODE = 56
+BYTES_PER_NODE = 46
 """Peak of a distance computation, measured."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""

@@ -112,19 +112,20 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
     It varies slowly, so the finest level of the pyramid is left out.
     """
     from ..operators.extraction import quotients
-    from ..operators.pyramid import collapse, diffuse_on_pyramid, leave_out, scatter
+    from ..operators.node_sources import NodeSources
+    from ..operators.pyramid import collapse, diffuse_on_pyramid, leave_out
     from ..operators.stencil import interpolation_stencil
 
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)
-    finest = source.vectors
-    left_out, nodes = leave_out(finest.shape, finest.steps, max(1, source.finest))
-    axes = slice(-source.grid.dimension, None)
-    ratios = finest.steps[axes] / np.where(nodes.steps[axes] > 0, nodes.steps[axes], np.inf)
-    stencil = interpolation_stencil(source.samples.positions * ratios, nodes.shape[axes])
+    finest, axes = source.vectors, slice(-source.grid.dimension, None)
+    left_out, shape, steps = leave_out(finest.shape, finest.steps, max(1, source.finest))
+    ratios = finest.steps[axes] / np.where(steps[axes] > 0, steps[axes], np.inf)
+    stencil = interpolation_stencil(source.samples.positions * ratios, shape[axes])
     weights = source.weights / source.weights.max()
-    scatter(*stencil, np.stack([weights, weights * values / largest], axis=1), nodes)
+    pairs = np.stack([weights, weights * values / largest], axis=1)
+    nodes = NodeSources.scattered(shape, steps, *stencil, pairs)
     levels = left_out + diffuse_on_pyramid(nodes, source.time_on, rounds=1)
     mean = collapse(levels, finest.shape, 1, quotients).reshape(source.grid.shape)
     mean *= np.float32(largest)

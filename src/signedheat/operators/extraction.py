@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .sweeps import STRETCH, TINY
+from .node_sources import STRETCH
+from .sweeps import TINY
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})

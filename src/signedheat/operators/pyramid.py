@@ -19,8 +19,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .node_sources import STRETCH, NodeSources
 from .stencil import by_slabs
-from .sweeps import STRETCH, TINY, diffuse_by_sweeps
+from .sweeps import TINY, diffuse_by_sweeps
 
 BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
@@ -38,36 +39,6 @@ BEYOND = 2
 """How many times as often a level is swept that carries on what a finer one found."""
 ROUNDS_EVERYWHERE = 12
 """The same on the coarsest grid, where paths from the source are longer, and sweeps cost nothing."""
-
-
-@dataclass(frozen=True, eq=False)
-class NodeSources:
-    """Vectors at the nodes of a grid.
-
-    Attributes
-    ----------
-    sums : (l₀, l₁, l₂, n, 4) float32
-        Padded to four axes and four components.
-    touched : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
-        Stretches of the lines in which they are not all zero.
-    steps : (4,) float
-        Spacing of the grid; 0 along axes of one node.
-    """
-
-    sums: NDArray[np.float32]
-    touched: NDArray[np.bool_]
-    steps: NDArray[np.float64]
-
-    @classmethod
-    def empty(cls, shape: tuple[int, ...], steps: NDArray[np.float64]) -> NodeSources:
-        """Zero everywhere; pages that are never written cost no memory."""
-        stretches = -(-shape[3] // STRETCH)
-        return cls(np.zeros((*shape, 4), dtype=np.float32), np.zeros((*shape[:3], stretches), dtype=np.bool_), steps)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Nodes along each of the four axes."""
-        return self.sums.shape[:4]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,14 +104,12 @@ def diffuse_on_pyramid(
             levels.append(Level(None, None, factors))
         if last:
             return levels
-        coarse = _coarser(sources, factors)
+        shape, steps = _coarser(sources.shape, sources.steps)
         known = None
         if levels[-1].vectors is not None:
-            power = np.sqrt(time(_mean_step(sources)) / time(_mean_step(coarse)))
-            known = _carried(levels[-1], coarse, power)
-        if known is None:
-            _restrict(sources.sums, sources.touched, factors, coarse.sums, coarse.touched)
-        sources = coarse
+            power = np.sqrt(time(_mean_step(sources.steps)) / time(_mean_step(steps)))
+            known = _carried(levels[-1], shape, power)
+        sources = sources.restricted(factors, shape, steps) if known is None else NodeSources.empty(shape, steps)
 
 
 def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -164,14 +133,15 @@ def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np
     return factors
 
 
-def leave_out(shape: tuple[int, ...], steps: NDArray[np.float64], finest: int) -> tuple[list[Level], NodeSources]:
-    """The first levels of the pyramid, with nothing in them, and the coarser grid that follows, without sources."""
+def leave_out(
+    shape: tuple[int, ...], steps: NDArray[np.float64], finest: int
+) -> tuple[list[Level], tuple[int, ...], NDArray[np.float64]]:
+    """The first levels of the pyramid, with nothing in them; shape and spacing of the coarser grid that follows."""
     levels: list[Level] = []
-    nodes = NodeSources.empty(shape, steps)
-    while len(levels) < finest and ((factors := coarsening(nodes.shape, nodes.steps)) > 1).any():
+    while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
         levels.append(Level(None, None, factors))
-        nodes = _coarser(nodes, factors)
-    return levels, nodes
+        shape, steps = _coarser(shape, steps)
+    return levels, shape, steps
 
 
 def _diffuse_level(
@@ -182,10 +152,10 @@ def _diffuse_level(
     rounds: int,
     last: bool,
 ) -> Level:
-    t = time(_mean_step(sources))
+    t = time(_mean_step(sources.steps))
     real = sources.steps > 0
     ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
-    start = sources.touched if known is None else known.where
+    start = sources.places >= 0 if known is None else known.where
     if last:
         active = inside = np.ones_like(start)
     else:
@@ -197,12 +167,12 @@ def _diffuse_level(
     if known is None and not last and active.mean() < SMALL:
         rounds *= 2
     given = None if known is None else known.vectors
-    vectors = diffuse_by_sweeps(sources.sums, sources.touched, active, ratios, rounds, given)
+    vectors = diffuse_by_sweeps(sources, active, ratios, rounds, given)
     return Level(vectors, inside, factors)
 
 
-def _mean_step(sources: NodeSources) -> float:
-    return float(sources.steps[sources.steps > 0].mean())
+def _mean_step(steps: NDArray[np.float64]) -> float:
+    return float(steps[steps > 0].mean())
 
 
 def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -224,34 +194,22 @@ def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bo
     return grown
 
 
-def _coarser(sources: NodeSources, factors: NDArray[np.int64]) -> NodeSources:
-    """The next coarser grid, without sources."""
-    counts = np.array(sources.shape)
-    shape = np.where(factors == 2, counts // 2 + 1, np.where(factors == 1, counts, 1))
-    return NodeSources.empty(tuple(int(n) for n in shape), np.where(shape > 1, sources.steps * factors, 0.0))
+def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[int, ...], NDArray[np.float64]]:
+    """Shape and spacing of the next coarser grid."""
+    factors, counts = coarsening(shape, steps), np.array(shape)
+    coarse = np.where(factors == 2, counts // 2 + 1, np.where(factors == 1, counts, 1))
+    return tuple(int(n) for n in coarse), np.where(coarse > 1, steps * factors, 0.0)
 
 
-def _carried(level: Level, coarse: NodeSources, power: float) -> Known | None:
+def _carried(level: Level, shape: tuple[int, ...], power: float) -> Known | None:
     """What a level found, for the next coarser one: in stretches of which it knows every node."""
-    vectors = np.zeros_like(coarse.sums)
-    counts = np.zeros(coarse.touched.shape, dtype=np.int64)
+    vectors = np.zeros((*shape, 4), dtype=np.float32)
+    counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
     _carry(level.vectors, level.inside, level.factors, np.float32(power), vectors, counts)
     full = np.full(counts.shape[3], STRETCH)
-    full[-1] = coarse.shape[3] - STRETCH * (len(full) - 1)
+    full[-1] = shape[3] - STRETCH * (len(full) - 1)
     where = counts >= full
     return Known(vectors, where) if where.any() else None
-
-
-def scatter(
-    nodes: NDArray[np.int64], weights: NDArray[np.float64], values: NDArray[np.float64], sources: NodeSources
-) -> None:
-    """Add values (s, c ≤ 4) to the `nodes` (s, k) of a grid with `weights` (s, k)."""
-    four = np.zeros((len(values), 4))
-    four[:, : values.shape[1]] = values
-    stretches = sources.touched.shape[3]
-    _scatter(
-        nodes, weights, four, sources.sums.reshape(-1, 4), sources.touched.reshape(-1, stretches), sources.shape[3]
-    )
 
 
 def collapse(
@@ -280,17 +238,6 @@ def collapse(
 
 
 @njit(cache=True, nogil=True)
-def _scatter(nodes, weights, values, sums, touched, n):
-    for s in range(nodes.shape[0]):
-        for c in range(nodes.shape[1]):
-            node, weight = nodes[s, c], weights[s, c]
-            if weight > 0.0:
-                for q in range(4):
-                    sums[node, q] += np.float32(weight * values[s, q])
-                touched[node // n, node % n // STRETCH] = True
-
-
-@njit(cache=True, nogil=True)
 def _carry(vectors, inside, factors, power, coarse, counts):
     """Vectors at the nodes that both grids share, with their lengths raised to a power; how many in each stretch."""
     n0, n1, n2, n3 = vectors.shape[:4]
@@ -310,39 +257,6 @@ def _carry(vectors, inside, factors, power, coarse, counts):
                         for q in range(4):
                             coarse[a, b, c, d, q] = scale * line[q]
                         counts[a, b, c, d // STRETCH] += 1
-
-
-@njit(cache=True, nogil=True)
-def _restrict(sums, touched, factors, coarse, coarse_touched):
-    """The transpose of `_interpolate`."""
-    n0, n1, n2, n3 = sums.shape[:4]
-    for i in range(n0):
-        for j in range(n1):
-            for k in range(n2):
-                for s in range(touched.shape[3]):
-                    if not touched[i, j, k, s]:
-                        continue
-                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
-                        odd = (
-                            (8 if factors[0] == 2 and i % 2 else 0)
-                            | (4 if factors[1] == 2 and j % 2 else 0)
-                            | (2 if factors[2] == 2 and k % 2 else 0)
-                            | (1 if factors[3] == 2 and m % 2 else 0)
-                        )
-                        share = np.float32(1)
-                        for bit in range(4):
-                            if odd >> bit & 1:
-                                share *= np.float32(0.5)
-                        for corner in range(16):
-                            if corner & ~odd:
-                                continue
-                            a = i // factors[0] + (corner >> 3 & 1)
-                            b = j // factors[1] + (corner >> 2 & 1)
-                            c = k // factors[2] + (corner >> 1 & 1)
-                            d = m // factors[3] + (corner & 1)
-                            for q in range(4):
-                                coarse[a, b, c, d, q] += share * sums[i, j, k, m, q]
-                            coarse_touched[a, b, c, d // STRETCH] = True
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})

@@ -11,17 +11,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .node_sources import STRETCH, NodeSources
 from .wavefront import sweep_lines
 
 TINY = np.float32(1e-34)
 """Where nothing greater arrives, a coarser level knows better."""
-STRETCH = 8
-"""Nodes of a line that are swept, or left out, together."""
 
 
 def diffuse_by_sweeps(
-    sources: NDArray[np.float32],
-    touched: NDArray[np.bool_],
+    sources: NodeSources,
     active: NDArray[np.bool_],
     ratios: NDArray[np.float64],
     rounds: int,
@@ -31,11 +29,8 @@ def diffuse_by_sweeps(
 
     Parameters
     ----------
-    sources : (l₀, l₁, l₂, n, 4) float32
-        B: the grid's axes, with axes of one node in front where it has less than four; components beyond the grid's
-        are zero.
-    touched : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
-        Stretches in which B is not zero.
+    sources : NodeSources
+        B, on a grid of (l₀, l₁, l₂, n) nodes.
     active : (l₀, l₁, l₂, ⌈n / STRETCH⌉) bool
         Stretches in which to solve.
     ratios : (4,) float
@@ -50,16 +45,16 @@ def diffuse_by_sweeps(
     (l₀, l₁, l₂, n, 4) float32
         X; pages outside the active stretches are never touched.
     """
-    shape = sources.shape[:4]
-    vectors = np.zeros_like(sources) if given is None else given
+    shape = sources.shape
+    vectors = np.zeros((*shape, 4), dtype=np.float32) if given is None else given
     lines = shape[0] * shape[1] * shape[2]
     sweep_lines(
         _sweep_tiles,
         shape,
         rounds,
         vectors.reshape(lines, 4 * shape[3]),
-        sources.reshape(lines, 4 * shape[3]),
-        touched.reshape(lines, -1),
+        sources.sums.reshape(-1, 4 * STRETCH),
+        sources.places.reshape(lines, -1),
         active.reshape(lines, -1),
         np.array(shape),
         ratios.astype(np.float32),
@@ -84,11 +79,11 @@ def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
-def _sweep_tiles(vectors, sources, touched, active, shape, ratios, pivots, tiles):
+def _sweep_tiles(vectors, sums, places, active, shape, ratios, pivots, tiles):
     """Update the lines of tiles in order: four components side by side. Parts of lines are sliced, for vector code."""
     n0, n1, n2, n = shape
     ratio0, ratio1, ratio2, along = ratios
-    row = np.empty(4 * n, dtype=np.float32)
+    scratch = np.empty(4 * n, dtype=np.float32)
     none = np.zeros(4 * n, dtype=np.float32)  # beyond the walls
     stretches = active.shape[1]
     for tile in tiles:
@@ -107,7 +102,7 @@ def _sweep_tiles(vectors, sources, touched, active, shape, ratios, pivots, tiles
                             stretch += 1
                         begin, end = first * STRETCH, min(stretch * STRETCH, n)
                         part = slice(4 * begin, 4 * end)
-                        inflow, out, pivot = row[: 4 * (end - begin)], vectors[here, part], pivots[walls, begin:end]
+                        inflow, out, pivot = scratch[: 4 * (end - begin)], vectors[here, part], pivots[walls, begin:end]
                         # what flows in from the lines around, the source, and the values that stay on the line
                         low = vectors[here - n2, part] if j > 0 else none[part]
                         high = vectors[here + n2, part] if j < n1 - 1 else none[part]
@@ -121,11 +116,11 @@ def _sweep_tiles(vectors, sources, touched, active, shape, ratios, pivots, tiles
                             for m in range(len(inflow)):
                                 inflow[m] += ratio0 * (below[m] + above[m])
                         for s in range(first, stretch):
-                            if touched[here, s]:
-                                source = sources[here, 4 * STRETCH * s : 4 * min(STRETCH * (s + 1), n)]
+                            row = places[here, s]
+                            if row >= 0:
                                 into = inflow[4 * STRETCH * (s - first) :]
-                                for m in range(len(source)):
-                                    into[m] += source[m]
+                                for m in range(min(len(into), 4 * STRETCH)):
+                                    into[m] += sums[row, m]
                         x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
                         if begin > 0:  # the neighbour was eliminated: its value is x + q · (value here)
                             before = vectors[here, 4 * begin - 4 : 4 * begin]

@@ -23,7 +23,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 
 if TYPE_CHECKING:
-    from ..operators.pyramid import NodeSources
+    from ..operators.node_sources import NodeSources
 
 NEIGHBOURS = 8
 """Neighbours from which the area of an oriented point is estimated."""
@@ -193,7 +193,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
     SourceError
         If a shape cannot be used on this grid, or nothing of any lies within it.
     """
-    from ..operators.pyramid import NodeSources
+    from ..operators.node_sources import NodeSources
     from ..operators.wavefront import padded_shape
     from .binning import merge_in_cells
 
@@ -211,7 +211,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
             )
         order = np.argsort(elements.components, kind="stable")
         corners = (elements.corners - grid.origin) / grid.spacing
-        samples = merge_in_cells(
+        samples, nodes = merge_in_cells(
             corners,
             elements.vectors,
             elements.weights,

@@ -6,8 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ..operators.pyramid import NodeSources
-from ..operators.sweeps import STRETCH
+from ..operators.node_sources import STRETCH, NodeSources, with_room
 
 
 def merge_in_cells(
@@ -20,7 +19,7 @@ def merge_in_cells(
     size: float,
     sources: NodeSources,
     scale: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]], NodeSources]:
     """Samples of the simplices `corners` (m, c, d), in cells, that lie on a grid of `shape` nodes.
 
     Every simplex is bisected across its longest edge until that is at most `size` cells, which halves its measure each
@@ -32,12 +31,15 @@ def merge_in_cells(
 
     Returns
     -------
-    positions (s, d), vectors (s, d), weights (s,), components (s,)
-        Sorted by component, then in order of first touch. Samples of no weight are left out.
+    samples : tuple
+        positions (s, d), vectors (s, d), weights (s,), components (s,), sorted by component, then in order of first
+        touch. Samples of no weight are left out.
+    sources : NodeSources
+        What acts on the nodes by now; takes the place of what was given.
     """
     slots = np.zeros(int(np.prod(shape - 1)), dtype=np.int32)  # untouched pages cost no memory
     dimension = corners.shape[2]
-    sums, labels = _merge(
+    sums, labels, nodes = _merge(
         np.ascontiguousarray(corners),
         np.ascontiguousarray(vectors),
         weights,
@@ -46,19 +48,19 @@ def merge_in_cells(
         shape,
         size,
         slots,
-        sources.sums.reshape(-1, 4),
-        sources.touched.reshape(-1, sources.touched.shape[3]),
+        sources.sums,
+        sources.places.reshape(-1, sources.places.shape[3]),
         scale,
-        STRETCH,
     )
     kept = sums[:, -1] > 0
     sums, labels = sums[kept], labels[kept]
     weight = sums[:, -1]
-    return sums[:, :dimension] / weight[:, None], sums[:, dimension:-1].copy(), weight.copy(), labels
+    samples = (sums[:, :dimension] / weight[:, None], sums[:, dimension:-1].copy(), weight.copy(), labels)
+    return samples, NodeSources(sources.places, nodes, sources.shape, sources.steps)
 
 
 @njit(cache=True, nogil=True)
-def _merge(corners, vectors, weights, components, order, shape, size, slots, nodes, touched, scale, stretch):
+def _merge(corners, vectors, weights, components, order, shape, size, slots, nodes, places, scale):
     """Sums of weight · position, vector and weight per (component, cell).
 
     Element by element: array assignment compiles slowly.
@@ -70,7 +72,7 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
     capacity = 1024
     sums = np.zeros((capacity, 2 * dimension + 1))
     labels = np.empty(capacity, dtype=np.int64)
-    count = 0
+    count, used = 0, nodes.shape[0]
     first = 0  # slots of the component at hand start here
     current = np.int64(-1)
     centre = np.empty(dimension)
@@ -150,6 +152,8 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
                 slots[cell] = count
             share = shares[top]
             weight = weights[face] * share
+            if used + (1 << dimension) > nodes.shape[0]:
+                nodes = with_room(nodes, used, 1 << dimension)
             lines[0], parts[0] = 0, share / scale
             for d in range(dimension - 1):
                 below = min(max(np.int64(centre[d]), 0), shape[d] - 2)
@@ -165,11 +169,15 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
                     for side in range(2):
                         part = parts[k] * (f if side else 1.0 - f)
                         if part > 0.0:
+                            m = below + side
+                            row = places[lines[k], m // STRETCH]
+                            if row < 0:
+                                row = places[lines[k], m // STRETCH] = used
+                                used += 1
                             for d in range(dimension):
-                                nodes[lines[k] * n + below + side, d] += np.float32(part * vectors[face, d])
-                            touched[lines[k], (below + side) // stretch] = True
+                                nodes[row, m % STRETCH, d] += np.float32(part * vectors[face, d])
             for d in range(dimension):
                 sums[slot, d] += weight * centre[d]
                 sums[slot, dimension + d] += vectors[face, d] * share
             sums[slot, 2 * dimension] += weight
-    return sums[:count], labels[:count]
+    return sums[:count], labels[:count], nodes[:used]

@@ -15,7 +15,7 @@ from .area_elements import AreaSamples
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-    from ..operators.pyramid import NodeSources
+    from ..operators.node_sources import NodeSources
 
 
 @dataclass(frozen=True, eq=False)
