@@ -49,20 +49,24 @@ def facing(
     table = triangles.edges
     if table.face_counts.max(initial=0) <= 2:
         return triangles, groups
-    distance = from_sources(triangles, [part for group in groups for part in group])
+    parts = [part for group in groups for part in group]
+    distance = from_sources(triangles, parts)
+    holds = np.zeros(triangles.n_faces, dtype=bool)
+    holds[np.concatenate([part.faces[part.edges < 0] for part in parts])] = True
     side = np.flatnonzero(table.face_counts[table.of_faces].ravel() > 2)
     edge = table.of_faces.ravel()[side]
     opposite = np.roll(triangles.corner_vertices, -2, axis=1).ravel()[side]
     ends = distance[table.vertices[edge]].mean(axis=1)
-    order = np.lexsort([side, distance[opposite], edge])
-    nearest = order[np.append(True, np.diff(edge[order]) > 0)]
-    nearest = nearest[distance[opposite[nearest]] < ends[nearest]]
     first = np.full(triangles.n_edges, -1)
     first[table.of_faces.ravel()[triangles.first_sides]] = triangles.first_sides
-    changed = np.zeros(triangles.n_edges, dtype=bool)
-    changed[edge[nearest]] = first[edge[nearest]] != side[nearest]
-    if not changed.any():
+    away = np.where(holds[side // 3], -1.0, distance[opposite])
+    order = np.lexsort([side != first[edge], away, edge])  # of equal ones, the first stays first
+    nearest = order[np.append(True, np.diff(edge[order]) > 0)]
+    nearest = nearest[(away[nearest] < ends[nearest]) & (side[nearest] != first[edge[nearest]])]
+    if not len(nearest):
         return triangles, groups
+    changed = np.zeros(triangles.n_edges, dtype=bool)
+    changed[edge[nearest]] = True
     first[edge[nearest]] = side[nearest]
     turned = replace(triangles, leading_sides=first[first >= 0])
     return turned, [[mirrored(part, changed) for part in group] for group in groups]
