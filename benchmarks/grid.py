@@ -23,7 +23,7 @@ import signedheat as sh
 
 HALF = 1.6
 OFFSET = 0.2
-REPEATS = 3
+REPEATS = 6
 
 
 def sphere(n_vertices: int, missing: float = 0.0) -> sh.TriangleMesh:

@@ -176,6 +176,19 @@ def test_levels_of_several_sources_and_components():
         solver.distance([left, right], sh.LevelValues([0, 1, 2]))
 
 
+def test_sides_that_coincide_are_told_and_refused_when_nothing_is_left():
+    thin = sh.TriangleMesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1e-4]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+    )
+    field = sh.signed_distance(thin, resolution=32)
+    assert 0.99 < field.diagnostics.notes["area that cancels"] < 1
+    outside = np.abs(field.grid.points[..., 2]) > 0.1
+    assert (field.values[outside] > 0).all()
+    twice = sh.TriangleMesh(thin.vertices, np.concatenate([thin.faces, thin.faces[:, ::-1]]))
+    with pytest.raises(sh.SourceError, match="cancel each other everywhere"):
+        sh.signed_distance(twice, resolution=32)
+
+
 def test_what_cannot_be_done_is_refused_with_the_remedy():
     shape = sphere(300)
     with pytest.raises(sh.SourceError, match="normals"):

@@ -19,6 +19,8 @@ from .options import Parser
 from .progress import ProgressBar
 
 RESOLUTION = 128
+MOST = 0.9
+"""Fraction of the area that may cancel without a word."""
 
 
 @contextmanager
@@ -105,6 +107,17 @@ def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
         return sharpen(field)
 
 
+def hint(field: GridField) -> str:
+    """A further line on sources that may have been given twice."""
+    cancelled = field.diagnostics.notes.get("area that cancels", 0.0)
+    if cancelled < MOST:
+        return ""
+    return (
+        f"\n{cancelled:.4%} of the area lies within a cell of area that faces the other way, as on thin sheets: if "
+        "faces are doubled, remove one copy"
+    )
+
+
 def describe(field: Any) -> dict[str, Any]:
     """A field in numbers, for ``--json``."""
     if isinstance(field, GridField):
@@ -112,6 +125,8 @@ def describe(field: Any) -> dict[str, Any]:
             "origin": field.grid.origin.tolist(),
             "spacing": field.grid.spacing.tolist(),
             "shape": list(field.grid.shape),
+            "area_outside": field.diagnostics.notes.get("area outside the grid", 0.0),
+            "area_cancelled": field.diagnostics.notes.get("area that cancels", 0.0),
         }
     else:
         where = {"n_vertices": len(field.values)}

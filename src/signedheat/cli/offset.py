@@ -8,7 +8,7 @@ from typing import Any
 
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
 from ..viewing import PICTURE_FORMATS, save_slices
-from .computing import check_grid_options, compute, describe, grid_for, is_planar, naming, read_source
+from .computing import check_grid_options, compute, describe, grid_for, hint, is_planar, naming, read_source
 from .options import Parser, Summary, add_command, add_grid_options, finite
 
 
@@ -67,7 +67,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         for distance, output, what in zip(arguments.distances, outputs, found, strict=True)
     ]
     kind = "{lines} lines ({closed} closed), length {length:.6g}" if planar else "closed surface, {faces} faces"
-    text = "\n".join(f"{w['output']}: at {w['distance']:+g}, {kind.format(**w)}" for w in written)
+    text = "\n".join(f"{w['output']}: at {w['distance']:+g}, {kind.format(**w)}" for w in written) + hint(field)
     return {"input": arguments.shape, "lines" if planar else "surfaces": written, "field": describe(field)}, text
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from ..io import ensure_field_writable, ensure_writable, save_field
 from ..viewing import PICTURE_FORMATS, save_slices
 from . import tets
-from .computing import check_grid_options, compute, describe, grid_for, naming, read_source
+from .computing import check_grid_options, compute, describe, grid_for, hint, naming, read_source
 from .options import Parser, Summary, add_command, add_grid_options
 
 
@@ -56,4 +56,5 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     summary = {"input": arguments.shape, "output": arguments.output, **describe(field)}
     nodes = " × ".join(map(str, field.grid.shape))
     text = f"{arguments.output}: {nodes} nodes, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
+    text += hint(field)
     return summary, text

@@ -91,7 +91,11 @@ class GridDiscretization:
         return divergence(directions, self.grid.spacing)
 
     def field(self, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics) -> GridField:
-        notes = {"samples": len(source.weights), "area outside the grid": source.samples.outside}
+        notes = {
+            "samples": len(source.weights),
+            "area outside the grid": source.samples.outside,
+            "area that cancels": source.samples.cancelled,
+        }
         return GridField(self.grid, values, replace(diagnostics, notes={**diagnostics.notes, **notes}))
 
 

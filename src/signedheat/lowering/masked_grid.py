@@ -152,7 +152,11 @@ class MaskedGridDiscretization:
                 UnreachedWarning,
                 stacklevel=2,
             )
-        notes = {"samples": len(source.weights), "area outside the grid": source.whole.samples.outside}
+        notes = {
+            "samples": len(source.weights),
+            "area outside the grid": source.whole.samples.outside,
+            "area that cancels": source.whole.samples.cancelled,
+        }
         found = replace(diagnostics, unreached=unreached, notes={**diagnostics.notes, **notes})
         return GridField(self.grid, everywhere.reshape(self.grid.shape), found)
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 NEIGHBOURS = 8
 """Neighbours from which the area of an oriented point is estimated."""
+ROUNDING = 1e-9
+"""Where less of the area than this is left of normals that cancel, the rest is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,9 @@ class AreaSamples:
         h_source: the largest of the sources' mean spacings.
     outside : float
         Fraction of the area that lies outside the grid.
+    cancelled : float
+        Fraction of the area inside whose normals cancel others of the same cell and component: sheets thinner than a
+        cell, and faces given twice with opposite orientations.
     nodes : NodeSources
         The vectors brought to the nodes, up to a common factor.
     """
@@ -83,6 +88,7 @@ class AreaSamples:
     owners: NDArray[np.int64]
     spacing: float
     outside: float
+    cancelled: float
     nodes: NodeSources
 
 
@@ -235,4 +241,11 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         raise SourceError(
             f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape: move or enlarge it"
         )
-    return AreaSamples(*joined, spacing=spacing, outside=max(0.0, 1.0 - inside / total), nodes=nodes)
+    left = float(np.linalg.norm(joined[1], axis=1).sum() / joined[2].sum())
+    if left < ROUNDING:
+        raise SourceError(
+            "the normals of the source cancel each other everywhere, so that nothing tells inside from outside: "
+            "remove or turn one of its coinciding sides"
+        )
+    outside = max(0.0, 1.0 - inside / total)
+    return AreaSamples(*joined, spacing=spacing, outside=outside, cancelled=max(0.0, 1.0 - left), nodes=nodes)
