@@ -43,6 +43,29 @@ def sphere(n_vertices: int, missing: float = 0.0) -> sh.TriangleMesh:
     return sh.TriangleMesh(points, faces[nearness <= np.quantile(nearness, 1 - missing)])
 
 
+def scattered(missing: float) -> sh.TriangleMesh:
+    """The unit sphere without every face that chance takes away."""
+    whole = sphere(10_000)
+    kept = np.random.default_rng(7).random(whole.n_faces) >= missing
+    return sh.TriangleMesh(whole.vertices, whole.faces[kept])
+
+
+def flipped(part: float) -> sh.TriangleMesh:
+    """The unit sphere with some faces inside out."""
+    whole = sphere(10_000)
+    faces, turned = whole.faces.copy(), np.random.default_rng(7).random(whole.n_faces) < part
+    faces[turned] = faces[turned][:, ::-1]
+    return sh.TriangleMesh(whole.vertices, faces)
+
+
+def soup(noise: float) -> sh.TriangleMesh:
+    """The unit sphere's faces, each moved a little on its own."""
+    whole = sphere(10_000)
+    moves = noise * np.random.default_rng(7).normal(size=(whole.n_faces, 1, 3))
+    corners = (whole.vertices[whole.faces] + moves).reshape(-1, 3)
+    return sh.TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3))
+
+
 def box(n: int) -> sh.Grid:
     return sh.Grid([-HALF] * 3, 2 * HALF / (n - 1), (n, n, n))
 
@@ -121,7 +144,14 @@ def peers(n: int) -> None:
     """The same job, whole and broken, beside other programs."""
     grid = box(n)
     exact = np.linalg.norm(grid.points, axis=-1) - 1
-    for name, shape in (("sphere, 82k faces", sphere(41_000)), ("sphere, 35 % missing", sphere(10_000, 0.35))):
+    shapes = {
+        "sphere, 82k faces": sphere(41_000),
+        "sphere, 35 % missing in 60 places": sphere(10_000, 0.35),
+        "sphere, 35 % missing here and there": scattered(0.35),
+        "sphere, 10 % flipped": flipped(0.1),
+        "sphere, a soup with noise": soup(0.01),
+    }
+    for name, shape in shapes.items():
         print(f"{name}, {n}³")
         seconds, field = best(lambda shape=shape: sh.sharpen(sh.signed_distance(shape, grid)))
         contouring, surface = best(lambda field=field: field.offset(OFFSET))
