@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..discretization import discretize
-from ..fields.marching_tets import level_triangles
 from ..fields.tet_field import TetField
 from ..lowering.tets import TetDiscretization
 from ..operators.linear_elements import LinearElements
@@ -40,6 +39,7 @@ def _(
     Where the linear interpolant vanishes, φ itself does not if it is curved. By how much it differs there, its
     gradients at the corners of the tet tell to second order: ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)``.
     """
+    from ..fields.marching_tets import level_triangles
     from ..operators.box_tree import BoxTree
     from ..operators.nearest import nearest_on_triangles
     from ..operators.straight_lines import Walls, bent_distance

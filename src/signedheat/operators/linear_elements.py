@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .laid_out_triangles import LaidOutTriangles
-from .tetrahedral import Tetrahedra
+if TYPE_CHECKING:
+    from .laid_out_triangles import LaidOutTriangles
+    from .tetrahedral import Tetrahedra
 
 
 @dataclass(frozen=True, eq=False)
