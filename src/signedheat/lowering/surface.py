@@ -166,13 +166,14 @@ class SurfaceDiscretization:
         diagnostics = replace(diagnostics, unreached=unreached, notes={**diagnostics.notes, **self.notes})
         return VertexField(self.domain, values, diagnostics, source)
 
-    def _reached_by(self, vectors: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    def _reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
         """(n_vertices,) whether a vertex has a face on a part that holds vectors. Vectors only pass along edges."""
         parts = self.triangles.face_parts
         if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
-        lit = np.zeros(self.triangles.n_faces, dtype=bool)
-        lit[parts[(vectors != 0)[self.triangles.edges.of_faces].any(axis=1)]] = True
+        held, lit = np.zeros(self.triangles.n_edges, dtype=bool), np.zeros(self.triangles.n_faces, dtype=bool)
+        held[vectors.indices[vectors.data != 0]] = True
+        lit[parts[held[self.triangles.edges.of_faces].any(axis=1)]] = True
         reached = np.zeros(self.triangles.n_vertices, dtype=bool)
         reached[self.triangles.corner_vertices[lit[parts]]] = True
         return reached

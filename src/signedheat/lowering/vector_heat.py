@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from ..linear import Factor, factorize
 from ..operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
@@ -52,11 +53,11 @@ class VectorHeat:
         mass = np.bincount(self.triangles.edges.of_faces.ravel(), np.repeat(self.triangles.face_areas / 3.0, 3))
         return float(mass.min())
 
-    def solve(self, sources: Sequence[NDArray[np.complex128]]) -> list[list[NDArray[np.complex128]]]:
+    def solve(self, sources: Sequence[csr_array]) -> list[list[NDArray[np.complex128]]]:
         """X for each X₀, in stages: each is known up to a factor of its own, and NaN nearer than where it begins."""
         starts = np.zeros((len(sources), self.triangles.n_edges), dtype=np.complex128)
-        for vectors, start in zip(sources, starts, strict=True):
-            self._raise(vectors, start)
+        for source, start in zip(sources, starts, strict=True):
+            self._raise(source.indices, source.data, start)
         together = self._solve(starts.T)
         return [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
 
@@ -76,8 +77,8 @@ class VectorHeat:
             border = self._at_border(stages[-1], faint, start)
             if not border.any():
                 return stages
-            start = np.zeros_like(border)
-            self._raise(border, start)
+            start, held = np.zeros_like(border), np.flatnonzero(border)
+            self._raise(held, border[held], start)
             stages.append(self._solve(start[:, None])[:, 0])
             stages[-1][~faint] = np.nan
             unknown = faint
@@ -94,13 +95,14 @@ class VectorHeat:
         forces = vector_heat_forces(self.triangles, self.time, np.where(faint, vectors, 0), around)
         return np.where(near_border, forces, np.where(faint, start, 0))
 
-    def _raise(self, vectors: NDArray[np.complex128], start: NDArray[np.complex128]) -> None:
+    def _raise(
+        self, edges: NDArray[np.integer], vectors: NDArray[np.complex128], start: NDArray[np.complex128]
+    ) -> None:
         """Put vectors into zeros, scaled by a power of two, so that the largest X is about one."""
-        held = np.flatnonzero(vectors)
-        largest = _size(vectors[held]).max(initial=0.0)
+        largest = _size(vectors).max(initial=0.0)
         if largest > 0:
             steps = int(np.frexp(self._smallest_mass)[1] - np.frexp(largest)[1])
-            start[held] = np.ldexp(vectors[held].view(np.float64), steps).view(np.complex128)
+            start[edges] = np.ldexp(vectors.view(np.float64), steps).view(np.complex128)
 
     def _solve(self, columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
         if self.factor.n == len(columns):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix, vstack
+from scipy.sparse import csr_array, csr_matrix, vstack
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import SourceError
@@ -24,8 +24,8 @@ class SurfaceSource:
 
     Attributes
     ----------
-    vectors : (e,) complex
-        X₀, in the frames of the edges.
+    vectors : (1, e) complex sparse
+        X₀, in the frames of the edges; few are not zero.
     time : float
         t of Eq. 12.
     rows : (s, n_vertices) sparse
@@ -47,7 +47,7 @@ class SurfaceSource:
         The sources on these triangles.
     """
 
-    vectors: NDArray[np.complex128]
+    vectors: csr_array
     time: float
     rows: csr_matrix
     weights: NDArray[np.float64]
@@ -102,14 +102,14 @@ def surface_source(
     if not all(part.fits for part in parts):
         raise SourceError("unoriented curves inside faces must be embedded in the triangles first")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
-    vectors += unoriented_vectors(triangles, parts, spacing)
+    vectors = vectors + unoriented_vectors(triangles, parts, spacing)
     points = [p.nodes for p in parts if len(p.ends) == 0]
     if points:
         nodes = chained(points)
         at_vertex = nodes.kinds == VERTEX
-        vectors += spacing * vertex_point_vectors(triangles, nodes.elements[at_vertex])
-        vectors += np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
-    elif np.abs(vectors).max() <= 1e-12 * max(part.lengths.max() for part in parts):
+        vectors = vectors + spacing * vertex_point_vectors(triangles, nodes.elements[at_vertex])
+        vectors = vectors + np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
+    elif np.abs(vectors.data).max(initial=0.0) <= 1e-12 * max(part.lengths.max() for part in parts):
         raise SourceError(
             "the curves cancel: all of them run both ways, or close inside single faces, so that no side is positive; "
             "make them unoriented (oriented=False), or the faces smaller"
@@ -132,28 +132,28 @@ def surface_source(
     )
 
 
-def oriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> NDArray[np.complex128]:
+def oriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> csr_array:
     """Eq. 11 without the value of ψ_e: i(b − a), on the edge that it runs along or in thirds on those of its face.
 
     One third is the mean of ψ_e over a face; it gives both kinds of pieces of one curve the same weight. (The
     published code adds the whole vector to each of the three edges.)
     """
-    sums = np.zeros(triangles.n_edges, dtype=np.complex128)
+    sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
     for part in parts:
         along, inside = part.edges >= 0, part.edges < 0
-        sums += scatter(triangles.n_edges, part.edges[along], part.vectors[along])
-        sums += from_faces(triangles, part.faces[inside], part.vectors[inside] / 3)
+        sums = sums + scatter(triangles.n_edges, part.edges[along], part.vectors[along])
+        sums = sums + from_faces(triangles, part.faces[inside], part.vectors[inside] / 3)
     return sums
 
 
-def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces], spacing: float) -> NDArray[np.complex128]:
+def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces], spacing: float) -> csr_array:
     """App. A.2: each side of a curve along edges points away from it, and round its free ends.
 
     A face beside edge ij gets i(p_j − p_i), ij in its own order, on its other two edges; on ij itself the sides cancel.
     """
     curves = [p for p in parts if len(p.ends) and not p.oriented]
     if not curves:
-        return np.zeros(triangles.n_edges, dtype=np.complex128)
+        return csr_array((1, triangles.n_edges), dtype=np.complex128)
     edges = np.unique(np.concatenate([p.edges for p in curves]))
     marked = np.zeros(triangles.n_edges, dtype=bool)
     marked[edges] = True
@@ -174,7 +174,7 @@ def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces], spa
     return sums + from_faces(triangles, faces, arcs)
 
 
-def vertex_point_vectors(triangles: LaidOutTriangles, vertices: NDArray[np.int64]) -> NDArray[np.complex128]:
+def vertex_point_vectors(triangles: LaidOutTriangles, vertices: NDArray[np.int64]) -> csr_array:
     """App. A.1, Eq. 19: round vertex i, the corner of angle α gets i d (1 − e^{iα}) / Θ.
 
     d is the direction of the first edge that leaves the corner, counter-clockwise, and Θ the total angle at the vertex.
@@ -191,7 +191,7 @@ def vertex_point_vectors(triangles: LaidOutTriangles, vertices: NDArray[np.int64
     return from_faces(triangles, faces, round_corner)
 
 
-def inner_point_vectors(triangles: LaidOutTriangles, places: Places) -> NDArray[np.complex128]:
+def inner_point_vectors(triangles: LaidOutTriangles, places: Places) -> csr_array:
     """Points on edges and inside faces: −∇δ tested with the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
     Diffused, this is minus the gradient of the heat kernel, which points away from p in all directions alike, whatever
@@ -219,18 +219,15 @@ def in_frames(
     return np.where(triangles.reflected[faces], np.conj(turned), turned)
 
 
-def from_faces(
-    triangles: LaidOutTriangles, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
-    """(e,) sums of face vectors over the three edges of each face."""
+def from_faces(triangles: LaidOutTriangles, faces: NDArray[np.int64], vectors: NDArray[np.complex128]) -> csr_array:
+    """(1, e) sums of face vectors over the three edges of each face."""
     return scatter(triangles.n_edges, triangles.edges.of_faces[faces], in_frames(triangles, faces, vectors))
 
 
-def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(n,) complex sums of values with the same index, few beside n."""
-    sums = np.zeros(n, dtype=np.complex128)
-    np.add.at(sums, index.ravel(), values.ravel())
-    return sums
+def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> csr_array:
+    """(1, n) sums of values with the same index, few beside n."""
+    flat = index.ravel()
+    return csr_array((values.ravel(), (np.zeros(len(flat), dtype=np.int64), flat)), shape=(1, n), dtype=np.complex128)
 
 
 def line_elements(part: Pieces, spacing: float) -> NDArray[np.float64]:
