@@ -103,7 +103,10 @@ def test_nonorientable_surfaces_equal_their_double_cover(closed):
         np.add.at(vectors, triangles.edges.of_faces, triangles.in_edge_frames(np.tile(in_faces, laps)[:, None]))
         samples = np.eye(base.n_vertices)[:1] if laps == 1 else np.eye(cover.n_vertices)[gluing.below == 0]
         source = SimpleNamespace(
-            vectors=vectors, time=0.25, rows=sparse.csr_matrix(samples), weights=np.ones(len(samples))
+            vectors=sparse.csr_array(vectors[None]),
+            time=0.25,
+            rows=sparse.csr_matrix(samples),
+            weights=np.ones(len(samples)),
         )
         directions = normalize(surface, diffuse(surface, source))
         fields.append((directions, integrate(surface, directions, source, sh.Free())))
