@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
+from ..parallel import attended
 from ..solver import Progress
 from .sharpening import sharpen
 
@@ -26,7 +27,10 @@ def sharpen_grid(field: GridField, progress: Progress | None = None) -> GridFiel
     if progress is not None:
         progress(0.0, "sharpen")
     begin = time.perf_counter()
-    values = distance_to_zero_set(field.values, field.grid.spacing)
+    values = attended(
+        lambda: distance_to_zero_set(field.values, field.grid.spacing),
+        None if progress is None else lambda: progress(0.0, "sharpen"),
+    )
     if progress is not None:
         progress(1.0, "done")
     timings = {**field.diagnostics.timings, "sharpen": time.perf_counter() - begin}

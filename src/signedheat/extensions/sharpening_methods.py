@@ -16,6 +16,7 @@ from ..discretization import Discretization
 from ..domains.validation import finite_number, positive_number
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..operators.linear_elements import LinearElements
+from ..parallel import attended
 from ..solver import Progress
 
 
@@ -58,7 +59,10 @@ class Geodesic:
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
         """|φ| measured anew; parts without a zero set keep what they have."""
-        distance, notes = straight_distance(discretization, values, source, self.tolerance)
+        distance, notes = attended(
+            lambda: straight_distance(discretization, values, source, self.tolerance),
+            None if progress is None else lambda: progress(0.0, "sharpen"),
+        )
         if not np.isfinite(distance).any():
             raise OutsideError(
                 "the field has one sign everywhere, hence no zero set to measure from: add an offset to its values, or "
