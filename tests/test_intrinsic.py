@@ -368,10 +368,10 @@ def test_progress_and_cancelling():
 
 def test_what_cannot_be_done_is_said():
     mesh = square(4)
-    for angle in 45, 0, -3, np.nan, np.inf:
+    for angle in 45, 0, -3, np.nan, np.inf, "28", [20]:
         with pytest.raises(sh.GeometryError, match="30 degrees"):
             sh.intrinsic_delaunay(mesh, refine=True, angle=angle)
-    for limit in 0, -1, np.nan, np.inf:
+    for limit in 0, -1, np.nan, np.inf, "many", [9]:
         with pytest.raises(sh.GeometryError, match="max_vertices"):
             sh.intrinsic_delaunay(mesh, refine=True, max_vertices=limit)
     for domain in sh.PolygonMesh(mesh.vertices, mesh.faces.tolist()), sh.intrinsic_delaunay(mesh), None:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -237,10 +238,10 @@ def intrinsic_delaunay(
 
     if not isinstance(mesh, TriangleMesh):
         raise GeometryError(f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(mesh).__name__}")
-    if not 0 < angle <= LARGEST_ANGLE:
-        raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle}")
-    if max_vertices is not None and not 0 < max_vertices < np.inf:
-        raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices}")
+    if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
+        raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}")
+    if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):
+        raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices!r}")
     stopwatch = Stopwatch(progress, steps=3)
     with stopwatch("embed curves"):
         base, _ = laid_out(mesh)
