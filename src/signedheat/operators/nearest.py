@@ -33,7 +33,9 @@ def _nearest(triangles, bounds, items, points):
     leaves = len(bounds) // 2
     for p in range(len(points)):
         x, y, z = points[p]
-        best, u, v, w = _place(triangles[found[p - 1] if p else 0], x, y, z)  # the next point is often nearby
+        best, u, v, w = place_on_triangle(
+            triangles[found[p - 1] if p else 0], x, y, z
+        )  # the next point is often nearby
         found[p] = found[p - 1] if p else 0
         depth, stack[0], gaps[0] = 1, 1, 0.0
         while depth > 0:
@@ -55,7 +57,7 @@ def _nearest(triangles, bounds, items, points):
                 continue
             for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
                 if items[k] >= 0:
-                    distance, a, b, c = _place(triangles[items[k]], x, y, z)
+                    distance, a, b, c = place_on_triangle(triangles[items[k]], x, y, z)
                     if distance < best:
                         best, u, v, w = distance, a, b, c
                         found[p] = items[k]
@@ -72,7 +74,7 @@ def _box_distance(box, x, y, z):
 
 
 @njit(cache=True)
-def _place(triangle, x, y, z):
+def place_on_triangle(triangle, x, y, z):
     """Squared distance of the nearest place in a triangle, and its barycentric coordinates.
 
     Inside if the foot of the perpendicular is; on the nearest of the sides if not. Numbers instead of arrays, because

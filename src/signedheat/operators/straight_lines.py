@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .nearest import _place
+from .nearest import place_on_triangle
 
 
 class Walls(NamedTuple):
@@ -74,7 +74,7 @@ def _foot(triangles, triangles_at, first_triangle, corners, near, x, y, z):
     best, found, place = np.inf, near, np.zeros(3)
     for c in range(3):
         for i in range(first_triangle[corners[near, c]], first_triangle[corners[near, c] + 1]):
-            square, a, b, g = _place(triangles[triangles_at[i]], x, y, z)
+            square, a, b, g = place_on_triangle(triangles[triangles_at[i]], x, y, z)
             if square < best:
                 best, found = square, triangles_at[i]
                 for d in range(3):
@@ -134,7 +134,7 @@ def bent_distance(
     for v in range(n):
         if nearest[v] >= 0:
             x, y, z = points[v]
-            square, a, b, g = _place(triangles[nearest[v]], x, y, z)
+            square, a, b, g = place_on_triangle(triangles[nearest[v]], x, y, z)
             t = triangles[nearest[v]]
             for d in range(3):
                 feet[v, d] = a * t[0, d] + b * t[1, d] + g * t[2, d]
@@ -147,7 +147,7 @@ def bent_distance(
             v = walls.tets[owners[i], k]
             if not known[v] and nearest[v] >= 0:
                 x, y, z = points[v]
-                square, a, b, g = _place(triangles[i], x, y, z)
+                square, a, b, g = place_on_triangle(triangles[i], x, y, z)
                 if square < distance[v] ** 2:
                     distance[v], nearest[v] = np.sqrt(square), i
                     for d in range(3):
