@@ -33,10 +33,9 @@ def _nearest(triangles, bounds, items, points):
     leaves = len(bounds) // 2
     for p in range(len(points)):
         x, y, z = points[p]
-        best, u, v, w = place_on_triangle(
-            triangles[found[p - 1] if p else 0], x, y, z
-        )  # the next point is often nearby
-        found[p] = found[p - 1] if p else 0
+        near = found[p - 1] if p else 0  # the next point is often nearby
+        best, u, v, w = place_on_triangle(triangles[near], x, y, z)
+        found[p] = near
         depth, stack[0], gaps[0] = 1, 1, 0.0
         while depth > 0:
             depth -= 1
