@@ -24,7 +24,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 import signedheat as sh
-from signedheat.operators.exact_geodesics import distance_to_zero_line
+from signedheat.geometry.geodesics.exact import distance_to_zero_line
 from signedheat.samples import sphere, torus
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import viewing
+from signedheat.visualization import slices as viewing
 
 EXPECTED = (8.5, 0.1)
 """Area of the letter, and what its missing corners may cost."""

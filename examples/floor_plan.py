@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import viewing
+from signedheat.visualization import slices as viewing
 
 PLAN = """
 #########################

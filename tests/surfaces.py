@@ -3,7 +3,7 @@
 import numpy as np
 
 import signedheat as sh
-from signedheat.operators.laid_out_triangles import LaidOutTriangles
+from signedheat.geometry.intrinsic_mesh import LaidOutTriangles
 
 
 def split_quads(a, b, c, d, rng):

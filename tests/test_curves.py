@@ -9,9 +9,9 @@ import pytest
 from surface_cases import band, book, flipped, laid_out, positions, sphere, square
 
 import signedheat as sh
-from signedheat.sources.pieces import pieces
-from signedheat.sources.places import EDGE, FACE, VERTEX, distinct, locate
-from signedheat.sources.projection import closest_points
+from signedheat.domains.projection import closest_points
+from signedheat.geometry.curve_segments import pieces
+from signedheat.geometry.surface_points import EDGE, FACE, VERTEX, distinct, locate
 
 
 def through_every_face(mesh, faces, weights):

@@ -8,7 +8,7 @@ import pytest
 
 import signedheat as sh
 from signedheat.discretization import discretize
-from signedheat.operators.surfels import boundary_surfels
+from signedheat.geometry.surfels import boundary_surfels
 
 AXIS = np.array([0.3, 0.2, 0.9]) / np.linalg.norm([0.3, 0.2, 0.9])
 

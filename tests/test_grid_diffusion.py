@@ -10,9 +10,9 @@ from scipy.sparse.linalg import spsolve
 import signedheat as sh
 from signedheat.discretization import discretize
 from signedheat.method import unit
-from signedheat.operators.node_sources import NodeSources
-from signedheat.operators.stencil import divergence, laplacian, solve_poisson
-from signedheat.operators.sweeps import diffuse_by_sweeps
+from signedheat.operators.grid.node_sources import NodeSources
+from signedheat.operators.grid.stencil import divergence, laplacian, solve_poisson
+from signedheat.operators.grid.sweeps import diffuse_by_sweeps
 
 
 def path_laplacian(n):

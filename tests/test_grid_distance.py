@@ -14,7 +14,7 @@ from grid_cases import (
 
 import signedheat as sh
 from signedheat.discretization import discretize
-from signedheat.lowering.grid import memory_estimate
+from signedheat.lowering.grid.discretization import memory_estimate
 
 BROKEN = broken_spheres()
 

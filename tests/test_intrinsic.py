@@ -9,8 +9,8 @@ from scipy.spatial import Delaunay
 from surface_cases import band, book, flipped, sphere, square
 
 import signedheat as sh
-from signedheat.operators.intrinsic_delaunay import flip_to_delaunay
-from signedheat.operators.laid_out_triangles import LaidOutTriangles
+from signedheat.geometry.intrinsic.delaunay import flip_to_delaunay
+from signedheat.geometry.intrinsic_mesh import LaidOutTriangles
 
 
 def squashed(mesh, factor=6.0):
@@ -305,7 +305,7 @@ def test_fixed_edges_keep_their_numbers():
 
 
 def test_vertices_that_all_but_coincide():
-    from signedheat.operators.coincidence_kernels import coinciding
+    from signedheat.geometry.intrinsic.coincidence_kernels import coinciding
 
     places = np.array(
         [0.0, 1e-3, 2e-3, 1.0, 1.5, 1.5 + 1e-3, 9.0, 9.0 + 1e-5, 9.001]

@@ -8,8 +8,8 @@ from grid_cases import assert_closed_manifold, enclosed_volume
 
 import signedheat as sh
 from signedheat.linear.stages import solve_in_stages
-from signedheat.lowering import masked_grid
-from signedheat.operators.open_nodes import OpenNodes
+from signedheat.lowering.grid import masked as masked_grid
+from signedheat.lowering.grid.free_nodes import OpenNodes
 
 LEFT_OF_WALL = sh.Polyline([[0.3, 2.0], [0.3, 0.0]])
 

@@ -10,10 +10,10 @@ from surface_cases import sphere, square
 from surfaces import surface_of_revolution
 
 import signedheat as sh
+from signedheat.geometry.edges import face_edges
 from signedheat.linear import factorize, whole
+from signedheat.lowering.surface.source import oriented_vectors
 from signedheat.method import diffuse, normalize
-from signedheat.operators.edges import face_edges
-from signedheat.sources.surface_source import oriented_vectors
 
 
 def bumpy():

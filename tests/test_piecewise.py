@@ -9,8 +9,8 @@ import signedheat as sh
 from signedheat.discretization import discretize
 from signedheat.extensions.jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 from signedheat.fields.piecewise_field import chains
-from signedheat.operators.face_pairs import face_pairs
-from signedheat.operators.laid_out_triangles import LaidOutTriangles
+from signedheat.geometry.face_pairs import face_pairs
+from signedheat.geometry.intrinsic_mesh import LaidOutTriangles
 from signedheat.samples import sphere, torus
 
 

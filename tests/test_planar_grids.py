@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat import viewing
+from signedheat.visualization import slices as viewing
 
 
 def circle(n=400, radius=1.0, center=(0.0, 0.0), part=1.0):

@@ -6,8 +6,8 @@ import pytest
 from scipy.spatial import Delaunay
 
 import signedheat as sh
-from signedheat.operators.holes import hole_fillings
-from signedheat.operators.local_triangulations import local_triangulations
+from signedheat.geometry.hole_filling import hole_fillings
+from signedheat.geometry.local_triangulations import local_triangulations
 
 
 def sphere_with_circle(n, height=0.3, seed=0):

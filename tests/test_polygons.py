@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat.operators.virtual_refinement import cut_into_triangles, virtual_refinement, virtual_vertices
+from signedheat.geometry.virtual_refinement import cut_into_triangles, virtual_refinement, virtual_vertices
 
 
 def refined(vertices, polygons):

@@ -10,7 +10,7 @@ from surfaces import FlatGluing
 
 import signedheat as sh
 from signedheat.linear import available_backends, whole
-from signedheat.lowering.surface import SurfaceDiscretization
+from signedheat.lowering.surface.discretization import SurfaceDiscretization
 from signedheat.method import diffuse, integrate, normalize
 from signedheat.operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
 
@@ -322,7 +322,9 @@ def test_the_pages_of_a_book(pages, constraint):
 
 
 def test_nothing_is_factorised_twice(monkeypatch):
-    from signedheat.lowering import direct_integration, surface, vector_heat
+    from signedheat.lowering import direct_integration
+    from signedheat.lowering.surface import discretization as surface
+    from signedheat.lowering.surface import vector_heat
 
     made = []
     for module in (direct_integration, surface, vector_heat):

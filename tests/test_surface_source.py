@@ -8,10 +8,10 @@ import pytest
 from surface_cases import band, book, flipped, laid_out, positions, sphere, square
 
 import signedheat as sh
-from signedheat.sources.embedding import embed
-from signedheat.sources.pieces import in_pieces, pieces
-from signedheat.sources.places import locate
-from signedheat.sources.surface_source import surface_source
+from signedheat.geometry.curve_segments import in_pieces, pieces
+from signedheat.geometry.intrinsic.conforming_refinement import embed
+from signedheat.geometry.surface_points import locate
+from signedheat.lowering.surface.source import surface_source
 
 
 def peer(mesh, curves=(), signs=(), points=(), constraint="None"):

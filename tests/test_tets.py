@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from tet_cases import boxes, lattice, plain_recipe, rectangle, rms, sphere
 
 import signedheat as sh
-from signedheat.lowering import tets as lowering
+from signedheat.lowering.tets import discretization as lowering
 from signedheat.method import unit
 
 

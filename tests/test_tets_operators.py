@@ -8,9 +8,9 @@ from scipy import sparse
 from tet_cases import boxes, rectangle, sphere
 
 import signedheat as sh
+from signedheat.geometry.tet_clipping import Planes, barycentric, clip_triangles, locate
 from signedheat.linear import factorize
 from signedheat.linear.krylov import IncompleteCholesky, outward_order
-from signedheat.sources.clipping import Planes, barycentric, clip_triangles, locate
 
 
 def dihedral_cotangents(corners: np.ndarray) -> dict[tuple[int, int], float]:

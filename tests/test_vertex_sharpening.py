@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 import signedheat as sh
 from signedheat.discretization import discretize
-from signedheat.operators.exact_geodesics import distance_to_edges_and_points, distance_to_zero_line
+from signedheat.geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
 from signedheat.samples import sphere, torus
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat import samples, viewing
+from signedheat import samples
+from signedheat.visualization import slices as viewing
 
 
 def test_cross_section_of_a_sphere_is_a_circle():

@@ -2,8 +2,10 @@
 
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .discretization import Diagnostics
+from .domains.curves import Curve, SurfacePoints
 from .domains.digital_surface import DigitalSurface
 from .domains.grid import Grid
+from .domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .domains.point_cloud import PointCloud
 from .domains.polygon_mesh import PolygonMesh
 from .domains.polyline import Polyline
@@ -25,7 +27,6 @@ from .extensions import tet_sharpening as _tet_sharpening  # noqa: F401  registe
 from .extensions import vertex_sharpening as _vertex_sharpening  # noqa: F401  registers it
 from .extensions.close_curves import close_curves
 from .extensions.common_subdivision import common_subdivision
-from .extensions.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.piecewise import piecewise_distance
 from .extensions.sharpening import sharpen
@@ -46,15 +47,14 @@ from .io import (
     write_curves,
     write_polylines,
 )
-from .lowering import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
-from .lowering import grid as _grid  # noqa: F401  registers the lowering
-from .lowering import point_clouds as _point_clouds  # noqa: F401  registers the lowering
-from .lowering import polygons as _polygons  # noqa: F401  registers the lowering
-from .lowering import surface as _surface  # noqa: F401  registers the lowering
-from .lowering import tets as _tets  # noqa: F401  registers the lowering
+from .lowering import polylines as _polylines  # noqa: F401  registers the source
+from .lowering.grid import discretization as _grid  # noqa: F401  registers the lowering
+from .lowering.surface import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
+from .lowering.surface import discretization as _surface  # noqa: F401  registers the lowering
+from .lowering.surface import point_clouds as _point_clouds  # noqa: F401  registers the lowering
+from .lowering.surface import polygons as _polygons  # noqa: F401  registers the lowering
+from .lowering.tets import discretization as _tets  # noqa: F401  registers the lowering
 from .solver import SignedHeatSolver, signed_distance
-from .sources import polylines as _polylines  # noqa: F401  registers the source
-from .sources.curves import Curve, SurfacePoints
 
 __version__ = "0.1.0"
 

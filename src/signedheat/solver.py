@@ -63,7 +63,7 @@ class SignedHeatSolver:
     def discretization(self) -> Discretization:
         """The domain as the method sees it."""
         if self.intrinsic:
-            from .extensions.intrinsic_triangulation import Retriangulated
+            from .domains.intrinsic_triangulation import Retriangulated
 
             progress = self.progress
             report = None if progress is None else lambda share: progress((1 + share) / 5, "refine")
@@ -235,7 +235,7 @@ def signed_distance(
     array([False,  True])
     """
     if domain is None:
-        from .sources.area_elements import grid_around
+        from .lowering.area_elements import grid_around
 
         domain = grid_around(as_list(source), resolution, padding)
     return SignedHeatSolver(domain, diffusion, progress).distance(source, constraint)

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..extensions.close_curves import refuse_without_sides
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
-from ..viewing import PICTURE_FORMATS
+from ..visualization.slices import PICTURE_FORMATS
 from .computing import naming
 from .options import Summary, add_command
 from .surface import add_curves_and_output, advice, measured
@@ -38,7 +38,7 @@ def run(arguments: Namespace) -> Summary:
         found = field.contour(0.0)
     write_curves(arguments.output, found, surface)
     if arguments.preview:
-        from ..surface_pictures import save_surface
+        from ..visualization.surfaces import save_surface
 
         save_surface(field, arguments.preview, found)
     closed = sum(curve.closed for curve in found)

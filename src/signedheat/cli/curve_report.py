@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..operators.laid_out_triangles import LaidOutTriangles
-from ..sources.curves import Curve
-from ..sources.pieces import pieces
-from ..sources.places import EDGE, FACE, VERTEX, locate
-from ..sources.tracing import gaps
+from ..domains.curves import Curve
+from ..geometry.curve_segments import pieces
+from ..geometry.geodesics.paths import gaps
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.surface_points import EDGE, FACE, VERTEX, locate
 
 NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 

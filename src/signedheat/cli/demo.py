@@ -13,7 +13,7 @@ from ..errors import FileFormatError
 from ..io import ensure_writable, save, save_field
 from ..io.files import PathLike, replacing
 from ..samples import broken_duck
-from ..viewing import draw_shape, draw_slices, new_figure
+from ..visualization.slices import draw_shape, draw_slices, new_figure
 from .computing import compute, describe
 from .options import Summary, add_command, whole_number
 

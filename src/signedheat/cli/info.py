@@ -84,7 +84,7 @@ def lines_report(arguments: Namespace) -> Summary:
 
 def _memory(shape: Any, resolution: int) -> int | None:
     """Estimate for a grid around the shape; nothing where the shape is a single place."""
-    from ..lowering.grid import memory_estimate
+    from ..lowering.grid.discretization import memory_estimate
 
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None

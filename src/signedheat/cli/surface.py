@@ -12,7 +12,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
-from ..viewing import PICTURE_FORMATS
+from ..visualization.slices import PICTURE_FORMATS
 from .computing import naming
 from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
 from .progress import ProgressBar
@@ -107,7 +107,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         lines = [curve for level in levels for curve in field.contour(float(level))]
         write_curves(summary["contours"], lines, surface)
     if arguments.preview:
-        from ..surface_pictures import save_surface
+        from ..visualization.surfaces import save_surface
 
         save_surface(field, arguments.preview, curves, arguments.contours or 20)
     text = f"{arguments.output}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
-from ..operators.surfels import Surfels, boundary_surfels, corrected_normals
+from ..geometry.surfels import Surfels, boundary_surfels, corrected_normals
 from .polygon_mesh import PolygonMesh
 from .surface import Surface
 from .triangle_mesh import TriangleMesh

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
-from ..operators.local_triangulations import LocalTriangulations, local_triangulations
+from ..geometry.local_triangulations import LocalTriangulations, local_triangulations
 from .exchange import Exchangeable
 from .surface import Surface
 from .triangle_mesh import TriangleMesh

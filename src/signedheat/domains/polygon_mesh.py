@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
-from ..operators.virtual_refinement import VirtualRefinement, virtual_refinement
+from ..geometry.virtual_refinement import VirtualRefinement, virtual_refinement
 from .exchange import Exchangeable
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh

@@ -76,7 +76,7 @@ class Polyline:
         >>> dot.points.tolist(), dot.closed
         ([[1.0, 1.5], [1.5, 1.0], [1.0, 0.5], [0.5, 1.0]], True)
         """
-        from ..fields.contouring import level_lines
+        from ..geometry.marching import level_lines
         from .grid import Grid
 
         inside = np.asarray(mask)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SourceError
-from ..sources.curves import Curve, SurfacePoints
+from .curves import Curve, SurfacePoints
 
 if TYPE_CHECKING:
     from .triangle_mesh import TriangleMesh
@@ -103,7 +103,7 @@ class Surface:
         >>> mesh.polyline([[0.8, 0.2, 0.01], [0.2, 0.8, 0.01]]).barycentric.round(3).tolist()
         [[0.2, 0.6, 0.2], [0.5, 0.0, 0.5], [0.2, 0.2, 0.6]]
         """
-        from ..sources.projection import projected_curve
+        from .projection import projected_curve
 
         return projected_curve(self.triangulation, points, closed, oriented, max_distance)
 
@@ -133,7 +133,7 @@ class Surface:
         >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).level_set([0.0, 1.0, 1.0], 0.5)
         [Curve(2 points, open, oriented)]
         """
-        from ..sources.level_sets import level_set
+        from .level_sets import level_set
 
         values = np.asarray(values, dtype=np.float64)
         return level_set(self.triangulation, self.on_triangulation(values), float(level))
@@ -163,7 +163,7 @@ class Surface:
         >>> mesh.region_boundary([True, False])
         [Curve(2 points, open, oriented)]
         """
-        from ..sources.level_sets import region_boundary
+        from .level_sets import region_boundary
 
         return region_boundary(self.triangulation, self._triangle_mask(np.asarray(face_mask)))
 
@@ -181,12 +181,12 @@ class Surface:
         >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).boundary_curves()
         [Curve(3 points, closed, oriented)]
         """
-        from ..sources.level_sets import boundary_curves
+        from .level_sets import boundary_curves
 
         return boundary_curves(self.triangulation)
 
     def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        from ..sources.places import corners_at
+        from ..geometry.surface_points import corners_at
 
         ids = self._triangulation_vertices(np.atleast_1d(np.asarray(vertices)))
         mesh = self.triangulation

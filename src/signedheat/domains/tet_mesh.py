@@ -120,7 +120,7 @@ class TetMesh:
     @cached_property
     def search_tree(self) -> Any:
         """A tree of the tets' boxes: an `operators.box_tree.BoxTree`."""
-        from ..operators.box_tree import BoxTree
+        from ..geometry.box_tree import BoxTree
 
         corners = self.vertices[self.tets]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))

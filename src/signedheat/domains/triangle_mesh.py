@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..operators.edges import EdgeTable, face_edges
+from ..geometry.edges import EdgeTable, face_edges
 from .exchange import Exchangeable
 from .surface import Surface
 from .validation import element_ids, finite_rows

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..constraints import Constraint
+from ..domains.curves import Curve, SurfacePoints
 from ..errors import SourceError
 from ..solver import SignedHeatSolver, as_list
-from ..sources.curves import Curve, SurfacePoints
 
 
 def close_curves(

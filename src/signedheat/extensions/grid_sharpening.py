@@ -17,7 +17,7 @@ from .sharpening import sharpen
 @sharpen.register
 def sharpen_grid(field: GridField, progress: Progress | None = None) -> GridField:
     """Distance of every node to the zero set; signs stay as they are. Second order on smooth shapes."""
-    from ..operators.closest_points import distance_to_zero_set
+    from ..operators.grid.closest_points import distance_to_zero_set
 
     if not np.isfinite(field.values).all():
         raise GeometryError(

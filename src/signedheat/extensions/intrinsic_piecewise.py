@@ -7,12 +7,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.curves import SurfacePoints
 from ..domains.polygon_mesh import PolygonMesh
 from ..errors import GeometryError
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.vertex_field import VertexField
-from ..sources.curves import SurfacePoints
-from ..sources.places import barycentric_in
+from ..geometry.surface_points import barycentric_in
 from .common_subdivision import positions, subdivided
 
 

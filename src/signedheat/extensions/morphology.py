@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.curves import Curve
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number
 from ..errors import SignedHeatError, SourceError
 from ..fields.grid_field import GridField
+from ..lowering.area_elements import area_elements, extent, grid_around
 from ..solver import SignedHeatSolver, as_list
-from ..sources.area_elements import area_elements, extent, grid_around
-from ..sources.curves import Curve
 from .sharpening import sharpen
 
 RESOLUTION = 128

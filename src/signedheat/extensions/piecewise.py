@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..discretization import Diagnostics, discretize
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
 from ..errors import SourceError, UnreachedWarning
 from ..fields.piecewise_field import PiecewiseField
+from ..geometry.curve_segments import Pieces
+from ..geometry.face_pairs import FacePairs, face_pairs
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.surface_points import VERTEX, barycentric_in
 from ..linear import factorize
 from ..method import diffuse, normalize
 from ..operators.cotan import cotan_matrix
-from ..operators.face_pairs import FacePairs, face_pairs
-from ..operators.laid_out_triangles import LaidOutTriangles
 from ..solver import Progress, SignedHeatSolver, Stopwatch, as_list
-from ..sources.pieces import Pieces
-from ..sources.places import VERTEX, barycentric_in
 from .intrinsic_piecewise import IntrinsicPiecewiseField
-from .intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 
 SOURCE_WEIGHT = 100.0

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
-from ..sources.area_elements import area_elements, extent
+from ..lowering.area_elements import area_elements, extent
 
 
 def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError, MemoryLimitError
-from ..sources.area_elements import area_elements, extent
+from ..lowering.area_elements import area_elements, extent
 
 LEAST_GRADING = 2.7
 """Below this, neighbouring leaves could differ by more than a factor of two: g/2 must exceed √3·¾."""

@@ -12,11 +12,11 @@ from scipy import sparse
 from ..discretization import discretize
 from ..errors import GeometryError
 from ..fields.vertex_field import VertexField
-from ..lowering.surface import SurfaceDiscretization
-from ..operators.laid_out_triangles import LaidOutTriangles
+from ..geometry.curve_segments import Pieces, rows_of
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.surface_points import VERTEX, barycentric_in, chained, star
+from ..lowering.surface.discretization import SurfaceDiscretization
 from ..operators.linear_elements import LinearElements
-from ..sources.pieces import Pieces, rows_of
-from ..sources.places import VERTEX, barycentric_in, chained, star
 from .sharpening import Method, Progress, sharpen, sharpened
 from .sharpening_methods import straight_distance
 
@@ -59,7 +59,7 @@ def _(
     surface: SurfaceDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
 ) -> tuple[NDArray[np.float64], dict[str, Any]]:
     """Along the faces, from the line on which values vanish and from sources without sides."""
-    from ..operators.exact_geodesics import distance_to_zero_line
+    from ..geometry.geodesics.exact import distance_to_zero_line
 
     parts = getattr(source, "parts", ())
     unsided = [part for part in parts if not part.oriented]
@@ -107,7 +107,7 @@ def distance_to_pieces(
     triangles: LaidOutTriangles, parts: list[Pieces], tolerance: float
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to curves along edges and to points anywhere; and the windows that it took."""
-    from ..operators.exact_geodesics import distance_to_edges_and_points
+    from ..geometry.geodesics.exact import distance_to_edges_and_points
 
     nodes = chained([part.nodes for part in parts])
     at_vertex = nodes.kinds == VERTEX

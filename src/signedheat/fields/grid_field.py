@@ -130,7 +130,7 @@ class GridField:
         GeometryError
             If the grid has neither 2 nor 3 dimensions, or values are infinite.
         """
-        from .contouring import closed_surface, level_lines
+        from ..geometry.marching import closed_surface, level_lines
 
         contoured = level_lines if self.grid.dimension == 2 else closed_surface
         return contoured(self.grid, self.values, level)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..discretization import Diagnostics
+from ..domains.curves import SurfacePoints
 from ..domains.triangle_mesh import TriangleMesh
-from ..operators.face_pairs import FacePairs, face_pairs
-from ..operators.laid_out_triangles import LaidOutTriangles
-from ..sources.curves import SurfacePoints
-from ..sources.places import locate
+from ..geometry.face_pairs import FacePairs, face_pairs
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.surface_points import locate
 from .vertex_field import VertexField
 
 if TYPE_CHECKING:

@@ -132,7 +132,7 @@ class TetField:
         OutsideError
             If φ does not take the level anywhere in the mesh.
         """
-        from .marching_tets import closed_level_set
+        from ..geometry.marching_tets import closed_level_set
 
         return closed_level_set(self.mesh, self.values, self._vertex_gradients, level)
 
@@ -181,21 +181,21 @@ class TetField:
 
     @cached_property
     def _planes(self) -> Any:
-        from ..sources.clipping import Planes
+        from ..geometry.tet_clipping import Planes
 
         return Planes.of(self.mesh)
 
     @cached_property
     def _wall_tree(self) -> Any:
-        from ..operators.box_tree import BoxTree
+        from ..geometry.box_tree import BoxTree
 
         corners = self.mesh.vertices[self.mesh.boundary.faces]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
     def _place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Vertices and weights that interpolate at each point or the nearest on the boundary, and the way from it."""
-        from ..operators.nearest import nearest_on_triangles
-        from ..sources.clipping import barycentric, locate
+        from ..geometry.nearest import nearest_on_triangles
+        from ..geometry.tet_clipping import barycentric, locate
 
         tets = locate(self.mesh, self._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)

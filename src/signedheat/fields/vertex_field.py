@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..discretization import Diagnostics
+from ..domains.curves import Curve, SurfacePoints
 from ..domains.validation import finite_rows
 from ..errors import OutsideError
-from ..sources.curves import Curve, SurfacePoints
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -156,7 +156,7 @@ class VertexField:
                     f"{mesh.n_faces - 1}: was it made for another surface?"
                 )
             return mesh, values, points.faces, points.barycentric
-        from ..sources.projection import closest_points
+        from ..domains.projection import closest_points
 
         faces, weights, _ = closest_points(mesh, finite_rows(points, "points", 3))
         return mesh, values, faces, weights

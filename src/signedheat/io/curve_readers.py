@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.curves import Curve
 from ..errors import FileFormatError, SourceError
-from ..sources.chains import chains
-from ..sources.curves import Curve
+from ..geometry.polylines import chains
 from .files import PathLike, text
 from .point_lists import read_point_lists
 
@@ -210,7 +210,7 @@ def read_obj(path: PathLike, domain: Any) -> Iterable[Group | Curve]:
 
 def projected_nodes(domain: Any, points: NDArray[np.float64]) -> list[Node]:
     """Closest points of a surface, as nodes."""
-    from ..sources.projection import closest_points
+    from ..domains.projection import closest_points
 
     faces, weights, _ = closest_points(domain.triangulation, points)
     return nodes_of(faces, weights, domain)

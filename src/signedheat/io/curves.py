@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.curves import Curve, SurfacePoints
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, SourceError
-from ..operators.laid_out_triangles import LaidOutTriangles
-from ..sources.curves import Curve, SurfacePoints
-from ..sources.places import locate
-from ..sources.tracing import gaps
+from ..geometry.geodesics.paths import gaps
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.surface_points import locate
 from .curve_readers import (
     POINTS,
     SIGNED,

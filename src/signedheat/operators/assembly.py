@@ -32,7 +32,7 @@ def assemble(
            [0.+0.j, 1.+0.j, 2.+0.j],
            [0.+0.j, 0.+0.j, 1.+0.j]])
     """
-    from .assembly_kernels import add_up
+    from ..geometry.triangle_kernels import add_up
 
     starts, columns, values = add_up(unknowns, diagonal, coupling, n)
     return sparse.csr_matrix((values, columns, starts), shape=(n, n))

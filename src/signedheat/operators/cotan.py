@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..geometry.intrinsic_mesh import LaidOutTriangles
 from .assembly import assemble
-from .laid_out_triangles import LaidOutTriangles
 
 
 def cotan_matrix(triangles: LaidOutTriangles) -> sparse.csr_matrix:
@@ -33,7 +33,7 @@ def divergence(triangles: LaidOutTriangles, directions: NDArray[np.complex128]) 
 
     The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
     """
-    from .assembly_kernels import add_fluxes
+    from ..geometry.triangle_kernels import add_fluxes
 
     directions = np.ascontiguousarray(directions)
     return add_fluxes(triangles.corner_vertices, triangles.corner_positions, directions, triangles.n_vertices)

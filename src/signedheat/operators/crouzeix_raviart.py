@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..geometry.intrinsic_mesh import LaidOutTriangles
 from .assembly import assemble
-from .laid_out_triangles import LaidOutTriangles
 
 
 def vector_heat_matrix(triangles: LaidOutTriangles, time: float) -> sparse.csr_matrix:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 if TYPE_CHECKING:
-    from .laid_out_triangles import LaidOutTriangles
+    from ..geometry.intrinsic_mesh import LaidOutTriangles
     from .tetrahedral import Tetrahedra
 
 

@@ -1,0 +1,174 @@
+"""Curves and isolated points on a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import GeometryError, SourceError
+from .validation import finite_rows, frozen
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A curve on a surface, from point to point; φ > 0 to its left if it is oriented.
+
+    Left is a quarter turn counter-clockwise from the curve's direction, as seen with the face normal towards you. A
+    segment along an edge has the left of the first face at that edge. Points given on an edge or at a vertex are
+    recognised whatever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive
+    points that share no face are joined by a shortest line across the faces between them; consecutive points that
+    coincide are harmless.
+
+    Parameters
+    ----------
+    faces : (n,) int
+        Face that each point lies in; any face that has the point will do.
+    barycentric : (n, 3) float
+        Where in that face.
+    closed : bool
+        Whether the last point is joined to the first.
+    oriented : bool
+        Whether the curve has two sides; an unoriented curve has distance like |φ|.
+    normals : (segments, 3) float, optional
+        Direction in space in which φ grows across each segment. Needed where left has no meaning: on surfaces whose
+        faces are not consistently oriented. Only their part along the surface counts, and not their length.
+
+    Raises
+    ------
+    SourceError
+        If there are fewer than two points, a number is NaN or infinite, coordinates are not barycentric, or the number
+        of normals is not that of the segments. Face ids are checked when the curve meets its surface.
+
+    Examples
+    --------
+    >>> across = Curve([0, 0], [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]])
+    >>> across.n_segments
+    1
+    >>> across.reversed().barycentric[0].tolist()
+    [0.0, 0.5, 0.5]
+    """
+
+    faces: NDArray[np.int64]
+    barycentric: NDArray[np.float64]
+    closed: bool = False
+    oriented: bool = True
+    normals: NDArray[np.float64] | None = None
+
+    def __init__(
+        self,
+        faces: ArrayLike,
+        barycentric: ArrayLike,
+        closed: bool = False,
+        oriented: bool = True,
+        normals: ArrayLike | None = None,
+    ) -> None:
+        ids, weights = surface_points(faces, barycentric, "curve")
+        if len(ids) < 2:
+            raise SourceError(
+                f"a curve needs at least two points, not {len(ids)}: use SurfacePoints for isolated points"
+            )
+        object.__setattr__(self, "faces", ids)
+        object.__setattr__(self, "barycentric", weights)
+        object.__setattr__(self, "closed", bool(closed))
+        object.__setattr__(self, "oriented", bool(oriented))
+        if normals is not None:
+            normals = finite(normals, "curve normals")
+            if len(normals) != self.n_segments:
+                raise SourceError(
+                    f"a curve of {self.n_segments} segments needs as many normals, not {len(normals)}: "
+                    "they belong to segments, not to points"
+                )
+        object.__setattr__(self, "normals", normals)
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.faces)
+
+    @property
+    def n_segments(self) -> int:
+        """Number of segments."""
+        return self.n_points if self.closed else self.n_points - 1
+
+    def reversed(self) -> Curve:
+        """The same curve run the other way: left and right change places, normals stay what they are."""
+        normals = None
+        if self.normals is not None:
+            normals = np.roll(self.normals[::-1], -1, axis=0) if self.closed else self.normals[::-1]
+        return Curve(self.faces[::-1], self.barycentric[::-1], self.closed, self.oriented, normals)
+
+    def __repr__(self) -> str:
+        kind = ("closed" if self.closed else "open", "oriented" if self.oriented else "unoriented")
+        return f"Curve({self.n_points} points, {kind[0]}, {kind[1]})"
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoints:
+    """Isolated points on a surface; φ grows away from each.
+
+    Parameters
+    ----------
+    faces : (n,) int
+        Face that each point lies in; any face that has the point will do.
+    barycentric : (n, 3) float
+        Where in that face.
+
+    Raises
+    ------
+    SourceError
+        If there is no point, a number is NaN or infinite, or coordinates are not barycentric.
+
+    Examples
+    --------
+    >>> SurfacePoints([4], [[0.2, 0.3, 0.5]])
+    SurfacePoints(1 points)
+    """
+
+    faces: NDArray[np.int64]
+    barycentric: NDArray[np.float64]
+
+    def __init__(self, faces: ArrayLike, barycentric: ArrayLike) -> None:
+        ids, weights = surface_points(faces, barycentric, "point source")
+        if not len(ids):
+            raise SourceError("there is no point: pass at least one")
+        object.__setattr__(self, "faces", ids)
+        object.__setattr__(self, "barycentric", weights)
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.faces)
+
+    def __repr__(self) -> str:
+        return f"SurfacePoints({self.n_points} points)"
+
+
+def surface_points(
+    faces: ArrayLike, barycentric: ArrayLike, name: str
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Frozen face ids and barycentric coordinates, checked as far as they can be without the surface."""
+    ids = np.atleast_1d(np.asarray(faces))
+    if ids.size == 0:
+        return frozen(np.empty(0, dtype=np.int64)), frozen(np.empty((0, 3)))
+    weights = finite(barycentric, f"barycentric coordinates of a {name}")
+    if ids.ndim != 1 or len(ids) != len(weights) or not np.issubdtype(ids.dtype, np.integer):
+        raise SourceError(
+            f"a {name} needs one integer face id per point: {ids.dtype} of shape {ids.shape} for {len(weights)} points"
+        )
+    wrong = np.flatnonzero((weights < -1e-6).any(axis=1) | (np.abs(weights.sum(axis=1) - 1) > 1e-6))
+    if len(wrong):
+        raise SourceError(
+            f"point {wrong[0]} of a {name} has barycentric coordinates {weights[wrong[0]].tolist()}: "
+            "they must be at least 0 and add up to 1"
+        )
+    return frozen(ids.astype(np.int64)), weights
+
+
+def finite(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    """(n, 3) finite numbers, or a `SourceError`."""
+    try:
+        return finite_rows(values, name, 3)
+    except GeometryError as error:
+        raise SourceError(str(error)) from None

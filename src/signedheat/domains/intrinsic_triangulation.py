@@ -1,0 +1,321 @@
+"""Intrinsic triangulations of a mesh: the same surface in better triangles (Sec. 9.4, Fig. 22).
+
+Edges are straightest lines along the surface instead of segments in space, so that triangles can be chosen for their
+angles alone: nothing of the surface changes. Flips give the intrinsic Delaunay triangulation (Bobenko & Springborn
+2007), in which the maximum principle holds; more vertices give a minimum angle (Sharp, Soliman & Crane 2019).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..discretization import discretize
+from ..errors import GeometryError
+from ..geometry.curve_segments import Pieces, in_pieces, pieces
+from ..geometry.intrinsic.history import History
+from ..geometry.intrinsic.transfer import Embedding, carry_pieces
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.mollification import mollify
+from ..lowering.surface.discretization import SurfaceDiscretization
+from ..solver import Progress, Stopwatch
+from .triangle_mesh import TriangleMesh
+from .validation import finite_rows, frozen
+
+MARGIN = 1e-14
+"""Triangle inequalities hold at least by this fraction of the mean length; flat triangles are thickened to it."""
+
+THICKNESS = 1e-9
+"""The same, for what is computed on a triangulation that has been made."""
+
+LARGEST_ANGLE = 30.0
+"""Degrees; refinement is not sure to end for more."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntrinsicTriangulation:
+    """A mesh in other triangles; made by `intrinsic_delaunay`. A domain like the mesh itself.
+
+    The first vertices are those of the mesh, under their numbers. Sources are given on the mesh; fields come back at
+    all vertices, and `restrict` returns to those of the mesh.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        What is triangulated.
+    triangles : LaidOutTriangles
+        The triangles: vertices, edges and shapes. Two edges may join the same two vertices, or a vertex with itself.
+    marked : (e,) bool
+        Edges along which the kept curves run.
+    goal : float
+        The angle, in degrees, that refinement aimed at; 0 for flips only.
+    complete : bool
+        Whether refinement ended before the limit on the number of vertices.
+    close : (m,) bool
+        Faces at vertices that all but coincide; refinement leaves thin ones among them alone.
+    """
+
+    mesh: TriangleMesh
+    triangles: LaidOutTriangles
+    marked: NDArray[np.bool_]
+    goal: float
+    complete: bool
+    close: NDArray[np.bool_] = field(repr=False)
+    base: LaidOutTriangles = field(repr=False)
+    embedding: Embedding = field(repr=False)
+    history: History = field(repr=False)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices; those of the mesh go first."""
+        return self.triangles.n_vertices
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return self.triangles.n_faces
+
+    @property
+    def faces(self) -> NDArray[np.int64]:
+        """(m, 3) vertex ids. The corners alone do not tell a face: see `triangles` for its edges."""
+        return self.triangles.corner_vertices
+
+    @cached_property
+    def vertices(self) -> NDArray[np.float64]:
+        """(n, 3) where in space the vertices lie, all of them on the mesh."""
+        faces, weights = self.vertex_places
+        return frozen(self.in_space(faces, weights))
+
+    @cached_property
+    def vertex_places(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """(n,) face of the mesh, and (n, 3) barycentric coordinates in it, of every vertex; face −1 where unused."""
+        old = self.mesh.faces
+        faces, weights = np.full(self.mesh.n_vertices, -1), np.zeros((self.mesh.n_vertices, 3))
+        for k in range(3):
+            faces[old[:, k]], weights[old[:, k]] = np.arange(len(old)), np.eye(3)[k]
+        cut = self.embedding.triangles
+        extra, corner = np.unique(cut.corner_vertices.ravel(), return_index=True)
+        corner = corner[extra >= self.mesh.n_vertices]
+        put = self.embedding.up(corner // 3, np.eye(3)[corner % 3])
+        new = self.embedding.up(*self.history.new_vertices)
+        return np.concatenate([faces, put[0], new[0]]), np.concatenate([weights, put[1], new[1]])
+
+    @cached_property
+    def corner_angles(self) -> NDArray[np.float64]:
+        """(m, 3) radians."""
+        leaving = self.triangles.edge_vectors
+        return np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
+
+    @cached_property
+    def thin_faces(self) -> NDArray[np.int64]:
+        """(k,) faces with an angle below the goal."""
+        return np.flatnonzero(self.corner_angles.min(axis=1) < np.radians(self.goal) - 1e-9)
+
+    @property
+    def summary(self) -> str:
+        """What was reached, in words."""
+        if not self.goal:
+            return f"Delaunay; the smallest angle is {np.degrees(self.corner_angles.min()):.3g}°"
+        if not len(self.thin_faces):
+            return f"no angle below {self.goal:g}°"
+        n_close = int(self.close[self.thin_faces].sum())
+        rest = len(self.thin_faces) - n_close
+        reasons = [f"{n_close} where vertices all but coincide"] if n_close else []
+        if rest and self.complete:
+            reasons.append(f"{rest} where the surface, its boundary or the kept curves close in at less than 60°")
+        elif rest:
+            reasons.append(f"{rest} because the limit of {self.n_vertices} vertices was reached: raise max_vertices")
+        return (
+            f"no angle below {self.goal:g}° but in {len(self.thin_faces)} of {self.n_faces} faces: {', '.join(reasons)}"
+        )
+
+    def in_space(self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p, 3) positions of points given on the mesh."""
+        positions = np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[faces]])
+        lost = np.flatnonzero(np.asarray(faces) < 0)
+        positions[lost] = self.mesh.vertices[lost]
+        return positions
+
+    def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Points of the mesh (faces, barycentric coordinates) in the triangulation's own faces.
+
+        Raises
+        ------
+        GeometryError
+            If a face does not exist, or a coordinate is NaN or infinite.
+        """
+        barycentric = finite_rows(barycentric, "barycentric coordinates", 3)
+        faces = np.asarray(faces, dtype=np.int64)
+        wrong = np.flatnonzero((faces < 0) | (faces >= self.mesh.n_faces))
+        if len(wrong):
+            raise GeometryError(f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces")
+        below = self.embedding.down(faces, barycentric, np.zeros((len(faces), 0, 3)))
+        found, weights, _ = self.history.forward(below[0], np.maximum(below[1], 0.0))
+        return found, weights / weights.sum(axis=1, keepdims=True)
+
+    def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Edges as they run on the mesh: number of the edge, start and end in space of each straight part."""
+        lines = self.history.edges_before()
+        starts = self.in_space(*self.embedding.up(lines.faces, lines.starts))
+        return lines.owners, starts, self.in_space(*self.embedding.up(lines.faces, lines.ends))
+
+    def bring(self, source: Any) -> Any:
+        """A source on the mesh, as these triangles see it."""
+        if isinstance(source, Sequence):
+            return [self.bring(part) for part in source]
+        seen = pieces(source, self.base, self.mesh.vertices)
+        return seen if isinstance(source, Pieces) else carry_pieces(seen, self.embedding, self.history, self.base)
+
+    def __repr__(self) -> str:
+        return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"
+
+
+def intrinsic_delaunay(
+    mesh: TriangleMesh,
+    keep: Any = (),
+    refine: bool = False,
+    angle: float = 28.0,
+    max_vertices: int | None = None,
+    progress: Progress | None = None,
+) -> IntrinsicTriangulation:
+    """Triangulate a mesh anew, along the surface: better angles, the same geometry.
+
+    Boundary and nonmanifold edges stay, and so do kept curves, which become paths of edges; refinement splits them
+    where it must. Any mesh will do: nonmanifold, nonorientable, with faces turned at random, nearly flat faces.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    keep : Curve, SurfacePoints or a sequence of them
+        Sources that are to run along edges, and to lie at vertices. Others can still be used afterwards.
+    refine : bool
+        Insert vertices until no angle is smaller than `angle`. Smaller ones remain where the surface, its boundary or
+        kept curves close in at less than 60°; and, on purpose, in faces at vertices that all but coincide: are
+        together smaller than a hundredth of the way to any other (grading towards them takes hundreds of vertices each,
+        and gains nothing). `IntrinsicTriangulation.summary` tells.
+    angle : float
+        Degrees, at most 30.
+    max_vertices : int, optional
+        Refine no further, so that it ends in any case; 20 for every vertex of the mesh and the kept curves, and
+        10,000 more, by default.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; what it raises cancels.
+
+    Returns
+    -------
+    IntrinsicTriangulation
+        A domain; time and memory grow in proportion to the flips and the new vertices, which on all but contrived
+        meshes are in proportion to the mesh.
+
+    Raises
+    ------
+    GeometryError
+        If the domain is not a triangle mesh, has no area, or `angle` or `max_vertices` is out of range.
+    SourceError
+        If a curve to be kept does not fit the mesh.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> vertices = [[0, 0, 0], [10, 0, 0], [10, 1, 0], [0, 1, 0]]
+    >>> strip = sh.TriangleMesh(vertices, [[0, 1, 2], [0, 2, 3]])
+    >>> better = sh.intrinsic_delaunay(strip, refine=True)
+    >>> better.summary
+    'no angle below 28°'
+    >>> bool(abs(better.triangles.face_areas.sum() - 10) < 1e-12)
+    True
+    """
+    from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
+    from ..geometry.intrinsic.refinement import refine_all
+
+    if not isinstance(mesh, TriangleMesh):
+        raise GeometryError(f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(mesh).__name__}")
+    if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
+        raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}")
+    if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):
+        raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices!r}")
+    stopwatch = Stopwatch(progress, steps=3)
+    with stopwatch("embed curves"):
+        base, _ = laid_out(mesh)
+        listed = list(keep) if isinstance(keep, Sequence) else [keep]
+        embedding = Embedding.of(base, list(chain.from_iterable(in_pieces(listed, base, mesh.vertices))))
+        marked, complete = embedding.marked, True
+    with stopwatch("flip"):
+        gluing = flip_all(glue(embedding.triangles, marked))
+        close = np.zeros(embedding.triangles.n_faces, dtype=bool)
+    with stopwatch("refine"):
+        if refine:
+            inner = None if progress is None else lambda share: progress((2 + share) / 3, "refine")
+            limit = 20 * embedding.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
+            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), limit, inner)
+            marked = np.append(marked, False)[origin]
+    n = int(gluing.counts[3])
+    triangles = lay_out(gluing)
+    history = History(embedding.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
+    goal = angle if refine else 0.0
+    return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, embedding, history)
+
+
+def laid_out(mesh: TriangleMesh) -> tuple[LaidOutTriangles, float]:
+    """A mesh as laid-out triangles, none of them quite flat; and the length that was added to all edges for that."""
+    lengths, added = mollify(mesh.edge_lengths[mesh.edges.of_faces], MARGIN)
+    if not lengths.max() > 0:
+        raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
+    return LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added
+
+
+@discretize.register
+def _(domain: IntrinsicTriangulation) -> SurfaceDiscretization:
+    return lowered(domain)
+
+
+@dataclass(frozen=True, eq=False)
+class Retriangulated:
+    """A mesh that gets an intrinsic triangulation of its own for every set of sources; fields stay on the mesh.
+
+    Stands in for the mesh's discretisation until the sources are known.
+    """
+
+    mesh: TriangleMesh
+    progress: Callable[[float], None] | None = field(default=None, repr=False)
+
+    def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
+        """Refine the mesh with the sources along edges."""
+        inner = None if self.progress is None else lambda share, _: self.progress(share)
+        domain = intrinsic_delaunay(self.mesh, keep=sources, refine=True, progress=inner)
+        own = np.arange(self.mesh.n_vertices)
+        return lowered(domain, domain=self.mesh, restriction=own).adapt(sources)
+
+
+def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
+    """An intrinsic triangulation as the three steps see it; what is flat against an edge that stays, is thickened."""
+    triangles = triangulation.triangles
+    lengths, added = mollify(triangles.edge_lengths, THICKNESS)
+    if added:
+        corners, edges = triangles.corner_vertices, triangles.edges
+        triangles = LaidOutTriangles.from_lengths(corners, lengths, triangles.n_vertices, edges)
+    options = {
+        "domain": triangulation,
+        "bring": triangulation.bring,
+        "spacing": spacing(triangles),
+        "notes": {"intrinsic triangulation": triangulation.summary},
+        **options,
+    }
+    return SurfaceDiscretization(triangles=triangles, **options)
+
+
+def spacing(triangles: LaidOutTriangles) -> float:
+    """h: half the mean edge length, where the mean is over the area of the surface.
+
+    The plain mean would follow the many small triangles that refinement puts where the mesh needs them, and then
+    ``√t`` would not bridge the others.
+    """
+    return 0.5 * float(triangles.face_areas @ triangles.edge_lengths.mean(axis=1) / triangles.face_areas.sum())

@@ -1,0 +1,122 @@
+"""Curves that a surface has of its own: level sets of functions on it, borders of regions, its boundary."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SourceError
+from ..geometry.polylines import chains
+from .curves import Curve
+
+if TYPE_CHECKING:
+    from .triangle_mesh import TriangleMesh
+
+
+def level_set(mesh: TriangleMesh, values: NDArray[np.float64], level: float) -> list[Curve]:
+    """Marching triangles: where a piecewise linear function takes a value, with larger values to the left.
+
+    Values equal to the level count as larger, so that every face is crossed along one segment or not at all; loops that
+    shrink to a point are dropped, and faces with a NaN corner left out. Where the faces are not consistently oriented,
+    the curves get normals, along the gradient.
+    """
+    faces, edges = mesh.faces, mesh.edges
+    if values.shape != (mesh.n_vertices,):
+        raise SourceError(f"a level set needs one value per vertex: {mesh.n_vertices}, not an array {values.shape}")
+    above = values >= level
+    known = np.isfinite(values)[faces].all(axis=1)
+    count = above[faces].sum(axis=1)
+    crossed = np.flatnonzero(known & (count > 0) & (count < 3))
+    odd = np.where(count[crossed] == 1, above[faces[crossed]].argmax(axis=1), above[faces[crossed]].argmin(axis=1))
+    sides = np.stack([odd, (odd + 2) % 3], axis=1)
+    sides[count[crossed] == 2] = sides[count[crossed] == 2, ::-1]
+    on_edges = edges.of_faces[crossed[:, None], sides]
+
+    tail, head = (values[edges.vertices[:, k]] for k in (0, 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = np.clip((level - tail) / (head - tail), 0.0, 1.0)
+    oriented = is_consistent(mesh)
+    normals = None if oriented else gradients(mesh, values, crossed)
+    curves = []
+    for order, backwards, closed in chains(*on_edges.T, directed=oriented):
+        first = np.where(backwards, sides[order, 1], sides[order, 0])
+        last = np.where(backwards, sides[order, 0], sides[order, 1])[-1:]
+        face = crossed[order]
+        if not closed:
+            face, first = np.append(face, face[-1]), np.append(first, last)
+        weights = on_sides(mesh, face, first, along)
+        points = np.einsum("ik,ikj->ij", weights, mesh.vertices[mesh.faces[face]])
+        if (points == points[0]).all():
+            continue
+        curves.append(Curve(face, weights, closed=closed, normals=None if normals is None else normals[order]))
+    return curves
+
+
+def on_sides(
+    mesh: TriangleMesh, faces: NDArray[np.int64], sides: NDArray[np.int64], along: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(k, 3) barycentric coordinates of points on sides of faces, from fractions of edges."""
+    row = np.arange(len(faces))
+    fraction = along[mesh.edges.of_faces[faces, sides]]
+    fraction = np.where(mesh.edges.forward[faces, sides], fraction, 1 - fraction)
+    weights = np.zeros((len(faces), 3))
+    weights[row, sides] = 1 - fraction
+    weights[row, (sides + 1) % 3] = fraction
+    return weights
+
+
+def gradients(mesh: TriangleMesh, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k, 3) gradients of a piecewise linear function on some faces, up to a positive factor."""
+    corners = mesh.vertices[mesh.faces[faces]]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    of_corners = np.cross(normal[:, None], opposite)
+    rise = values[mesh.faces[faces]]
+    return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
+
+
+def region_boundary(mesh: TriangleMesh, mask: NDArray[np.bool_]) -> list[Curve]:
+    """Edges between faces in a region and faces outside, with the region to the left."""
+    inside = np.bincount(mesh.edges.of_faces.ravel(), np.repeat(mask, 3), len(mesh.edges.vertices))
+    between = (inside > 0) & (inside < mesh.edges.face_counts)
+    return along_sides(mesh, between[mesh.edges.of_faces] & mask[:, None])
+
+
+def boundary_curves(mesh: TriangleMesh) -> list[Curve]:
+    """Edges of a single face, with the surface to the left."""
+    return along_sides(mesh, (mesh.edges.face_counts == 1)[mesh.edges.of_faces])
+
+
+def along_sides(mesh: TriangleMesh, chosen: NDArray[np.bool_]) -> list[Curve]:
+    """Curves along chosen sides of faces, each face to the left of its own."""
+    faces, sides = np.nonzero(chosen)
+    following = (sides + 1) % 3
+    tails, heads = mesh.faces[faces, sides], mesh.faces[faces, following]
+    oriented = is_consistent(mesh)
+    curves = []
+    for order, backwards, closed in chains(tails, heads, directed=oriented):
+        face = faces[order]
+        corner = np.where(backwards, following[order], sides[order])
+        if not closed:
+            face = np.append(face, face[-1])
+            corner = np.append(corner, sides[order[-1]] if backwards[-1] else following[order[-1]])
+        normals = None if oriented else inward(mesh, faces[order], sides[order])
+        curves.append(Curve(face, np.eye(3)[corner], closed=closed, normals=normals))
+    return curves
+
+
+def inward(mesh: TriangleMesh, faces: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k, 3) directions in faces, at right angles to sides of theirs, inward."""
+    corners = mesh.vertices[mesh.faces[faces]]
+    row = np.arange(len(faces))
+    along = corners[row, (sides + 1) % 3] - corners[row, sides]
+    return np.cross(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), along)
+
+
+def is_consistent(mesh: TriangleMesh) -> bool:
+    """Whether no two faces run along an edge in the same direction."""
+    edges = mesh.edges
+    ahead = np.bincount(edges.of_faces.ravel(), edges.forward.ravel(), len(edges.vertices))
+    return bool((ahead <= 1).all() and (edges.face_counts - ahead <= 1).all())

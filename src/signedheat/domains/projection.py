@@ -1,0 +1,57 @@
+"""Polylines in space, brought onto a surface."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import SourceError
+from ..geometry.box_tree import BoxTree
+from ..geometry.geodesics.paths import join
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.surface_points import locate
+from .curves import Curve, finite
+
+if TYPE_CHECKING:
+    from .triangle_mesh import TriangleMesh
+
+
+def projected_curve(
+    mesh: TriangleMesh, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
+) -> Curve:
+    """The curve through the closest points of a mesh, with shortest lines across faces between them."""
+    points = finite(points, "points of the polyline")
+    if len(points) < 2:
+        raise SourceError(f"a polyline needs at least two points, not {len(points)}: for isolated points use points_at")
+    faces, weights, distances = closest_points(mesh, points)
+    if max_distance is None:
+        max_distance = 0.05 * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
+    far = int(distances.argmax())
+    if distances[far] > max_distance:
+        raise SourceError(
+            f"the polyline leaves the mesh: point {far}, {points[far].tolist()}, is {distances[far]:.6g} away from it, "
+            f"and at most {max_distance:.6g} is allowed: check units and placement, or raise max_distance"
+        )
+    lengths = np.linalg.norm(np.roll(mesh.vertices[mesh.faces], -1, axis=1) - mesh.vertices[mesh.faces], axis=2)
+    triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
+    start = np.arange(len(points) if closed else len(points) - 1)
+    places, starts, ends, _ = join(
+        triangles, locate(triangles, faces, weights), start, (start + 1) % len(points), "polyline"
+    )
+    order = starts if closed else np.append(starts, ends[-1])
+    return Curve(places.faces[order], places.barycentric[order], closed=closed, oriented=oriented)
+
+
+def closest_points(
+    mesh: TriangleMesh, points: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Face, barycentric coordinates and distance of the point of a mesh closest to each point."""
+    from ..geometry.nearest import nearest_on_triangles
+
+    corners = mesh.vertices[mesh.faces]
+    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+    faces, weights = nearest_on_triangles(corners, tree, np.ascontiguousarray(points))
+    found = np.einsum("ik,ikj->ij", weights, corners[faces])
+    return faces, weights, np.linalg.norm(points - found, axis=1)

@@ -1,0 +1,63 @@
+"""Edges of a set of triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeTable:
+    """Edges and how the faces run along them.
+
+    Attributes
+    ----------
+    vertices : (e, 2) int
+        Tail and head: the direction in which the FIRST face of the edge runs along it.
+    of_faces : (m, 3) int
+        Edge from corner k to corner k + 1 of each face.
+    forward : (m, 3) bool
+        Whether the face runs along that edge from tail to head.
+    """
+
+    vertices: NDArray[np.int64]
+    of_faces: NDArray[np.int64]
+    forward: NDArray[np.bool_]
+
+    @property
+    def face_counts(self) -> NDArray[np.int64]:
+        """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
+        return np.bincount(self.of_faces.ravel(), minlength=len(self.vertices))
+
+    def elimination_order(self, vertex_order: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Order that suits unknowns at edges, from a fill-reducing order of the vertices.
+
+        An edge goes with its end that is eliminated first. Edges from two parts that a set of vertices separates never
+        share a face, so the edges within that set separate them just as well: the order dissects edges as it does
+        vertices, for a fraction of the cost of finding one anew.
+        """
+        rank = np.empty(len(vertex_order), dtype=np.int64)
+        rank[vertex_order] = np.arange(len(vertex_order))
+        a, b = rank[self.vertices].T
+        return np.argsort((np.minimum(a, b) + 1) * len(rank) - np.maximum(a, b), kind="stable")
+
+
+def face_edges(faces: NDArray[np.int64]) -> EdgeTable:
+    """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face).
+
+    Grows with the number of faces; a vertex that all faces share does no harm.
+
+    Examples
+    --------
+    >>> table = face_edges(np.array([[0, 1, 2], [2, 1, 3]]))
+    >>> table.vertices.tolist()
+    [[0, 1], [1, 2], [2, 0], [1, 3], [3, 2]]
+    >>> table.of_faces.tolist()
+    [[0, 1, 2], [1, 3, 4]]
+    """
+    from .triangle_kernels import find_edges
+
+    faces = np.ascontiguousarray(faces, dtype=np.int64)
+    return EdgeTable(*find_edges(faces, np.bincount(faces.ravel())))

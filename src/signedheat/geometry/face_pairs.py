@@ -1,0 +1,79 @@
+"""Which faces meet across which edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .intrinsic_mesh import LaidOutTriangles
+
+
+@dataclass(frozen=True, eq=False)
+class FacePairs:
+    """Pairs of faces that meet at an edge.
+
+    The faces round an edge of three or more are paired each with the next, round and round, and each pair counts half:
+    to part one face from all others then costs as much as to part two.
+
+    Attributes
+    ----------
+    faces : (p, 2) int
+        The two faces.
+    sides : (p, 2) int
+        Which of its sides each face has there; side k runs from corner k to corner k + 1.
+    edges : (p,) int
+        The edge.
+    tails, heads : (p, 2) int
+        In each face the corner at the edge's tail, and the one at its head; as index into raveled (m, 3) corners.
+    shares : (p,) float
+        1, or ½ where three or more faces meet.
+    """
+
+    faces: NDArray[np.int64]
+    sides: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    tails: NDArray[np.int64]
+    heads: NDArray[np.int64]
+    shares: NDArray[np.float64]
+
+    def ends(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(p, 2) difference, first face less second, of (m, 3) corner values at the edge's tail and at its head."""
+        flat = corner_values.ravel()
+        at_tail, at_head = flat[self.tails], flat[self.heads]
+        return np.stack([at_tail[:, 0] - at_tail[:, 1], at_head[:, 0] - at_head[:, 1]], axis=1)
+
+
+def face_pairs(triangles: LaidOutTriangles) -> FacePairs:
+    """Pair the faces at every edge; boundary edges have no pair.
+
+    Examples
+    --------
+    >>> two = LaidOutTriangles.from_lengths(np.array([[0, 1, 2], [2, 1, 3]]), np.ones((2, 3)), 4)
+    >>> pairs = face_pairs(two)
+    >>> pairs.faces.tolist(), pairs.sides.tolist(), pairs.edges.tolist()
+    ([[0, 1]], [[1, 0]], [1])
+    """
+    edge = triangles.edges.of_faces.ravel()
+    order = np.argsort(edge, kind="stable")
+    count = np.bincount(edge, minlength=triangles.n_edges)
+    last = np.cumsum(count)
+    following = np.arange(1, len(order) + 1)
+    following[last[count > 0] - 1] = (last - count)[count > 0]
+    halfedges = np.stack([order, order[following]], axis=1)
+    around = count[edge[order]]
+    halfedges = halfedges[(around > 2) | ((around == 2) & (halfedges[:, 0] < halfedges[:, 1]))]
+
+    faces, sides = halfedges // 3, halfedges % 3
+    begin, end = halfedges, 3 * faces + (sides + 1) % 3
+    forward = triangles.edges.forward.ravel()[halfedges]
+    edges = edge[halfedges[:, 0]]
+    return FacePairs(
+        faces,
+        sides,
+        edges,
+        tails=np.where(forward, begin, end),
+        heads=np.where(forward, end, begin),
+        shares=np.where(count[edges] > 2, 0.5, 1.0),
+    )

@@ -1,0 +1,147 @@
+"""Shortest lines across faces, between points that share none."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+from ...errors import SourceError
+from ..intrinsic_mesh import LaidOutTriangles
+from ..surface_points import Places, barycentric_in, chained, locate, places_at, shared_faces, star
+
+
+def join(
+    triangles: LaidOutTriangles, places: Places, start: NDArray[np.int64], end: NDArray[np.int64], name: str
+) -> tuple[Places, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Join starts to ends: all places, with the shortest lines between those that share no face cut into segments.
+
+    Returns the places, old ones first; starts and ends of segments, in order; and which pair each belongs to.
+    """
+    apart = np.flatnonzero(shared_faces(triangles, places[start], places[end]) < 0)
+    added = np.zeros(len(start), dtype=np.int64)
+    middle = places[apart[:0]]
+    if len(apart):
+        middle, added[apart] = trace(triangles, places[start[apart]], places[end[apart]], name)
+    pair = np.repeat(np.arange(len(start)), added + 1)
+    step = np.arange(len(pair)) - np.repeat(np.cumsum(added + 1) - added - 1, added + 1)
+    after = len(places) + np.repeat(np.cumsum(added) - added, added + 1) + step
+    starts = np.where(step == 0, start[pair], after - 1)
+    ends = np.where(step == added[pair], end[pair], after)
+    return chained([places, middle]), starts, ends, pair
+
+
+def gaps(triangles: LaidOutTriangles, places: Places, closed: bool) -> NDArray[np.int64]:
+    """Which segments of a curve through places have ends that share no face."""
+    start = np.arange(len(places) if closed else len(places) - 1)
+    return np.flatnonzero(shared_faces(triangles, places[start], places[(start + 1) % len(places)]) < 0)
+
+
+def trace(triangles: LaidOutTriangles, start: Places, end: Places, name: str = "curve") -> tuple[Places, NDArray]:
+    """Places on the shortest lines between starts and ends, where they cross edges or pass vertices.
+
+    A line is shortest among its neighbours: no vertex that it passes could be passed on the other side for less. The
+    first guess is the shortest way through midpoints of edges; the faces on it are unfolded, a string is pulled tight
+    inside them, and wherever it bends round a vertex the other side is tried.
+
+    Parameters
+    ----------
+    triangles : LaidOutTriangles
+        The surface.
+    start, end : Places
+        (k,) the points to join.
+    name : str
+        What the points belong to, for messages.
+
+    Returns
+    -------
+    places : Places
+        All points between, line after line.
+    counts : (k,) int
+        How many there are on each line.
+
+    Raises
+    ------
+    SourceError
+        If no way along the surface leads from a start to its end.
+    """
+    from .path_kernels import shortest_lines
+
+    starts, ends = faces_at(triangles, start), faces_at(triangles, end)
+    edges = triangles.edges
+    sides, fractions, counts = shortest_lines(
+        triangles.corner_positions, edges.of_faces.ravel(), edges.forward.ravel(), triangles.n_edges, *starts, *ends
+    )
+    weights = np.zeros((len(sides), 3))
+    row = np.arange(len(sides))
+    weights[row, sides % 3] = 1 - fractions
+    weights[row, (sides % 3 + 1) % 3] = fractions
+    places = locate(triangles, sides // 3, weights, name)
+    blocked = np.flatnonzero(counts < 0)
+    if not len(blocked):
+        return places, counts
+    parts, begin = [], np.cumsum(np.maximum(counts, 0)) - np.maximum(counts, 0)
+    for k in range(len(counts)):
+        if counts[k] >= 0:
+            parts.append(places[np.arange(begin[k], begin[k] + counts[k])])
+            continue
+        parts.append(through_vertices(triangles, start[[k]], end[[k]], name))
+        counts[k] = len(parts[-1])
+    return chained(parts), counts
+
+
+def faces_at(
+    triangles: LaidOutTriangles, places: Places
+) -> tuple[NDArray[np.int64], NDArray[np.complex128], NDArray[np.int64]]:
+    """All faces that have each place, where it lies in their layouts, and where the faces of each place begin."""
+    which, faces = star(triangles, places)
+    order = np.lexsort([faces, which])
+    which, faces = which[order], faces[order]
+    weights = barycentric_in(triangles, faces, places[which])
+    points = (weights * triangles.corner_positions[faces]).sum(axis=1)
+    return faces, points, np.searchsorted(which, np.arange(len(places) + 1))
+
+
+def through_vertices(triangles: LaidOutTriangles, start: Places, end: Places, name: str) -> Places:
+    """The way between two places that no faces join across edges, through vertices at which fans of faces touch."""
+    edges, n = triangles.edges, triangles.n_vertices
+    arcs, lengths = [edges.vertices], [edge_lengths(triangles)]
+    for node, place in ((n, start), (n + 1, end)):
+        faces, points, _ = faces_at(triangles, place)
+        corners = triangles.corner_vertices[faces].ravel()
+        arcs.append(np.stack([np.full(len(corners), node), corners], axis=1))
+        lengths.append(np.abs(triangles.corner_positions[faces] - points[:, None]).ravel())
+    tails, heads = np.concatenate(arcs).T
+    graph = csr_matrix((np.concatenate(lengths) + 1e-300, (tails, heads)), shape=(n + 2, n + 2))
+    before = dijkstra(graph, directed=False, indices=n, return_predecessors=True)[1]
+    path = [n + 1]
+    while path[-1] != n and before[path[-1]] >= 0:
+        path.append(before[path[-1]])
+    if path[-1] != n:
+        raise SourceError(
+            f"{name}: no way along the surface joins the point in face {start.faces[0]} to the point in face "
+            f"{end.faces[0]}: they lie on different connected components; make them two curves"
+        )
+    chain = chained([start, places_at(triangles, np.array(path[-2:0:-1])), end])
+    step = np.arange(len(chain) - 1)
+    part = parts_of_faces(triangles)[shared_faces(triangles, chain[step], chain[step + 1])]
+    turning = np.concatenate([[0], 1 + np.flatnonzero(np.diff(part)), [len(chain) - 1]])
+    step = np.arange(len(turning) - 1)
+    places, _, ends, _ = join(triangles, chain[turning], step, step + 1, name)
+    return places[ends[:-1]]
+
+
+def edge_lengths(triangles: LaidOutTriangles) -> NDArray[np.float64]:
+    """(e,) lengths of the edges, each as one of its faces has it."""
+    lengths = np.zeros(triangles.n_edges)
+    lengths[triangles.edges.of_faces] = triangles.edge_lengths
+    return lengths
+
+
+def parts_of_faces(triangles: LaidOutTriangles) -> NDArray[np.int64]:
+    """(m,) which faces can be reached from one another across edges."""
+    m, edge = triangles.n_faces, triangles.edges.of_faces.ravel()
+    face = np.repeat(np.arange(m), 3)
+    graph = csr_matrix((np.ones(len(edge)), (face, m + edge)), shape=(m + triangles.n_edges,) * 2)
+    return connected_components(graph, directed=False)[1][:m]

@@ -1,0 +1,378 @@
+"""Triangles cut so that curves run along edges and points lie at vertices."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..constrained_triangulation import arrange, triangulate
+from ..curve_segments import Pieces
+from ..edges import EdgeTable
+from ..intrinsic_mesh import LaidOutTriangles
+from ..surface_points import EDGE, FACE, VERTEX, Places, chained, distinct, places_at
+from .delaunay import flip_all, glue, lay_out
+
+
+def embed(
+    triangles: LaidOutTriangles, groups: Sequence[Sequence[Pieces]]
+) -> tuple[LaidOutTriangles, list[list[Pieces]]]:
+    """Cut faces wherever an unoriented curve or an isolated point leaves edges and vertices (MATH.md §2).
+
+    Whatever else lies in a face that is cut, or on an edge that is split, is embedded too; all other faces and pieces
+    stay as they are. Edges of the cut faces that carry nothing are then flipped to Delaunay, to be rid of slivers.
+
+    Parameters
+    ----------
+    triangles : LaidOutTriangles
+        The surface.
+    groups : sequence of sequences of Pieces
+        The sources, in pieces.
+
+    Returns
+    -------
+    triangles : LaidOutTriangles
+        The old vertices first, then new ones; the very same object if nothing had to be cut.
+    groups : list of lists of Pieces
+        The sources on these triangles.
+    """
+    parts = [part for group in groups for part in group]
+    if all(part.fits for part in parts):
+        return triangles, [list(group) for group in groups]
+    everything = Union.of(parts)
+    cut_faces, split_edges = reach(triangles, everything, [not part.fits for part in parts])
+    finer, moved = flipped(*Cut(triangles, everything, cut_faces, split_edges).assemble())
+    pieces = iter([moved.part(k, part.oriented) for k, part in enumerate(parts)])
+    return finer, [[next(pieces) for _ in group] for group in groups]
+
+
+@dataclass(frozen=True, eq=False)
+class Union:
+    """The pieces of several sources, with points that coincide counted once."""
+
+    nodes: Places
+    ends: NDArray[np.int64]
+    faces: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    vectors: NDArray[np.complex128]
+    owners: NDArray[np.int64]
+    samples: list[NDArray[np.int64]]
+
+    @classmethod
+    def of(cls, parts: Sequence[Pieces]) -> Union:
+        """Join sources; `samples` says which nodes each of them has."""
+        places = chained([p.nodes for p in parts])
+        first, who = distinct(places)
+        offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
+        return cls(
+            places[first],
+            np.concatenate([who[p.ends + o] for p, o in zip(parts, offsets, strict=False)]),
+            np.concatenate([p.faces for p in parts]),
+            np.concatenate([p.edges for p in parts]),
+            np.concatenate([p.vectors for p in parts]),
+            np.repeat(np.arange(len(parts)), [len(p.ends) for p in parts]),
+            [who[a:b] for a, b in pairwise(offsets)],
+        )
+
+    def part(self, k: int, oriented: bool) -> Pieces:
+        """One of the sources again."""
+        mine = self.owners == k
+        old = self.samples[k]
+        nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
+        rank = np.full(len(self.nodes), -1)
+        rank[nodes[::-1]] = np.arange(len(nodes))[::-1]
+        return Pieces(
+            self.nodes[nodes], rank[self.ends[mine]], self.faces[mine], self.edges[mine], self.vectors[mine], oriented
+        )
+
+
+def reach(triangles: LaidOutTriangles, union: Union, unfit: Sequence[bool]) -> tuple[set[int], set[int]]:
+    """Faces to cut and edges to split: those that unfit sources need, and what else must follow."""
+    nodes, inside = union.nodes, union.edges < 0
+    nodes_of, pieces_of = defaultdict(list), defaultdict(list)
+    for i in np.flatnonzero(nodes.kinds == FACE).tolist():
+        nodes_of[int(nodes.elements[i])].append(i)
+    for p in np.flatnonzero(inside).tolist():
+        pieces_of[int(union.faces[p])].append(p)
+    on_edges = np.unique(nodes.elements[nodes.kinds == EDGE])
+    marked = np.zeros(triangles.n_edges, dtype=bool)
+    marked[on_edges] = True
+    faces_of = defaultdict(list)
+    for f, k in zip(*(a.tolist() for a in np.nonzero(marked[triangles.edges.of_faces])), strict=True):
+        faces_of[int(triangles.edges.of_faces[f, k])].append(f)
+
+    wanted = np.unique(np.concatenate([s for s, bad in zip(union.samples, unfit, strict=True) if bad]))
+    bad_pieces = inside & np.asarray(unfit)[union.owners]
+    queue = [int(e) for e in nodes.elements[wanted][nodes.kinds[wanted] == FACE]]
+    queue += union.faces[bad_pieces].tolist()
+    edges = {int(e) for e in nodes.elements[wanted][nodes.kinds[wanted] == EDGE]}
+    for e in edges:
+        queue += faces_of[e]
+    faces: set[int] = set()
+    while queue:
+        face = queue.pop()
+        if face in faces:
+            continue
+        faces.add(face)
+        for p in pieces_of[face]:
+            for i in union.ends[p].tolist():
+                e = int(nodes.elements[i])
+                if nodes.kinds[i] == EDGE and e not in edges:
+                    edges.add(e)
+                    queue += faces_of[e]
+    return faces, edges
+
+
+class Cut:
+    """A set of triangles while some of its faces are cut."""
+
+    def __init__(self, triangles: LaidOutTriangles, union: Union, faces: set[int], edges: set[int]) -> None:
+        self.triangles, self.union = triangles, union
+        self.n_vertices, self.n_edges = triangles.n_vertices, triangles.n_edges
+        self.faces: list[NewFace] = []
+        self.pieces: list[NewPiece] = []
+        self.cut_faces = sorted(faces)
+        nodes = union.nodes
+        self.vertex_of = np.where(nodes.kinds == VERTEX, nodes.elements, -1).tolist()
+        self.node_at = {v: i for i, v in enumerate(self.vertex_of) if v >= 0}
+        self.on_edge: dict[int, list[int]] = {e: [] for e in sorted(edges)}
+        self.in_face: dict[int, list[int]] = {f: [] for f in self.cut_faces}
+        for i, (kind, element) in enumerate(zip(nodes.kinds.tolist(), nodes.elements.tolist(), strict=True)):
+            home = self.on_edge if kind == EDGE else self.in_face if kind == FACE else {}
+            if element in home:
+                home[element].append(i)
+                self.vertex_of[i] = self.new_vertex()
+                self.node_at[self.vertex_of[i]] = i
+        for members in self.on_edge.values():
+            members.sort(key=lambda i: nodes.along[i])
+        self.sub_edges = {e: [self.new_edge() for _ in range(len(m) + 1)] for e, m in self.on_edge.items()}
+
+        inside = defaultdict(list)
+        rows = zip(union.ends.tolist(), union.faces.tolist(), union.edges.tolist(), strict=True)
+        for p, (ends, face, edge) in enumerate(rows):
+            if edge in self.on_edge:
+                self.cut_along(p, edge)
+            elif edge < 0 and face in self.in_face:
+                inside[face].append(p)
+            else:
+                self.pieces.append(NewPiece(*ends, face, edge, union.vectors[p], union.owners[p]))
+        for face in self.cut_faces:
+            self.cut_face(face, inside[face])
+
+    def new_vertex(self) -> int:
+        self.n_vertices += 1
+        return self.n_vertices - 1
+
+    def new_edge(self) -> int:
+        self.n_edges += 1
+        return self.n_edges - 1
+
+    def node(self, vertex: int) -> int:
+        """The node at a vertex, a new one if it had none."""
+        if vertex not in self.node_at:
+            self.node_at[vertex] = len(self.vertex_of)
+            self.vertex_of.append(vertex)
+        return self.node_at[vertex]
+
+    def cut_along(self, p: int, edge: int) -> None:
+        """Cut a piece along a split edge at the points of the edge between its ends."""
+        union, chain = self.union, self.on_edge[edge]
+        at = [0.0, *union.nodes.along[chain].tolist(), 1.0]
+        vertices = [*(self.vertex_of[i] for i in chain), *self.triangles.edges.vertices[edge].tolist()]
+        vertices = [vertices[-2], *vertices[:-2], vertices[-1]]
+        a, b = (vertices.index(self.vertex_of[i]) for i in union.ends[p].tolist())
+        step = 1 if a < b else -1
+        for k in range(a, b, step):
+            vector = union.vectors[p] * (abs(at[k + step] - at[k]) / abs(at[b] - at[a]))
+            ends = self.node(vertices[k]), self.node(vertices[k + step])
+            sub = self.sub_edges[edge][min(k, k + step)]
+            self.pieces.append(NewPiece(*ends, -1, sub, vector, union.owners[p]))
+
+    def cut_face(self, face: int, inside: list[int]) -> None:
+        """Cut one face along the pieces inside it."""
+        triangles, union = self.triangles, self.union
+        corners = triangles.corner_vertices[face].tolist()
+        points, vertices = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], list(corners)
+        sides: list[list[int]] = []
+        edge_of: dict[tuple[int, int], tuple[int, bool]] = {}
+        frames: dict[int, tuple[int, int, bool]] = {}
+        for k in range(3):
+            edge, forward = int(triangles.edges.of_faces[face, k]), bool(triangles.edges.forward[face, k])
+            members = self.on_edge.get(edge, [])[:: 1 if forward else -1]
+            subs = self.sub_edges.get(edge, [edge])[:: 1 if forward else -1]
+            (x, y), (u, v) = points[k], points[(k + 1) % 3]
+            chain = [k]
+            for i in members:
+                t = union.nodes.along[i] if forward else 1 - union.nodes.along[i]
+                chain.append(len(points))
+                points.append((float(x + t * (u - x)), float(y + t * (v - y))))
+                vertices.append(self.vertex_of[i])
+            sides.append(chain[1:])
+            chain.append((k + 1) % 3)
+            for j, sub in enumerate(subs):
+                edge_of[chain[j], chain[j + 1]] = sub, forward
+                along = (chain[j], chain[j + 1]) if forward else (chain[j + 1], chain[j])
+                frames[sub] = (*along, bool(triangles.reflected[face, k]))
+        for i in self.in_face[face]:
+            points.append((float(union.nodes.barycentric[i, 1]), float(union.nodes.barycentric[i, 2])))
+            vertices.append(self.vertex_of[i])
+
+        local = {v: k for k, v in reversed(list(enumerate(vertices)))}
+        ends = [tuple(local[self.vertex_of[i]] for i in union.ends[p].tolist()) for p in inside]
+        chains = arrange(points, ends)
+        vertices += [self.new_vertex() for _ in range(len(points) - len(vertices))]
+        flat = np.array(points)
+        q = triangles.corner_positions[face]
+        positions = q[0] + flat[:, 0] * (q[1] - q[0]) + flat[:, 1] * (q[2] - q[0])
+
+        segments = [pair for chain in chains for pair in pairwise(chain)]
+        for corner in triangulate(points, sides, segments):
+            edges, ahead = [], []
+            for u, v in pairwise((*corner, corner[0])):
+                if (u, v) not in edge_of:
+                    edge = self.new_edge()
+                    edge_of[u, v], edge_of[v, u], frames[edge] = (edge, True), (edge, False), (u, v, False)
+                edges.append(edge_of[u, v][0])
+                ahead.append(edge_of[u, v][1])
+            self.faces.append(NewFace(face, [vertices[i] for i in corner], edges, ahead, positions[list(corner)]))
+
+        for p, chain in zip(inside, chains, strict=True):
+            whole = abs(positions[chain[-1]] - positions[chain[0]])
+            for u, v in pairwise(chain):
+                edge = (edge_of.get((u, v)) or edge_of[v, u])[0]
+                tail, head, over = frames[edge]
+                vector = union.vectors[p] * np.conj(positions[head] - positions[tail]) / whole
+                ends_here = self.node(vertices[u]), self.node(vertices[v])
+                self.pieces.append(NewPiece(*ends_here, -1, edge, np.conj(vector) if over else vector, union.owners[p]))
+
+    def assemble(self) -> tuple[LaidOutTriangles, Union, NDArray[np.bool_]]:
+        """The triangles after all cuts, what lies on them, and which faces are new."""
+        triangles, union = self.triangles, self.union
+        kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
+        parents = np.concatenate([kept, [f.parent for f in self.faces]])
+        order = np.argsort(
+            parents, kind="stable"
+        )  # the first face of an edge remains, or leaves its place to its parts
+
+        def with_new(old: NDArray, name: str) -> NDArray:
+            return np.concatenate([old[kept], [getattr(f, name) for f in self.faces]])[order]
+
+        of_faces = with_new(triangles.edges.of_faces, "edges")
+        forward = with_new(triangles.edges.forward, "ahead")
+        corners = with_new(triangles.corner_vertices, "corners")
+        used, first, flat = np.unique(of_faces, return_index=True, return_inverse=True)
+        vertices = np.stack([corners.ravel()[first], np.roll(corners, -1, axis=1).ravel()[first]], axis=1)
+        table = EdgeTable(vertices, flat.reshape(-1, 3), forward)
+        finer = LaidOutTriangles(corners, with_new(triangles.corner_positions, "positions"), table, self.n_vertices)
+
+        new_face = np.full(triangles.n_faces, -1)
+        is_new = order >= len(kept)
+        new_face[parents[order][~is_new]] = np.flatnonzero(~is_new)
+        new_edge = np.full(self.n_edges, -1)
+        new_edge[used] = np.arange(len(used))
+
+        at_vertex = np.array(self.vertex_of)
+        fill = np.zeros(len(at_vertex) - len(union.nodes))
+        kinds = np.where(at_vertex >= 0, VERTEX, np.concatenate([union.nodes.kinds, fill]).astype(np.int64))
+        elements = np.concatenate([union.nodes.elements, fill]).astype(np.int64)
+        elements[kinds == VERTEX] = at_vertex[kinds == VERTEX]
+        elements[kinds == EDGE] = new_edge[elements[kinds == EDGE]]
+        elements[kinds == FACE] = new_face[elements[kinds == FACE]]
+        weights = np.concatenate([union.nodes.barycentric, np.zeros((len(fill), 3))])
+        nodes = places_of(finer, kinds, elements, np.concatenate([union.nodes.along, fill]), weights)
+
+        ends = np.array([(p.start, p.end) for p in self.pieces], dtype=np.int64).reshape(-1, 2)
+        edges = np.array([p.edge for p in self.pieces], dtype=np.int64)
+        faces = np.array([p.face for p in self.pieces], dtype=np.int64)
+        on_edge = edges >= 0
+        edges[on_edge] = new_edge[edges[on_edge]]
+        faces[~on_edge] = new_face[faces[~on_edge]]
+        faces[on_edge] = first_sides(finer)[edges[on_edge]] // 3
+        vectors = np.array([p.vector for p in self.pieces], dtype=np.complex128)
+        owners = np.array([p.owner for p in self.pieces], dtype=np.int64)
+        return finer, Union(nodes, ends, faces, edges, vectors, owners, union.samples), is_new
+
+
+class NewFace(NamedTuple):
+    """Part of a face that was cut."""
+
+    parent: int
+    corners: list[int]
+    edges: list[int]
+    ahead: list[bool]
+    positions: NDArray[np.complex128]
+
+
+class NewPiece(NamedTuple):
+    """A piece, or part of one; its face does not count where it runs along an edge."""
+
+    start: int
+    end: int
+    face: int
+    edge: int
+    vector: complex
+    owner: int
+
+
+def first_sides(triangles: LaidOutTriangles) -> NDArray[np.int64]:
+    """(e,) the first side ``3 face + k`` of each edge."""
+    return np.unique(triangles.edges.of_faces, return_index=True)[1]
+
+
+def places_of(
+    triangles: LaidOutTriangles,
+    kinds: NDArray[np.int64],
+    elements: NDArray[np.int64],
+    along: NDArray[np.float64],
+    barycentric: NDArray[np.float64],
+) -> Places:
+    """Places told by their elements; `along` says where on edges and `barycentric` where in faces."""
+    faces, weights = elements.copy(), barycentric.copy()
+    at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
+    vertices = places_at(triangles, elements[at_vertex])
+    faces[at_vertex], weights[at_vertex] = vertices.faces, vertices.barycentric
+    side = first_sides(triangles)[elements[on_edge]]
+    faces[on_edge], weights[on_edge] = side // 3, 0.0
+    weights[on_edge, side % 3] = 1 - along[on_edge]
+    weights[on_edge, (side % 3 + 1) % 3] = along[on_edge]
+    return Places(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
+
+
+def flipped(triangles: LaidOutTriangles, union: Union, is_new: NDArray[np.bool_]) -> tuple[LaidOutTriangles, Union]:
+    """Flip edges of new faces to Delaunay, but for those that carry a piece or bound a face with one inside.
+
+    Where faces do not agree on the lengths of their edges, none can be flipped.
+    """
+    if not triangles.agree_on_lengths:
+        return triangles, union
+    on_edge = union.edges >= 0
+    fixed = np.ones(triangles.n_edges, dtype=bool)
+    fixed[triangles.edges.of_faces[is_new]] = False
+    fixed[union.edges[on_edge]] = True
+    fixed[triangles.edges.of_faces[union.faces[~on_edge]]] = True
+    fixed[triangles.edges.of_faces[union.nodes.elements[union.nodes.kinds == FACE]]] = True
+    fixed[union.nodes.elements[union.nodes.kinds == EDGE]] = True
+    gluing = flip_all(glue(triangles, fixed))
+    better = lay_out(gluing)
+
+    side = first_sides(better)
+    ahead, same = gluing.forward[side], gluing.front[side]  # the frame of an edge, seen from its first face of now
+    carrier = union.edges[on_edge]
+    vectors, faces = union.vectors.copy(), union.faces.copy()
+    seen = vectors[on_edge]
+    vectors[on_edge] = np.where(ahead[carrier], 1, -1) * seen.real + 1j * np.where(same[carrier], 1, -1) * seen.imag
+    faces[on_edge] = side[carrier] // 3
+    inside = union.faces[~on_edge]
+    turned = better.edge_vectors[inside, 0] * np.conj(triangles.edge_vectors[inside, 0])
+    vectors[~on_edge] *= turned / np.abs(turned)
+
+    nodes = union.nodes
+    along = np.where((nodes.kinds == EDGE) & ~ahead[np.where(nodes.kinds == EDGE, nodes.elements, 0)], 1, 0)
+    along = np.where(along, 1 - nodes.along, nodes.along)
+    places = places_of(better, nodes.kinds, nodes.elements, along, nodes.barycentric)
+    return better, replace(union, nodes=places, faces=faces, vectors=vectors)

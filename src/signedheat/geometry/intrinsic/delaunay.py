@@ -1,0 +1,119 @@
+"""Intrinsic Delaunay triangulations by edge flips: lengths and gluing in, lengths and gluing out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..edges import EdgeTable
+from ..intrinsic_mesh import LaidOutTriangles
+
+if TYPE_CHECKING:
+    from .gluing_kernels import Gluing
+
+
+def flip_to_delaunay(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = None) -> LaidOutTriangles:
+    """Flip edges until the two angles opposite to every edge sum to at most π.
+
+    The surface stays what it is: its vertices, angle sums and area; only the edges change. Edges at a boundary,
+    nonmanifold edges and those in `fixed_edges` stay, under their numbers. Where neighbouring faces disagree about
+    their orientation, faces are turned over as needed.
+
+    Parameters
+    ----------
+    triangles : LaidOutTriangles
+        Neighbouring faces must agree about the length of their edge; flat and nearly flat triangles are welcome.
+    fixed_edges : (e,) bool, optional
+        Edges that must not be flipped, for instance those of a source.
+
+    Returns
+    -------
+    LaidOutTriangles
+        As many vertices, edges and faces. Two edges may now join the same two vertices, or one vertex with itself.
+
+    Examples
+    --------
+    A rhombus cut along its long diagonal; the other diagonal is better.
+
+    >>> sides = np.array([[1.9, 1.0, 1.0], [1.9, 1.0, 1.0]])
+    >>> rhombus = LaidOutTriangles.from_lengths(np.array([[0, 1, 2], [1, 0, 3]]), sides, 4)
+    >>> flip_to_delaunay(rhombus).edges.vertices.tolist()
+    [[3, 2], [1, 2], [2, 0], [0, 3], [3, 1]]
+    """
+    gluing = glue(triangles, fixed_edges)
+    flip_all(gluing)
+    return lay_out(gluing)
+
+
+def glue(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = None) -> Gluing:
+    """Start an intrinsic triangulation, with an empty history."""
+    from .gluing_kernels import Gluing
+
+    edges = triangles.edges
+    edge, n_edges = edges.of_faces.ravel(), triangles.n_edges
+    order = np.argsort(edge, kind="stable")
+    first = np.searchsorted(edge[order], np.arange(n_edges))
+    last = np.searchsorted(edge[order], np.arange(n_edges), side="right") - 1
+    ring = np.empty_like(edge)
+    ring[order] = np.roll(order, -1)
+    used = first <= last
+    ring[order[last[used]]] = order[first[used]]
+    start = np.where(used, order[np.minimum(first, len(order) - 1)], 0)
+    sums = np.bincount(edge, weights=triangles.edge_lengths.ravel(), minlength=n_edges)
+    lengths = sums / np.maximum(edges.face_counts, 1)
+    unit = _power_of_two(lengths.mean())
+    fixed = np.zeros(n_edges, dtype=bool) if fixed_edges is None else np.array(fixed_edges, dtype=bool)
+    return Gluing(
+        tail=triangles.corner_vertices.ravel().copy(),
+        edge=edge.copy(),
+        forward=edges.forward.ravel().copy(),
+        front=start[edge] == np.arange(len(edge)),
+        ring=ring,
+        start=start,
+        length=lengths / unit,
+        fixed=fixed,
+        flips=np.zeros(n_edges, dtype=np.int64),
+        counts=np.array([triangles.n_faces, n_edges, triangles.n_vertices, 0, 0]),
+        steps=np.empty((2 * n_edges + 64, 4), dtype=np.int64),
+        weights=np.empty((2 * n_edges + 64, 4)),
+        scratch=np.empty((4, 4), dtype=np.int64),
+        unit=unit,
+    )
+
+
+def flip_all(gluing: Gluing) -> Gluing:
+    """Flip to Delaunay; the same triangulation, with room for its longer history."""
+    from .gluing_kernels import settle
+
+    n_edges = int(gluing.counts[1])
+    gluing.counts[4] = n_edges
+    stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
+    while not settle(gluing, stack, stacked):
+        gluing = gluing._replace(steps=doubled(gluing.steps), weights=doubled(gluing.weights))
+    return gluing
+
+
+def lay_out(gluing: Gluing) -> LaidOutTriangles:
+    """The triangulation as it is now. Edges keep their numbers."""
+    n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
+    corners, edge = gluing.tail[: 3 * n_faces].reshape(-1, 3), gluing.edge[: 3 * n_faces]
+    forward, heads = gluing.forward[: 3 * n_faces], np.roll(corners, -1, axis=1).ravel()
+    first = np.zeros(n_edges, dtype=np.int64)
+    first[edge[::-1]] = np.arange(3 * n_faces)[::-1]
+    table = EdgeTable(
+        np.stack([gluing.tail[first], heads[first]], axis=1),
+        edge.reshape(-1, 3).copy(),
+        (forward == forward[first[edge]]).reshape(-1, 3),
+    )
+    lengths = gluing.length[edge].reshape(-1, 3) * gluing.unit
+    return LaidOutTriangles.from_lengths(corners.copy(), lengths, n_vertices, table)
+
+
+def doubled(array: NDArray) -> NDArray:
+    return np.concatenate([array, np.zeros_like(array)])
+
+
+def _power_of_two(value: float) -> float:
+    return float(2.0 ** np.round(np.log2(value))) if value > 0 else 1.0

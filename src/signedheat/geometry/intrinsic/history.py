@@ -1,0 +1,146 @@
+"""How an intrinsic triangulation came about, and how points and lines go with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..intrinsic_mesh import LaidOutTriangles
+from .delaunay import glue
+
+
+class Lines(NamedTuple):
+    """Straight lines, one row for each face that one of them crosses, in order along each line.
+
+    Attributes
+    ----------
+    owners : (r,) int
+        Which line.
+    faces : (r,) int
+    starts, ends : (r, 3) float
+        Barycentric coordinates of where the line enters and leaves the face.
+    vectors : (r, k, 3) float
+        The vectors that went along, as differences of barycentric coordinates.
+    """
+
+    owners: NDArray[np.int64]
+    faces: NDArray[np.int64]
+    starts: NDArray[np.float64]
+    ends: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Two triangulations of one surface and the steps from one to the other.
+
+    Attributes
+    ----------
+    before, after : LaidOutTriangles
+        Vertices of `before` keep their numbers; the new ones follow.
+    steps, weights : (n, 4) int and float
+        As `intrinsic_kernels.record` writes them.
+    """
+
+    before: LaidOutTriangles
+    after: LaidOutTriangles
+    steps: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+    def forward(
+        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Points of `before`, and vectors (p, k, 3) at them, as points of `after`."""
+        return self._carry(True, faces, barycentric, vectors)
+
+    def backward(
+        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Points of `after`, and vectors (p, k, 3) at them, as points of `before`."""
+        return self._carry(False, faces, barycentric, vectors)
+
+    @cached_property
+    def new_vertices(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Where on `before` the vertices are that only `after` has: faces and barycentric coordinates."""
+        count = self.after.n_vertices - self.before.n_vertices
+        faces, barycentric, _ = self.backward(np.full(count, -1), np.zeros((count, 3)))
+        return faces, barycentric
+
+    def edges_before(self) -> Lines:
+        """The edges of `after`, from tail to head, as lines on `before`."""
+        return straight(self.before, *self.backward(*edge_middles(self.after)))
+
+    def edges_after(self) -> Lines:
+        """The edges of `before`, from tail to head, as lines on `after`."""
+        return straight(self.after, *self.forward(*edge_middles(self.before)))
+
+    def _carry(
+        self,
+        forward: bool,
+        faces: NDArray[np.int64],
+        barycentric: NDArray[np.float64],
+        vectors: NDArray[np.float64] | None,
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        from .transfer_kernels import carry
+
+        faces, barycentric = np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64)
+        vectors = np.zeros((len(faces), 0, 3)) if vectors is None else np.array(vectors, dtype=np.float64)
+        n_faces = max(self.before.n_faces, self.after.n_faces)
+        carry(self.steps, self.weights, forward, n_faces, faces, barycentric, vectors)
+        return faces, barycentric, vectors
+
+
+def edge_middles(triangles: LaidOutTriangles) -> tuple[NDArray, NDArray, NDArray]:
+    """Faces and barycentric coordinates of the edges' middle points, and (e, 1, 3) vectors from tail to head."""
+    side = np.unique(triangles.edges.of_faces, return_index=True)[1]
+    faces, k, rows = side // 3, side % 3, np.arange(len(side))
+    middle, along = np.zeros((len(side), 3)), np.zeros((len(side), 1, 3))
+    middle[rows, k] = middle[rows, (k + 1) % 3] = 0.5
+    ahead = np.where(triangles.edges.forward[faces, k], 1.0, -1.0)
+    along[rows, 0, k], along[rows, 0, (k + 1) % 3] = -ahead, ahead
+    return faces, middle, along
+
+
+def straight(
+    triangles: LaidOutTriangles,
+    faces: NDArray[np.int64],
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+) -> Lines:
+    """Straight lines given by their middle points and, as the first vector at each, their whole extent."""
+    from .transfer_kernels import walk_both_ways
+
+    gluing = glue(triangles)
+    halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
+    halves[:, 0] *= 0.5
+    room = 4 * len(faces) + 16
+    while True:
+        shape = (room, vectors.shape[1], 3)
+        rows = Lines(
+            np.empty(room, np.int64),
+            np.empty(room, np.int64),
+            np.empty((room, 3)),
+            np.empty((room, 3)),
+            np.empty(shape),
+        )
+        count = walk_both_ways(gluing, faces, barycentric, halves, *rows[1:], rows.owners)
+        if count <= room:
+            break
+        room = count
+    owners, faces, starts, ends, vectors = (a[:count] for a in rows)
+    against = owners < 0
+    owners = np.where(against, -1 - owners, owners)
+    begin, finish = np.where(against[:, None], ends, starts), np.where(against[:, None], starts, ends)
+    position = np.where(against, -1 - np.arange(count), np.arange(count))
+    vectors[:, 0] *= 2.0
+    order = np.lexsort([position, owners])
+    owners, faces, begin, finish, vectors, against = (
+        a[order] for a in (owners, faces, begin, finish, vectors, against)
+    )
+    first_half = np.flatnonzero(against[:-1] & ~against[1:] & (owners[:-1] == owners[1:]))  # they meet in the middle
+    finish[first_half] = finish[first_half + 1]
+    return Lines(*(np.delete(a, first_half + 1, axis=0) for a in (owners, faces, begin, finish, vectors)))

@@ -1,0 +1,152 @@
+"""Intrinsic Delaunay refinement: vertices put where they heal thin triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .delaunay import doubled
+
+if TYPE_CHECKING:
+    from .gluing_kernels import Gluing
+    from .refinement_kernels import Agenda
+
+PER_FACE = ("tail", "edge", "forward", "front", "ring")
+PER_EDGE = ("start", "length", "fixed", "flips")
+TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
+
+PATIENCE = 5000
+"""New vertices between two reports of progress: some hundredths of a second."""
+
+
+def refine_all(
+    gluing: Gluing, angle: float, max_vertices: int, progress: Callable[[float], None] | None = None
+) -> tuple[Gluing, NDArray[np.int64], NDArray[np.bool_], bool]:
+    """Refine a Delaunay triangulation until every face that can be helped has no angle below `angle`.
+
+    Fixed, boundary and nonmanifold edges may be split but stay. Small angles remain where fixed edges meet, or the
+    surface closes up, at less than 60°; where vertices all but coincide; and where the limit on the number of vertices
+    is reached first.
+
+    Parameters
+    ----------
+    gluing : Gluing
+        Delaunay, as `flip_all` returns it; changed.
+    angle : float
+        Radians.
+    max_vertices : int
+        Stop when there are as many.
+    progress : callable, optional
+        Called now and then with an estimate of the part that is done; what it raises ends the work.
+
+    Returns
+    -------
+    Gluing
+        The refined triangulation.
+    (e,) int
+        The fixed edge before that each edge now is part of, or −1.
+    (m,) bool
+        Faces at vertices that all but coincide: thin ones among them have been left alone.
+    bool
+        Whether it was finished before the limit.
+    """
+    from .refinement_kernels import FULL, GROW, PAUSED, Goal, list_all, refine
+
+    segments, agenda = agenda_of(gluing)
+    goal = Goal(np.tan(angle / 2) ** 2, max_vertices)
+    list_all(gluing, agenda, goal)
+    listed = np.flatnonzero(agenda.bins >= 0)  # by size: large faces go first, so the list in turn tells the progress
+    done = 0.0
+    while True:
+        status = refine(gluing, agenda, goal, PATIENCE)
+        if status == PAUSED and progress is not None:
+            done = max(done, float(listed[-1] - agenda.seen[1]) / len(listed))
+            progress(min(done, 1.0))
+        if status == GROW:
+            grown = {k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")}
+            gluing = gluing._replace(**grown)
+            agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in TO_GROW})
+        if status not in (PAUSED, GROW):
+            break
+    n_edges = int(gluing.counts[1])
+    origin = np.full(n_edges, -1)
+    fixed = np.flatnonzero(gluing.fixed[:n_edges])
+    origin[fixed] = segments[agenda.segment[fixed]]
+    return gluing, origin, close_faces(gluing, agenda), status != FULL
+
+
+def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
+    """(m,) faces whose shortest side joins vertices that all but coincide."""
+    n_faces = int(gluing.counts[0])
+    faces = np.arange(n_faces)
+    lengths = gluing.length[gluing.edge[: 3 * n_faces]].reshape(-1, 3)
+    group = agenda.group[gluing.tail[: 3 * n_faces]].reshape(-1, 3)
+    side = lengths.argmin(axis=1)
+    one, other = group[faces, side], group[faces, (side + 1) % 3]
+    return (one >= 0) & (one == other) & (lengths[faces, side] <= agenda.extent[one])
+
+
+def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:
+    """The fixed edges, and what there is to do; boundary and nonmanifold edges become fixed."""
+    from .coincidence_kernels import coinciding
+    from .refinement_kernels import N_BINS, Agenda
+
+    n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
+    counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
+    gluing.fixed[:n_edges] |= counts != 2
+    start = gluing.start[:n_edges]
+    tail, head = gluing.tail[start], gluing.tail[3 * (start // 3) + (start + 1) % 3]
+    lengths = gluing.length[:n_edges]
+    order = np.argsort(lengths, kind="stable")
+    group, extent = coinciding(tail, head, lengths, order[counts[order] > 0], n_vertices)
+    segments = np.flatnonzero(gluing.fixed[:n_edges])
+    segment = np.full(n_edges, -1, dtype=np.int64)
+    segment[segments] = np.arange(len(segments))
+    return segments, Agenda(
+        stack=np.empty(n_edges, dtype=np.int64),
+        stacked=np.zeros(n_edges, dtype=bool),
+        bins=np.full(N_BINS, -1, dtype=np.int64),
+        next_face=np.full(n_faces, -1, dtype=np.int64),
+        listed=np.zeros(n_faces, dtype=bool),
+        segment=segment,
+        segment_ends=np.stack([tail[segments], head[segments]], axis=1),
+        segment_length=gluing.length[segments],
+        on_segment=np.full(n_vertices, -1, dtype=np.int64),
+        narrow=narrow_vertices(gluing),
+        group=group,
+        extent=extent,
+        seen=np.array([gluing.counts[3], N_BINS]),
+        room=np.empty((4096, 5)),
+        halfedges=np.empty(4096, dtype=np.int64),
+    )
+
+
+def narrow_vertices(gluing: Gluing) -> NDArray[np.bool_]:
+    """(n,) vertices at which two fixed edges meet, or the surface closes up, at less than 60°."""
+    from .refinement_kernels import NARROW
+
+    corners, total = sectors(gluing)
+    narrow = np.zeros(int(gluing.counts[2]), dtype=bool)
+    narrow[gluing.tail[: len(corners)][total[corners] < NARROW]] = True
+    return narrow
+
+
+def sectors(gluing: Gluing) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Which sector every corner belongs to, and the angle of each: from fixed edge to fixed edge around a vertex."""
+    from .delaunay import lay_out
+
+    n = 3 * int(gluing.counts[0])
+    h = np.flatnonzero(~gluing.fixed[gluing.edge[:n]])
+    t = gluing.ring[h]
+    following = 3 * (t // 3) + (t + 1) % 3
+    other = np.where(gluing.forward[h] == gluing.forward[t], t, following)
+    graph = csr_matrix((np.ones(len(h)), (h, other)), shape=(n, n))
+    label = connected_components(graph, directed=False)[1]
+    leaving = lay_out(gluing).edge_vectors
+    angles = np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
+    return label, np.bincount(label, weights=angles.ravel())

@@ -1,0 +1,382 @@
+"""Compiled kernels of intrinsic Delaunay refinement: find thin triangles, put vertices where they heal them.
+
+Circumcentres go in (Chew 1993; on surfaces Sharp, Soliman & Crane 2019); where one would lie beyond a segment (an edge
+that must stay) or in a segment's diametral circle, the segment is split instead (Ruppert 1995).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .circumcenter_kernels import BLOCKED, LOST, cross, encroached, find_circumcenter
+from .coincidence_kernels import NEARNESS
+from .gluing_kernels import (
+    FLIP,
+    SPLIT_EDGE,
+    SPLIT_FACE,
+    apex_position,
+    following,
+    kernel,
+    look_at,
+    preceding,
+    ring_size,
+    settle,
+    split_edge,
+    split_face,
+    tangent_at,
+)
+
+DONE, GROW, FULL, PAUSED = 0, 1, 2, 3
+"""Why `refine` stopped: nothing left to do; out of room; as many vertices as allowed; to report how far it is."""
+
+NARROW = np.pi / 3
+"""Where segments meet, or the surface closes up, at less than this, small angles have to stay."""
+
+N_BINS = 256
+
+
+class Agenda(NamedTuple):
+    """What refinement still has to do, and what it remembers of segments.
+
+    `stack` and `stacked` are edges to be looked at for the Delaunay property. `bins` and `next_face` are linked lists
+    of faces to be looked at, by the binary logarithm of their circumradius; `listed` says which faces are in one.
+    `segment` numbers the input segment of each fixed edge, `segment_ends` and `segment_length` describe those, and
+    `on_segment` is the segment on which a new vertex was put. `narrow` marks input vertices at which two segments meet,
+    or the surface closes up, at less than 60°. `group` and `extent` tell which vertices all but
+    coincide, as `coinciding` does. `seen` counts the steps of the history whose faces have been listed, and remembers
+    the list that the last face came from; `room` and `halfedges` are for the search around a new vertex.
+    """
+
+    stack: NDArray[np.int64]
+    stacked: NDArray[np.bool_]
+    bins: NDArray[np.int64]
+    next_face: NDArray[np.int64]
+    listed: NDArray[np.bool_]
+    segment: NDArray[np.int64]
+    segment_ends: NDArray[np.int64]
+    segment_length: NDArray[np.float64]
+    on_segment: NDArray[np.int64]
+    narrow: NDArray[np.bool_]
+    group: NDArray[np.int64]
+    extent: NDArray[np.float64]
+    seen: NDArray[np.int64]
+    room: NDArray[np.float64]
+    halfedges: NDArray[np.int64]
+
+
+class Goal(NamedTuple):
+    """When refinement is done: squared tangent of half the angle, and the largest number of vertices."""
+
+    angle: float
+    max_vertices: int
+
+
+@kernel
+def refine(g, agenda, goal, patience):
+    """Insert vertices until no face that can be helped has a smaller angle than the goal; pause after `patience`."""
+    pause = g.counts[2] + patience
+    while settle(g, agenda.stack, agenda.stacked):
+        for n in range(agenda.seen[0], g.counts[3]):
+            for f in changed_faces(g, n):
+                list_face(g, agenda, f, goal)
+        agenda.seen[0] = g.counts[3]
+        f = next_thin(g, agenda, goal)
+        if f < 0:
+            return DONE
+        if g.counts[2] >= goal.max_vertices:
+            return FULL
+        if g.counts[2] >= pause:
+            list_face(g, agenda, f, goal)
+            return PAUSED
+        if not improve(g, agenda, f, goal):
+            list_face(g, agenda, f, goal)
+            return GROW
+    return GROW
+
+
+@kernel
+def changed_faces(g, n):
+    """The faces that step n of the history changed or made, some perhaps twice."""
+    kind, first, second = g.steps[n, 0], g.steps[n, 1], g.steps[n, 2]
+    if kind == FLIP:
+        return first // 3, second // 3, second // 3
+    if kind == SPLIT_EDGE:
+        return first // 3, second, second
+    if kind == SPLIT_FACE:
+        return first, second, second + 1
+    return first, first, first
+
+
+@kernel
+def is_thin(g, f, goal):
+    """Whether the smallest angle of a face, opposite to its shortest side, is below the goal; and the side."""
+    h = 3 * f
+    for k in range(1, 3):
+        if g.length[g.edge[3 * f + k]] < g.length[g.edge[h]]:
+            h = 3 * f + k
+    n, d = tangent_at(g, preceding(h))
+    return n < goal.angle * d, h
+
+
+@kernel
+def list_face(g, agenda, f, goal):
+    """Put a thin face on the lists."""
+    thin, h = is_thin(g, f, goal)
+    if agenda.listed[f] or not thin:
+        return
+    n, d = tangent_at(g, preceding(h))
+    radius = g.length[g.edge[h]] * (n + d) / np.sqrt(n * d) if n > 0.0 and d > 0.0 else np.inf
+    place = min(max(N_BINS // 2 + int(2.0 * np.log2(min(max(radius, 1e-30), 1e30))), 0), N_BINS - 1)
+    agenda.next_face[f] = agenda.bins[place]
+    agenda.bins[place] = f
+    agenda.listed[f] = True
+
+
+@kernel
+def list_all(g, agenda, goal):
+    """Put every thin face on the lists."""
+    for f in range(g.counts[0]):
+        list_face(g, agenda, f, goal)
+
+
+@kernel
+def next_thin(g, agenda, goal):
+    """The thin face of (nearly) the largest circumradius, or −1."""
+    for place in range(N_BINS - 1, -1, -1):
+        while agenda.bins[place] >= 0:
+            f = agenda.bins[place]
+            agenda.bins[place] = agenda.next_face[f]
+            agenda.listed[f] = False
+            agenda.seen[1] = place
+            if is_thin(g, f, goal)[0]:
+                return f
+    return -1
+
+
+@kernel
+def improve(g, agenda, f, goal):
+    """Insert one vertex for the sake of a thin face, if that can help; False if there is no room for it.
+
+    A face at vertices that all but coincide is left alone, unless an angle above 150° makes its circumcircle large and
+    nothing stands in the way of a vertex there: grading the faces towards such vertices would take hundreds of new
+    ones, for no gain in accuracy.
+    """
+    h = is_thin(g, f, goal)[1]
+    close = coincide(g, agenda, h)
+    if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
+        return True
+    outcome, place, x, y = find_circumcenter(g, f)
+    if outcome == LOST:
+        return True
+    segment = place if outcome == BLOCKED else encroached(g, place, x, y, agenda.room, agenda.halfedges)
+    if segment < 0 and too_near(g, h, place, x, y):
+        return True
+    if segment >= 0:
+        return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
+    if not has_room(g, agenda, 2):
+        return False
+    insert(g, agenda, place, x, y)
+    return True
+
+
+@kernel
+def too_near(g, h, f, px, py):
+    """Whether the circumcentre of the face with shortest side h, p in the frame of face f, is near a corner of f.
+
+    No vertex is nearer than the radius in a Delaunay triangulation; what rounding has kept from it is left alone.
+    """
+    n, d = tangent_at(g, preceding(h))
+    radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
+    x, y = apex_position(g, 3 * f)
+    nearest = min(np.hypot(px, py), np.hypot(px - g.length[g.edge[3 * f]], py), np.hypot(px - x, py - y))
+    return not nearest > 0.5 * radius
+
+
+@kernel
+def coincide(g, agenda, h):
+    """Whether the two ends of a halfedge all but coincide."""
+    group = agenda.group[g.tail[h]]
+    return group >= 0 and group == agenda.group[g.tail[following(h)]] and g.length[g.edge[h]] <= agenda.extent[group]
+
+
+@kernel
+def is_cap(g, agenda, f):
+    """Whether an angle of the face exceeds 150°, opposite to a side whose ends do not coincide."""
+    for h in range(3 * f, 3 * f + 3):
+        n, d = tangent_at(g, preceding(h))
+        if n > 13.9 * d:
+            return not coincide(g, agenda, h)
+    return False
+
+
+@kernel
+def is_hopeless(g, agenda, h):
+    """Whether the small angle opposite to h is there for good: given with the surface, or with the segments."""
+    corner = preceding(h)
+    if agenda.narrow[g.tail[corner]] and sector(g, corner) < NARROW:
+        return True
+    a, b = agenda.on_segment[g.tail[h]], agenda.on_segment[g.tail[following(h)]]
+    if a < 0 or b < 0 or a == b:
+        return False
+    for k in range(2):
+        for l in range(2):
+            shared = agenda.segment_ends[a, k]
+            if shared == agenda.segment_ends[b, l] and agenda.narrow[shared]:
+                return True
+    return False
+
+
+@kernel
+def sector(g, corner):
+    """Angle around the tail of a halfedge from segment to segment, or all around, as far as it matters (up to π)."""
+    n, d = tangent_at(g, corner)
+    total = 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
+    for side in range(2):
+        c, h = corner, (corner if side == 0 else preceding(corner))
+        while not g.fixed[g.edge[h]] and total < np.pi:
+            t = g.ring[h]
+            at_tail = (h == c) == (g.forward[t] == g.forward[h])  # is the vertex the tail of t?
+            c, h = (t, preceding(t)) if at_tail else (following(t), following(t))
+            if c == corner:
+                return total
+            n, d = tangent_at(g, c)
+            total += 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
+    return total
+
+
+@kernel
+def has_room(g, agenda, ring):
+    """Whether a split of an edge with `ring` faces fits into the arrays (one of a face takes less)."""
+    faces, edges, vertices, steps = g.counts[0], g.counts[1], g.counts[2], g.counts[3]
+    return (
+        3 * (faces + ring + 2) <= len(g.tail)
+        and edges + ring + 4 <= len(g.length)
+        and vertices + 1 <= len(agenda.on_segment)
+        and steps + ring + 2 <= len(g.steps)
+    )
+
+
+@kernel
+def look_around(g, agenda, step):
+    """Put the edges of all faces that the steps from `step` on have changed on the stack."""
+    for n in range(step, g.counts[3]):
+        for f in changed_faces(g, n):
+            for k in range(3):
+                look_at(g, agenda.stack, agenda.stacked, g.edge[3 * f + k])
+
+
+@kernel
+def insert(g, agenda, f, px, py):
+    """Put a vertex at p (in the frame of face f), or on the face's edge that it all but lies on."""
+    step = g.counts[3]
+    x, y = np.zeros(3), np.zeros(3)
+    x[1] = g.length[g.edge[3 * f]]
+    x[2], y[2] = apex_position(g, 3 * f)
+    area = x[1] * y[2]
+    nearest = np.inf
+    for k in range(3):
+        nearest = min(nearest, np.hypot(px - x[k], py - y[k]))
+    weights = np.empty(3)
+    on_edge, fraction = -1, 0.0
+    for k in range(3):
+        l = (k + 1) % 3
+        length = g.length[g.edge[3 * f + k]]
+        above = cross(x[k], y[k], x[l], y[l], px, py)
+        weights[(k + 2) % 3] = max(above / area, 0.0)
+        t = g.ring[3 * f + k]
+        if above / length < min(0.01 * length, 0.25 * nearest) and t // 3 != f and not g.fixed[g.edge[3 * f + k]]:
+            on_edge = k
+            fraction = ((px - x[k]) * (x[l] - x[k]) + (py - y[k]) * (y[l] - y[k])) / length**2
+    if on_edge >= 0 and 0.0 < fraction < 1.0:
+        split_edge(g, 3 * f + on_edge, fraction)
+    else:
+        weights /= weights.sum()
+        split_face(g, f, weights[0], weights[1], weights[2])
+    new = g.counts[2] - 1
+    agenda.on_segment[new] = agenda.group[new] = -1
+    agenda.narrow[new] = False
+    look_around(g, agenda, step)
+
+
+@kernel
+def folded_face(g, h):
+    """A face that has the edge of h twice, or −1."""
+    y = h
+    while True:
+        if g.edge[following(y)] == g.edge[h] or g.edge[preceding(y)] == g.edge[h]:
+            return y // 3
+        y = g.ring[y]
+        if y == h:
+            return -1
+
+
+@kernel
+def vertex_beside(g, h):
+    """The vertex opposite to an edge that all but lies on it, its height above and its place along h; or −1, 0, ½."""
+    nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
+    while True:
+        along, above = apex_position(g, y)
+        along = along / length if g.forward[y] == g.forward[h] else 1.0 - along / length
+        if above < min(height, NEARNESS * length * min(along, 1.0 - along)):
+            nearby, height, fraction = g.tail[preceding(y)], above, along
+        y = g.ring[y]
+        if y == h:
+            return nearby, height, fraction
+
+
+@kernel
+def room_beside(g, h, fraction):
+    """How far the vertices opposite to an edge are from a place along h."""
+    nearest, length, y = np.inf, g.length[g.edge[h]], h
+    while True:
+        along, above = apex_position(g, y)
+        here = fraction if g.forward[y] == g.forward[h] else 1.0 - fraction
+        nearest = min(nearest, np.hypot(along - here * length, above))
+        y = g.ring[y]
+        if y == h:
+            return nearest
+
+
+@kernel
+def split_segment(g, agenda, h, f, goal):
+    """Split a segment that stands in the way of healing face f; False if there is no room for it.
+
+    In the middle; but beside a vertex that all but lies on it, and near an end where segments meet in a small angle at
+    a power of two from it, so that the parts of both segments come out equal and stop splitting each other. Parts a
+    billionth of their segment are left alone.
+    """
+    e = g.edge[h]
+    segment, length, step = agenda.segment[e], g.length[e], g.counts[3]
+    if length < 1e-9 * agenda.segment_length[segment]:
+        return True
+    ring = ring_size(g, h)
+    if not has_room(g, agenda, ring):
+        return False
+    folded = folded_face(g, h)
+    if folded >= 0:
+        new = split_face(g, folded, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
+        agenda.on_segment[new] = agenda.group[new] = -1
+    else:
+        nearby, height, fraction = vertex_beside(g, h)
+        at_tail, at_head = agenda.narrow[g.tail[h]], agenda.narrow[g.tail[following(h)]]
+        if nearby < 0 and at_tail != at_head:
+            shell = 2.0 ** np.round(np.log2(0.5 * length)) / length
+            fraction = shell if at_tail else 1.0 - shell
+        if not room_beside(g, h, fraction) > 1e-13 * length:
+            return True
+        new = split_edge(g, h, fraction)
+        agenda.on_segment[new], agenda.group[new] = segment, -1
+        if nearby >= 0:
+            if agenda.group[nearby] < 0:
+                agenda.group[nearby], agenda.extent[nearby] = nearby, 0.0
+            agenda.group[new] = agenda.group[nearby]
+            agenda.extent[agenda.group[new]] += 1.01 * height
+        for k in range(g.counts[1] - 1 - ring, g.counts[1]):
+            agenda.segment[k] = segment
+    agenda.narrow[new] = False
+    look_around(g, agenda, step)
+    list_face(g, agenda, f, goal)
+    return True

@@ -1,0 +1,183 @@
+"""Sources on a mesh, as an intrinsic triangulation of the mesh sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..curve_segments import Pieces
+from ..intrinsic_mesh import LaidOutTriangles
+from ..surface_points import SNAP, barycentric_in, chained, distinct, locate
+from .conforming_refinement import Cut, Union, reach
+from .history import History, straight
+
+
+@dataclass(frozen=True, eq=False)
+class Embedding:
+    """Triangles cut so that some curves run along edges.
+
+    Attributes
+    ----------
+    triangles : LaidOutTriangles
+        After the cuts; old vertices first.
+    marked : (e,) bool
+        Edges along which the curves run.
+    parents : (m,) int
+        The face that each face is part of.
+    corners : (m, 3, 3) float
+        Barycentric coordinates of its corners there.
+    """
+
+    triangles: LaidOutTriangles
+    marked: NDArray[np.bool_]
+    parents: NDArray[np.int64]
+    corners: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> Embedding:
+        """Cut faces wherever a piece leaves the edges, or a point the vertices."""
+        finer, parents = triangles, np.arange(triangles.n_faces)
+        corners = np.broadcast_to(np.eye(3), (triangles.n_faces, 3, 3))
+        marked = np.zeros(triangles.n_edges, dtype=bool)
+        if not parts:
+            return cls(triangles, marked, parents, corners)
+        union = Union.of(parts)
+        faces, edges = reach(triangles, union, [True] * len(parts))
+        if faces or edges:
+            cut = Cut(triangles, union, faces, edges)
+            finer, union, is_new = cut.assemble()
+            kept = np.setdiff1d(parents, cut.cut_faces)
+            parents = np.sort(np.concatenate([kept, [f.parent for f in cut.faces]])).astype(np.int64)
+            corners = np.where(is_new[:, None, None], 0.0, np.eye(3))
+            new = np.flatnonzero(is_new)
+            corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
+            marked = np.zeros(finer.n_edges, dtype=bool)
+        marked[union.edges[union.edges >= 0]] = True
+        return cls(finer, marked, parents, corners)
+
+    def down(
+        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Points, and vectors (p, k, 3) at them, of the faces before the cuts, in the faces after."""
+        order = np.argsort(self.parents, kind="stable")
+        begin = np.searchsorted(self.parents[order], faces)
+        count = np.searchsorted(self.parents[order], faces, side="right") - begin
+        which = np.repeat(np.arange(len(faces)), count)
+        child = order[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
+        to_child = np.linalg.inv(self.corners[child])
+        weights = np.einsum("pk,pkl->pl", barycentric[which], to_child)
+        best = np.lexsort([-weights.min(axis=1), which])[np.cumsum(count) - count]
+        return child[best], weights[best], np.einsum("pvk,pkl->pvl", vectors, to_child[best])
+
+    def up(
+        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Points of the faces after the cuts, in the faces before."""
+        return self.parents[faces], np.einsum("pk,pkl->pl", barycentric, self.corners[faces])
+
+
+def barycentric_of(
+    triangles: LaidOutTriangles, faces: NDArray[np.int64], points: NDArray[np.complex128]
+) -> NDArray[np.float64]:
+    """(n, k, 3) barycentric coordinates of points in face layouts, k to each face."""
+    return np.stack([np.ones_like(points.real), *(np.zeros_like(points.real),) * 2], axis=-1) + differences_of(
+        triangles, faces, points - triangles.corner_positions[faces, :1]
+    )
+
+
+def differences_of(
+    triangles: LaidOutTriangles, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
+) -> NDArray[np.float64]:
+    """(n, k, 3) vectors in face layouts as differences of barycentric coordinates, k to each face."""
+    q = triangles.corner_positions[faces]
+    u, v = (q[:, 1] - q[:, 0])[:, None], (q[:, 2] - q[:, 0])[:, None]
+    area = (np.conj(u) * v).imag
+    second, third = (np.conj(vectors) * v).imag / area, (np.conj(u) * vectors).imag / area
+    return np.stack([-second - third, second, third], axis=-1)
+
+
+def carry_pieces(source: Pieces, embedding: Embedding, history: History, before: LaidOutTriangles) -> Pieces:
+    """A source on the triangles `before` the embedding, as the triangles at the end of the history see it."""
+    after = history.after
+    none = np.zeros((len(source.nodes), 0, 3))
+    spots = history.forward(*_snapped(*embedding.down(source.nodes.faces, source.nodes.barycentric, none)))
+    nodes = locate(after, spots[0], spots[1])
+    if len(source.ends) == 0:
+        return Pieces(nodes, source.ends, source.faces, source.edges, source.vectors, source.oriented)
+
+    faces, at_start, at_end, directions = in_faces(before, source)
+    along = at_end - at_start
+    growth = differences_of(before, faces, directions[:, None])[:, 0]
+    at_piece = (along * before.corner_positions[faces]).sum(axis=1)
+    vectors = np.stack([along, growth], axis=1)
+    middle = history.forward(*_snapped(*embedding.down(faces, 0.5 * (at_start + at_end), vectors)))
+    lines = straight(after, *middle)
+
+    along = lines.vectors[:, 0]
+    fraction = np.einsum("rk,rk->r", lines.ends - lines.starts, along) / np.einsum("rk,rk->r", along, along)
+    keep = np.abs(fraction) > SNAP
+    owners, faces = lines.owners[keep], lines.faces[keep]
+    starts, ends = locate(after, faces, lines.starts[keep]), locate(after, faces, lines.ends[keep])
+    last = np.append(np.diff(owners) > 0, True)
+    first = np.append(True, last[:-1])
+    places = chained([nodes, ends[np.flatnonzero(~last)]])
+    who_end = np.where(last, source.ends[owners, 1], len(nodes) + np.cumsum(~last) - 1)
+    who_start = np.where(first, source.ends[owners, 0], np.roll(who_end, 1))
+    chosen, who = distinct(places)
+
+    # the angle between piece and growth is known; what was carried only tells on which side, however thin the faces
+    corners = after.corner_positions[faces]
+    steps = ((ends.barycentric - starts.barycentric) * corners).sum(axis=1)
+    carried = np.conj(steps) * (lines.vectors[keep, 1] * corners).sum(axis=1)
+    turn = (directions / (at_piece * np.abs(directions / at_piece)))[owners]
+    grown = steps * np.where(carried.imag * turn.imag < 0, np.conj(turn), turn)
+    off = (starts.barycentric == 0) & (ends.barycentric == 0)
+    side = (off.argmax(axis=1) + 1) % 3
+    on_edge = off.any(axis=1)
+    turned = np.conj(after.edge_directions[faces, side]) * grown
+    turned = np.where(after.reflected[faces, side], np.conj(turned), turned)
+    return Pieces(
+        places[chosen],
+        who[np.stack([who_start, who_end], axis=1)],
+        faces,
+        np.where(on_edge, after.edges.of_faces[faces, side], -1),
+        np.where(on_edge, turned, grown),
+        source.oriented,
+    )
+
+
+def in_faces(triangles: LaidOutTriangles, source: Pieces) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Face, start, end (barycentric) and direction in the face's layout of every piece, along edges or not.
+
+    A piece along an edge is seen from the edge's face with the largest area.
+    """
+    faces = source.faces.copy()
+    on_edge = np.flatnonzero(source.edges >= 0)
+    flat = triangles.edges.of_faces.ravel()
+    order = np.lexsort([triangles.face_areas[np.arange(len(flat)) // 3], flat])
+    fattest = np.empty(triangles.n_edges, dtype=np.int64)
+    fattest[flat[order]] = order
+    halfedge = fattest[source.edges[on_edge]]
+    faces[on_edge] = halfedge // 3
+    directions = source.vectors.copy()
+    seen = directions[on_edge]
+    reflected = triangles.reflected.ravel()[halfedge]
+    directions[on_edge] = triangles.edge_directions.ravel()[halfedge] * np.where(reflected, np.conj(seen), seen)
+    starts = barycentric_in(triangles, faces, source.nodes[source.ends[:, 0]])
+    return faces, starts, barycentric_in(triangles, faces, source.nodes[source.ends[:, 1]]), directions
+
+
+def _snapped(
+    faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Points within rounding of an edge moved on to it, and vectors within rounding of it turned along it."""
+    near = barycentric < SNAP
+    weights = np.where(near, 0.0, barycentric)
+    weights /= weights.sum(axis=1, keepdims=True)
+    size = np.abs(vectors[:, :1]).max(axis=2, keepdims=True) if vectors.shape[1] else 0.0
+    flat = np.zeros(vectors.shape, dtype=bool)
+    flat[:, :1] = near[:, None] & (np.abs(vectors[:, :1]) < SNAP * size)
+    return faces, weights, np.where(flat, 0.0, vectors)

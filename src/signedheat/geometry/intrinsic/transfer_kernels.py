@@ -1,0 +1,200 @@
+"""Compiled kernels that carry points and vectors between intrinsic triangulations of one surface.
+
+Every step of a history (a flip, a split of a face or of an edge) exchanges simplices of four points with one affine
+dependency ``Σ c_k p_k = 0``. A point with nonnegative weights on the old simplex moves along c until another weight
+vanishes: then it has nonnegative weights on a new one. No angle is measured and nothing is traced, so carrying cannot
+miss, and what lay on an edge that stays lies on it exactly.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .gluing_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, diamond, following, kernel
+
+BEFORE = np.full((4, 3, 3), -1)
+"""By kind, face of the step and corner: which of the four points is there before it."""
+AFTER = np.full((4, 3, 3), -1)
+BEFORE[FLIP, :2], AFTER[FLIP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
+BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
+BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+
+
+@kernel
+def carry(steps, weights, forward, n_faces, faces, barycentric, vectors):
+    """Carry points and vectors at them through a history, forward or backward; in place.
+
+    Parameters
+    ----------
+    steps, weights : (n, 4) int and float
+        The history.
+    forward : bool
+        From the first triangulation to the last, or back.
+    n_faces : int
+        Of the larger triangulation.
+    faces : (p,) int
+        Face of each point. Going back, the points that have none (−1) are the new vertices, in the order in which they
+        were made, at the end; they appear where they were put.
+    barycentric : (p, 3) float
+        Where in the face.
+    vectors : (p, k, 3) float
+        Differences of barycentric coordinates.
+    """
+    first = np.full(n_faces, -1)
+    later = np.full(len(faces), -1)
+    born = len(faces) - 1
+    for p in range(len(faces)):
+        if faces[p] >= 0:
+            later[p] = first[faces[p]]
+            first[faces[p]] = p
+    before, after = (BEFORE, AFTER) if forward else (AFTER, BEFORE)
+    around, start, heads = np.empty(3, np.int64), np.zeros(3, np.int64), np.empty(3, np.int64)
+    for m in range(len(steps)):
+        n = m if forward else len(steps) - 1 - m
+        kind = steps[n, 0]
+        if kind == TURN:
+            p = first[steps[n, 1]]
+            while p >= 0:
+                swap_last(barycentric[p])
+                for k in range(vectors.shape[1]):
+                    swap_last(vectors[p, k])
+                p = later[p]
+            continue
+        around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
+        start[:] = 0
+        if kind != SPLIT_FACE:
+            around[0], start[0] = steps[n, 1] // 3, steps[n, 1] % 3
+        if kind == FLIP:
+            around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
+        for k in range(3):
+            heads[k] = -1
+            if before[kind, k, 0] >= 0:
+                heads[k] = first[around[k]]
+                first[around[k]] = -1
+        for k in range(3):
+            p = heads[k]
+            while p >= 0:
+                q = later[p]
+                place = exchange(
+                    kind, weights[n], forward, before[kind, k], start[k], after[kind], start, barycentric[p], vectors[p]
+                )
+                faces[p] = around[place]
+                later[p] = first[faces[p]]
+                first[faces[p]] = p
+                p = q
+        is_last = not forward and steps[n, 3] >= 0 and (n == 0 or steps[n - 1, 3] != steps[n, 3])
+        if is_last and born >= 0 and faces[born] < 0:
+            faces[born] = around[0]
+            for k in range(3):
+                barycentric[born, (start[0] + k) % 3] = weights[n, k]
+            later[born] = first[around[0]]
+            first[around[0]] = born
+            born -= 1
+
+
+@kernel
+def swap_last(w):
+    """Follow a face that is turned over."""
+    w[1], w[2] = w[2], w[1]
+
+
+@kernel
+def exchange(kind, c, forward, corners, start, new_corners, new_start, w, vectors):
+    """Carry one point, and vectors at it, over one step; returns which of the step's new faces has it."""
+    lead = 3 if kind == SPLIT_FACE else 2  # the points before it are on one side of the dependency
+    x = np.zeros(4)
+    for k in range(3):
+        x[corners[k]] = w[(start + k) % 3]
+    gone, amount = -1, np.inf
+    for l in range(4):
+        if (l < lead) == forward and c[l] > 0.0 and x[l] / c[l] < amount:
+            gone, amount = l, x[l] / c[l]
+    place = 0
+    while has(new_corners[place], gone):
+        place += 1
+    shift(x, c, lead, gone, amount if forward else -amount)
+    for k in range(3):
+        w[(new_start[place] + k) % 3] = x[new_corners[place, k]]
+    for v in range(len(vectors)):
+        x[:] = 0.0
+        for k in range(3):
+            x[corners[k]] = vectors[v, (start + k) % 3]
+        shift(x, c, lead, gone, x[gone] / c[gone] if forward else -x[gone] / c[gone])
+        for k in range(3):
+            vectors[v, (new_start[place] + k) % 3] = x[new_corners[place, k]]
+    return place
+
+
+@kernel
+def has(corners, l):
+    """Whether a face has point l of a step."""
+    return corners[0] == l or corners[1] == l or corners[2] == l
+
+
+@kernel
+def shift(x, c, lead, gone, amount):
+    """Move weights along the dependency until one is gone."""
+    for l in range(4):
+        x[l] += -amount * c[l] if l < lead else amount * c[l]
+    x[gone] = 0.0
+
+
+@kernel
+def walk(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
+    """Go straight from a point along the first of its vectors, or against it, up to its end; other vectors go along.
+
+    Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
+    it, and the vectors there. Returns the next row.
+    """
+    f, left = face, 1.0
+    w, v = barycentric.copy(), vectors.copy()
+    sign = 1.0 if forward else -1.0
+    for _ in range(1000000):
+        step, leaving = left, -1
+        for k in range(3):
+            slope = sign * v[0, k]
+            if slope < 0.0 and w[k] < -slope * step:
+                step, leaving = w[k] / -slope, k
+        if n < len(out_faces):
+            out_faces[n], out_starts[n], out_vectors[n] = f, w, v
+        for k in range(3):
+            w[k] = max(w[k] + sign * step * v[0, k], 0.0)
+        if leaving >= 0:
+            w[leaving] = 0.0
+        w /= w.sum()
+        if n < len(out_faces):
+            out_ends[n] = w
+        n += 1
+        left -= step
+        if leaving < 0 or left < 1e-12:
+            break
+        h = 3 * f + (leaving + 1) % 3
+        t = g.ring[h]
+        if t == h or g.ring[t] != h:
+            break  # a boundary: only by rounding
+        i, j, a = h % 3, following(h) % 3, leaving
+        ti, tj = (t % 3, following(t) % 3) if g.forward[h] == g.forward[t] else (following(t) % 3, t % 3)
+        tb = 3 - ti - tj
+        c_i, c_j, c_a, c_b, _ = diamond(g, h)
+        if not c_a > 0.0:
+            break
+        w_i, w_j = w[i], w[j]
+        w[ti], w[tj], w[tb] = w_i, w_j, 0.0
+        for k in range(len(v)):
+            v_i, v_j, v_a = v[k, i], v[k, j], v[k, a] / c_a
+            v[k, ti], v[k, tj], v[k, tb] = v_i + v_a * c_i, v_j + v_a * c_j, -v_a * c_b
+        f = t // 3
+    return n
+
+
+@kernel
+def walk_both_ways(g, faces, barycentric, vectors, out_faces, out_starts, out_ends, out_vectors, owners):
+    """`walk` half of the first vector both ways from every point; rows whose owner is −1 − p go against it."""
+    n = 0
+    for p in range(len(faces)):
+        for way in range(2):
+            begin = n
+            n = walk(g, faces[p], barycentric[p], vectors[p], way == 0, out_faces, out_starts, out_ends, out_vectors, n)
+            for k in range(begin, min(n, len(owners))):
+                owners[k] = p if way == 0 else -1 - p
+    return n

@@ -1,0 +1,164 @@
+"""Laid-out triangles: all that the surface method knows of a surface.
+
+Per face three vertex ids, three edge ids and the corners laid out in the plane as complex numbers. A triangle
+mesh, a virtually refined polygon mesh, a digital surface with corrected normals, an intrinsic triangulation and a
+point cloud's local triangulations are each such a set.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .edges import EdgeTable, face_edges
+
+
+@dataclass(frozen=True, eq=False)
+class LaidOutTriangles:
+    """Triangles known by their vertices, their edges and their shapes alone.
+
+    Attributes
+    ----------
+    corner_vertices : (m, 3) int
+        Vertex ids.
+    corner_positions : (m, 3) complex
+        Corners in the plane of the face, counter-clockwise.
+    edges : EdgeTable
+        Edge k of a face runs from corner k to corner k + 1. Two edges may join the same two vertices.
+    n_vertices : int
+        Number of vertices, used or not.
+    leading_sides : (e,) int, optional
+        Side 3 f + k of each edge whose face f counts as the edge's first; by default that of the lowest number.
+    """
+
+    corner_vertices: NDArray[np.int64]
+    corner_positions: NDArray[np.complex128]
+    edges: EdgeTable
+    n_vertices: int
+    leading_sides: NDArray[np.int64] | None = None
+
+    @classmethod
+    def from_lengths(
+        cls,
+        corner_vertices: NDArray[np.int64],
+        lengths: NDArray[np.float64],
+        n_vertices: int,
+        edges: EdgeTable | None = None,
+    ) -> LaidOutTriangles:
+        """Lay out triangles of given edge lengths; ``lengths[:, k]`` runs from corner k to corner k + 1.
+
+        Corner 0 is at the origin, corner 1 on the positive real axis, corner 2 above it. The height comes from
+        Kahan's stable form of Heron's formula, so that needles keep their shape.
+
+        Examples
+        --------
+        >>> LaidOutTriangles.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3).corner_positions
+        array([[0.+0.j, 4.+0.j, 0.+3.j]])
+        """
+        base, right, left = lengths.T
+        a, b, c = np.sort(lengths, axis=1)[:, ::-1].T
+        product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
+        twice_area = 0.5 * np.sqrt(np.maximum(product, 0.0))
+        apex_x = 0.5 * (base + (left - right) * (left + right) / base)
+        positions = np.zeros((len(lengths), 3), dtype=np.complex128)
+        positions[:, 1] = base
+        positions[:, 2] = apex_x + 1j * (twice_area / base)
+        return cls(corner_vertices, positions, face_edges(corner_vertices) if edges is None else edges, n_vertices)
+
+    @property
+    def n_faces(self) -> int:
+        """Number of faces."""
+        return len(self.corner_vertices)
+
+    @property
+    def n_edges(self) -> int:
+        """Number of edges."""
+        return len(self.edges.vertices)
+
+    @cached_property
+    def edge_vectors(self) -> NDArray[np.complex128]:
+        """(m, 3) from corner k to corner k + 1, in the face's layout."""
+        return np.roll(self.corner_positions, -1, axis=1) - self.corner_positions
+
+    @cached_property
+    def edge_lengths(self) -> NDArray[np.float64]:
+        """(m, 3) lengths of `edge_vectors`."""
+        return np.abs(self.edge_vectors)
+
+    @property
+    def agree_on_lengths(self) -> bool:
+        """Whether all faces of every edge give it the same length; flattened voxel faces do not."""
+        of_edges = np.empty(self.n_edges)
+        of_edges[self.edges.of_faces] = self.edge_lengths
+        return bool(np.allclose(of_edges[self.edges.of_faces], self.edge_lengths, rtol=1e-6, atol=0))
+
+    @cached_property
+    def face_areas(self) -> NDArray[np.float64]:
+        """(m,) areas."""
+        first, _, last = self.edge_vectors.T
+        return -0.5 * (np.conj(first) * last).imag
+
+    @cached_property
+    def corner_cotangents(self) -> NDArray[np.float64]:
+        """(m, 3) cotangent of the angle at each corner."""
+        leaving = self.edge_vectors
+        arriving = -np.roll(leaving, 1, axis=1)
+        return (np.conj(leaving) * arriving).real / (2.0 * self.face_areas)[:, None]
+
+    @cached_property
+    def edge_directions(self) -> NDArray[np.complex128]:
+        """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout."""
+        return np.where(self.edges.forward, 1.0, -1.0) * self.edge_vectors / self.edge_lengths
+
+    @cached_property
+    def reflected(self) -> NDArray[np.bool_]:
+        """(m, 3) where the frame of edge k acts on the face with a conjugation.
+
+        The frame's second axis points into the first face of the edge and out of all others; a quarter turn from the
+        edge's direction points into the faces that run along it in that direction, and out of the others.
+        """
+        is_first = np.zeros(3 * self.n_faces, dtype=bool)
+        is_first[self.first_sides] = True
+        return self.edges.forward != is_first.reshape(-1, 3)
+
+    @cached_property
+    def first_sides(self) -> NDArray[np.int64]:
+        """(k,) side 3 f + j of the first face of every edge that has one."""
+        if self.leading_sides is not None:
+            return self.leading_sides
+        first = np.full(self.n_edges, -1, dtype=np.int64)
+        flat = self.edges.of_faces.ravel()
+        first[flat[::-1]] = np.arange(len(flat))[::-1]
+        return first[first >= 0]
+
+    @cached_property
+    def is_consistently_oriented(self) -> bool:
+        """Whether no frame is reflected: then the connection Laplacian is complex Hermitian."""
+        return not self.reflected.any()
+
+    @cached_property
+    def face_parts(self) -> NDArray[np.int64]:
+        """(m,) part of the surface that each face lies in, named by its first face; parts may share vertices."""
+        from .triangle_kernels import join_faces
+
+        return join_faces(self.edges.of_faces, self.n_edges)
+
+    def in_edge_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """(m, 3) or (m, 1) face-layout vectors as seen in the frame of each of the face's edges."""
+        turned = np.conj(self.edge_directions) * vectors
+        return np.where(self.reflected, np.conj(turned), turned)
+
+    def in_face_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """(m, 3) the vectors of an (e,) edge array as seen in the layout of each face."""
+        of_face = vectors[self.edges.of_faces]
+        return self.edge_directions * np.where(self.reflected, np.conj(of_face), of_face)
+
+    def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """(m,) sum of the vectors of an (e,) edge array at the three edges of each face, in its layout."""
+        from .triangle_kernels import gather
+
+        vectors = np.ascontiguousarray(vectors)
+        return gather(self.edges.of_faces, self.edge_directions, self.reflected, vectors)

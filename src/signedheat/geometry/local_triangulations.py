@@ -1,0 +1,213 @@
+"""A point cloud as triangles: local Delaunay triangulations in tangent planes, glued by agreement.
+
+Every point triangulates its neighbours in its own tangent plane (as for the Laplacian of Sharp & Crane 2020) and
+offers the triangles around itself. Where the points agree, three corners offer the same triangle; where they do not,
+triangles that more corners offer, and then rounder ones, come first, and none is accepted that overlaps another around
+one of its corners. The result is a mesh whose edges have at most two faces each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .edges import face_edges
+from .hole_filling import hole_fillings
+
+_CHUNK = 65536
+
+
+@dataclass(frozen=True, eq=False)
+class LocalTriangulations:
+    """Triangles on points.
+
+    Attributes
+    ----------
+    faces : (m, 3) int
+        Point ids, oriented alike as far as the surface allows.
+    normals : (n, 3) float
+        Unit normals, on the side from which the faces at each point run counter-clockwise.
+    """
+
+    faces: NDArray[np.int64]
+    normals: NDArray[np.float64]
+
+
+def local_triangulations(
+    points: NDArray[np.float64], normals: NDArray[np.float64] | None = None, n_neighbors: int = 30
+) -> LocalTriangulations:
+    """Triangulate points on an unknown surface.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Distinct points.
+    normals : (n, 3) float, optional
+        Unit normals, of which only the side counts: the faces are oriented alike by themselves, each connected part to
+        the side to which most of its normals point, or else outward.
+    n_neighbors : int
+        Size of the neighbourhoods. No triangle has a circumradius beyond the distance to the last neighbour.
+
+    Notes
+    -----
+    Growth is n log n. Small holes that disagreement leaves are filled.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    >>> local_triangulations(square, n_neighbors=3).faces.tolist()
+    [[0, 1, 2], [0, 2, 3]]
+    """
+    axes, neighbors, reach = tangent_planes(points, n_neighbors)
+    candidates, votes = offers(points, axes, neighbors, reach)
+    candidates, votes, circumradii = plausible(points, candidates, votes, reach)
+    axis = axes[:, 2]
+    if len(candidates) == 0:
+        return LocalTriangulations(candidates, axis)
+    faces = agreed(points, axes, candidates[np.lexsort((circumradii, -votes))])
+    oriented = axis * aligned(points, axis, faces, normals)[:, None]
+    faces = facing(points, oriented, faces)
+    return LocalTriangulations(np.concatenate([faces, hole_fillings(points, oriented, faces)]), oriented)
+
+
+def tangent_planes(
+    points: NDArray[np.float64], n_neighbors: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Axes (n, 3, 3) of each point's tangent plane, its normal last; neighbours (n, k); distance (n,) to the last.
+
+    Normals that come with scans are often those of a mesh that is gone: planes fitted to neighbours agree better.
+    """
+    from scipy.spatial import cKDTree
+
+    k = min(n_neighbors, len(points) - 1)
+    tree = cKDTree(points)
+    axes = np.empty((len(points), 3, 3))
+    neighbors = np.empty((len(points), k), dtype=np.int64)
+    reach = np.empty(len(points))
+    for begin in range(0, len(points), _CHUNK):
+        chunk = slice(begin, begin + _CHUNK)
+        distances, near = tree.query(points[chunk], k=k + 1, workers=-1)
+        neighbors[chunk], reach[chunk] = near[:, 1:], distances[:, -1]
+        axes[chunk] = principal_axes(points[near] - points[chunk, None], distances)
+    return axes, neighbors, reach
+
+
+def principal_axes(offsets: NDArray[np.float64], distances: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3, 3) principal axes of each row of points, widest first; near points count more."""
+    weights = np.exp(-((2 * distances / distances[:, -1:]) ** 2))[..., None]
+    offsets = offsets - (weights * offsets).sum(axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
+    covariance = (weights * offsets).transpose(0, 2, 1) @ offsets
+    first, second = np.moveaxis(np.linalg.eigh(covariance)[1][:, :, :0:-1], 2, 0)
+    return np.stack([first, second, np.cross(first, second)], axis=1)
+
+
+def offers(
+    points: NDArray[np.float64], axes: NDArray[np.float64], neighbors: NDArray[np.int64], reach: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles (m, 3) of all fans, each once, corners in increasing order; how many of its corners offer each."""
+    from .local_triangulation_kernels import voronoi_fans
+
+    triangles = []
+    for begin in range(0, len(points), _CHUNK):
+        chunk = slice(begin, begin + _CHUNK)
+        offsets = points[neighbors[chunk]] - points[chunk, None]
+        x, y = (np.einsum("nki,ni->nk", offsets, axes[chunk, a]) for a in range(2))
+        order = np.argsort(x * x + y * y, axis=1)
+        x, y = np.take_along_axis(x, order, axis=1), np.take_along_axis(y, order, axis=1)
+        sides, counts = voronoi_fans(x, y, reach[chunk])
+        column = np.arange(sides.shape[1])
+        following = np.where(column + 1 < counts[:, None], np.roll(sides, -1, axis=1), sides[:, :1])
+        row, at = np.nonzero((column < counts[:, None]) & (sides >= 0) & (following >= 0))
+        near = np.take_along_axis(neighbors[chunk], order, axis=1)
+        triangles.append(np.stack([row + begin, near[row, sides[row, at]], near[row, following[row, at]]], axis=1))
+    sorted_corners = np.sort(np.concatenate(triangles), axis=1)
+    order = np.lexsort(sorted_corners.T[::-1])
+    ranked = sorted_corners[order]
+    first = np.ones(len(ranked), dtype=bool)
+    first[1:] = (ranked[1:] != ranked[:-1]).any(axis=1)
+    return ranked[first], np.bincount(np.cumsum(first) - 1)
+
+
+def plausible(
+    points: NDArray[np.float64], triangles: NDArray[np.int64], votes: NDArray[np.int64], reach: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """Triangles with area whose circumradius is within the reach of all their corners, with it."""
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    u, v, w = b - a, c - b, a - c
+    twice_area = np.linalg.norm(np.cross(u, w), axis=1)
+    product = np.prod([np.linalg.norm(side, axis=1) for side in (u, v, w)], axis=0)
+    limit = reach[triangles].min(axis=1)
+    keep = product <= 2 * limit * twice_area
+    keep &= twice_area > 0
+    return triangles[keep], votes[keep], product[keep] / (2 * twice_area[keep])
+
+
+def agreed(points: NDArray[np.float64], axes: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The triangles that overlap no other around any of their corners, first come, first served.
+
+    Overlap is told by the sector that a triangle takes up in the tangent plane of its corner.
+    """
+    from .local_triangulation_kernels import accept_apart
+
+    starts, widths = np.empty(triangles.shape), np.empty(triangles.shape)
+    for k in range(3):
+        here, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
+        angle = []
+        for there in (right, left):
+            step = points[there] - points[here]
+            angle.append(np.arctan2((step * axes[here, 1]).sum(axis=1), (step * axes[here, 0]).sum(axis=1)))
+        turn = np.mod(angle[1] - angle[0] + np.pi, 2 * np.pi) - np.pi
+        starts[:, k], widths[:, k] = np.where(turn < 0, angle[1], angle[0]), np.abs(turn)
+    return triangles[accept_apart(triangles, starts, widths, len(points))]
+
+
+def aligned(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    given: NDArray[np.float64] | None,
+) -> NDArray[np.int64]:
+    """(n,) signs that make normals agree along a minimum spanning tree of the edges (Hoppe et al. 1992).
+
+    Each connected part then points where most of its given normals do, or else outward: the side on which its volume,
+    seen from its centroid, is positive.
+    """
+    from .local_triangulation_kernels import signs_from_parents
+
+    n = len(points)
+    tail, head = face_edges(faces).vertices.T
+    bend = 1.0 - np.abs((normals[tail] * normals[head]).sum(axis=1))
+    graph = sparse.csr_matrix((np.maximum(bend, 0) + 1e-6, (tail, head)), shape=(n, n))
+    parts = sparse.csgraph.connected_components(graph, directed=False)[1]
+    roots = np.unique(parts, return_index=True)[1]
+    tree = sparse.coo_matrix(sparse.csgraph.minimum_spanning_tree(graph))
+    above = np.full(len(roots), n)  # one node above all roots makes one tree of the forest
+    rows, columns = np.concatenate([tree.row, above]), np.concatenate([tree.col, roots])
+    tree = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(n + 1, n + 1))
+    order, parents = sparse.csgraph.breadth_first_order(tree, n, directed=False)
+    order, parents = order[1:], np.where(parents[:n] == n, -1, parents[:n])
+    relative = np.where((normals * normals[parents]).sum(axis=1) < 0, -1, 1)
+    signs = signs_from_parents(order.astype(np.int64), parents.astype(np.int64), relative)
+
+    if given is not None:
+        outward = signs * np.sign((normals * given).sum(axis=1))
+        preference = np.bincount(parts, outward)
+    else:
+        normals = normals * signs[:, None]
+        faces = facing(points, normals, faces)
+        a, b, c = points[faces].transpose(1, 0, 2)
+        size = np.bincount(parts)[:, None]
+        center = np.stack([np.bincount(parts, column) for column in points.T], axis=1) / size
+        flux = (np.cross(b - a, c - a) * (a - center[parts[faces[:, 0]]])).sum(axis=1)
+        preference = np.bincount(parts[faces[:, 0]], flux, len(roots))
+    return np.where(preference < 0, -1, 1)[parts] * signs
+
+
+def facing(points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The faces, turned so that they run counter-clockwise seen from the side to which their corners' normals point."""
+    a, b, c = points[faces].transpose(1, 0, 2)
+    against = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0
+    return np.where(against[:, None], faces[:, [0, 2, 1]], faces)

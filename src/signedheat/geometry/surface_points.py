@@ -1,0 +1,217 @@
+"""Where on a surface a point lies: at a vertex, on an edge or inside a face, through whatever face it was given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SourceError
+from .intrinsic_mesh import LaidOutTriangles
+
+VERTEX, EDGE, FACE = 0, 1, 2
+
+SNAP = 1e-9
+"""Barycentric coordinates below this count as zero: the point lies on the edge or at the vertex."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Points of a surface, each with the smallest element that holds it.
+
+    Attributes
+    ----------
+    faces : (n,) int
+        A face that has the point.
+    barycentric : (n, 3) float
+        Where in that face; exact zeros on edges and at vertices.
+    kinds : (n,) int
+        `VERTEX`, `EDGE` or `FACE`.
+    elements : (n,) int
+        Id of the vertex, edge or face.
+    along : (n,) float
+        On edges, the fraction of the way from tail to head; else 0.
+    """
+
+    faces: NDArray[np.int64]
+    barycentric: NDArray[np.float64]
+    kinds: NDArray[np.int64]
+    elements: NDArray[np.int64]
+    along: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    def __getitem__(self, index: NDArray[np.int64]) -> Places:
+        return Places(
+            self.faces[index], self.barycentric[index], self.kinds[index], self.elements[index], self.along[index]
+        )
+
+
+def locate(
+    triangles: LaidOutTriangles, faces: NDArray[np.int64], barycentric: NDArray[np.float64], name: str = "point"
+) -> Places:
+    """Recognise points that lie on edges or at vertices.
+
+    Raises
+    ------
+    SourceError
+        If a face does not exist.
+    """
+    outside = np.flatnonzero((faces < 0) | (faces >= triangles.n_faces))
+    if len(outside):
+        raise SourceError(
+            f"{name} {outside[0]} lies in face {faces[outside[0]]}, but face ids go from 0 to {triangles.n_faces - 1}: "
+            "was it made for another mesh?"
+        )
+    inside = np.where(barycentric < SNAP, 0.0, barycentric)
+    inside /= inside.sum(axis=1, keepdims=True)
+    positive = inside > 0
+    kinds = positive.sum(axis=1) - 1
+    elements = faces.copy()
+    along = np.zeros(len(faces))
+
+    at_vertex = kinds == VERTEX
+    elements[at_vertex] = triangles.corner_vertices[faces[at_vertex], inside[at_vertex].argmax(axis=1)]
+
+    on_edge = np.flatnonzero(kinds == EDGE)
+    side = (np.argmin(inside[on_edge], axis=1) + 1) % 3  # the edge across from the corner that counts for nothing
+    of_face = faces[on_edge], side
+    elements[on_edge] = triangles.edges.of_faces[of_face]
+    forward = triangles.edges.forward[of_face]
+    along[on_edge] = np.where(forward, inside[on_edge, (side + 1) % 3], inside[on_edge, side])
+    return Places(faces, inside, kinds, elements, along)
+
+
+def places_at(triangles: LaidOutTriangles, vertices: NDArray[np.int64], name: str = "point") -> Places:
+    """Vertices as places, each through its first face."""
+    corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices, name)
+    kinds = np.full(len(vertices), VERTEX)
+    return Places(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
+
+
+def corners_at(
+    faces: NDArray[np.int64], vertices: NDArray[np.int64], n_vertices: int, name: str = "point"
+) -> NDArray[np.int64]:
+    """(k,) the first corner ``3 face + k`` at each vertex.
+
+    Raises
+    ------
+    SourceError
+        If a vertex does not exist, or no face has it.
+    """
+    if not np.issubdtype(vertices.dtype, np.integer):
+        if len(vertices) == 0:
+            return np.empty(0, dtype=np.int64)
+        raise SourceError(f"{name}s are told by integer vertex ids, not {vertices.dtype}")
+    outside = np.flatnonzero((vertices < 0) | (vertices >= n_vertices))
+    if len(outside):
+        raise SourceError(
+            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to {n_vertices - 1}: "
+            "was it made for another mesh?"
+        )
+    wanted = np.zeros(n_vertices, dtype=bool)
+    wanted[vertices] = True
+    corners = np.flatnonzero(wanted[faces])[::-1]
+    first = np.full(n_vertices, -1)
+    first[faces.ravel()[corners]] = corners
+    alone = np.flatnonzero(first[vertices] < 0)
+    if len(alone):
+        raise SourceError(
+            f"{name} {alone[0]} is vertex {vertices[alone[0]]}, which no face has: choose a vertex of the surface"
+        )
+    return first[vertices]
+
+
+def has(triangles: LaidOutTriangles, faces: NDArray[np.int64], places: Places) -> NDArray[np.bool_]:
+    """(n,) whether face k has place k."""
+    return np.choose(
+        places.kinds,
+        [
+            (triangles.corner_vertices[faces] == places.elements[:, None]).any(axis=1),
+            (triangles.edges.of_faces[faces] == places.elements[:, None]).any(axis=1),
+            faces == places.elements,
+        ],
+    )
+
+
+def barycentric_in(triangles: LaidOutTriangles, faces: NDArray[np.int64], places: Places) -> NDArray[np.float64]:
+    """(n, 3) where place k lies in face k, which must have it."""
+    weights = places.barycentric.copy()
+    moved = np.flatnonzero(faces != places.faces)
+    kinds, elements, along, other = (a[moved] for a in (places.kinds, places.elements, places.along, faces))
+    weights[moved] = 0.0
+
+    at_vertex = kinds == VERTEX
+    corner = (triangles.corner_vertices[other[at_vertex]] == elements[at_vertex, None]).argmax(axis=1)
+    weights[moved[at_vertex], corner] = 1.0
+
+    on_edge = kinds == EDGE
+    rows, face = moved[on_edge], other[on_edge]
+    side = (triangles.edges.of_faces[face] == elements[on_edge, None]).argmax(axis=1)
+    head = np.where(triangles.edges.forward[face, side], along[on_edge], 1 - along[on_edge])
+    weights[rows, side] = 1 - head
+    weights[rows, (side + 1) % 3] = head
+    return weights
+
+
+def shared_faces(triangles: LaidOutTriangles, start: Places, end: Places) -> NDArray[np.int64]:
+    """(k,) a face that has both ends, or −1; the face through which an end was given goes first."""
+    shared = np.where(has(triangles, end.faces, start), end.faces, -1)
+    shared = np.where(has(triangles, start.faces, end), start.faces, shared)
+    left = np.flatnonzero((shared < 0) & (start.kinds != FACE))
+    if len(left):
+        which, faces = star(triangles, start[left])
+        fits = has(triangles, faces, end[left[which]])
+        found = np.full(len(left), triangles.n_faces)
+        np.minimum.at(found, which[fits], faces[fits])
+        shared[left] = np.where(found < triangles.n_faces, found, -1)
+    return shared
+
+
+def star(triangles: LaidOutTriangles, places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """All faces that have each place, as pairs: index of the place, and face."""
+    inside = np.flatnonzero(places.kinds == FACE)
+    which, faces = [inside], [places.elements[inside]]
+    for kind, table, count in (
+        (VERTEX, triangles.corner_vertices, triangles.n_vertices),
+        (EDGE, triangles.edges.of_faces, triangles.n_edges),
+    ):
+        members = np.flatnonzero(places.kinds == kind)
+        if not len(members):
+            continue
+        members = members[np.argsort(places.elements[members], kind="stable")]
+        number = np.bincount(places.elements[members], minlength=count)
+        begin = np.cumsum(number) - number
+        face, corner = np.nonzero((number > 0)[table])
+        element = table[face, corner]
+        repeats = number[element]
+        offset = np.arange(repeats.sum()) - np.repeat(np.cumsum(repeats) - repeats, repeats)
+        which.append(members[np.repeat(begin[element], repeats) + offset])
+        faces.append(np.repeat(face, repeats))
+    return np.concatenate(which), np.concatenate(faces)
+
+
+def distinct(places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Points that coincide counted once, in order of first appearance: index of the first of each, and who is who."""
+    inner = np.where((places.kinds == FACE)[:, None], places.barycentric, 0.0)
+    columns = [places.kinds, places.elements, places.along, inner[:, 0], inner[:, 1]]
+    order = np.lexsort(columns[::-1])
+    new = np.zeros(len(places), dtype=bool)
+    new[:1] = True
+    for column in columns:
+        new[1:] |= np.abs(np.diff(column[order])) > SNAP
+    group = np.empty(len(places), dtype=np.int64)
+    group[order] = np.cumsum(new) - 1
+    first = np.full(int(new.sum()), len(places), dtype=np.int64)
+    np.minimum.at(first, group, np.arange(len(places)))
+    rank = np.empty_like(first)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return np.sort(first), rank[group]
+
+
+def chained(parts: Sequence[Places]) -> Places:
+    """Places one after another."""
+    return Places(*(np.concatenate([getattr(p, f) for p in parts]) for f in Places.__dataclass_fields__))

@@ -1,0 +1,251 @@
+"""Oriented area elements: what a shape in space is to the method, whatever it was made of.
+
+Triangles, fans of polygons, segments of a polyline and oriented points are all simplices that carry a vector: their
+area times their normal. They are bisected until they are small beside a cell, and merged again per cell and connected
+component, so that neither huge nor millions of tiny faces cost more than the cells they pass through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import singledispatch
+from math import gamma, pi
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.grid import Grid
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import SourceError
+
+if TYPE_CHECKING:
+    from ..operators.grid.node_sources import NodeSources
+
+NEIGHBOURS = 8
+"""Neighbours from which the area of an oriented point is estimated."""
+ROUNDING = 1e-9
+"""Where less of the area than this is left of normals that cancel, the rest is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class AreaElements:
+    """Simplices with vectors.
+
+    Attributes
+    ----------
+    corners : (m, c, d) float
+        Corners: three for triangles, two for segments, one for points.
+    vectors : (m, d) float
+        Area times unit normal.
+    weights : (m,) float
+        Area; negative for the parts of a nonconvex polygon's fan that lie outside it.
+    components : (m,) int
+        Connected component of the shape, from 0.
+    spacing : float
+        Mean distance between elements that bisection cannot bring closer: 0 where there is a surface between them.
+    """
+
+    corners: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    spacing: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class AreaSamples:
+    """Area elements merged per cell of a grid and per connected component.
+
+    Attributes
+    ----------
+    positions : (s, d) float
+        Mean position, in cells from the grid's origin.
+    vectors : (s, d) float
+        Sum of area times unit normal.
+    weights : (s,) float
+        Sum of areas.
+    components, owners : (s,) int
+        Connected component, and source, that each sample belongs to.
+    spacing : float
+        h_source: the largest of the sources' mean spacings.
+    outside : float
+        Fraction of the area that lies outside the grid.
+    cancelled : float
+        Fraction of the area inside whose normals cancel others of the same cell and component: sheets thinner than a
+        cell, and faces given twice with opposite orientations.
+    nodes : NodeSources
+        The vectors brought to the nodes, up to a common factor.
+    """
+
+    positions: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    owners: NDArray[np.int64]
+    spacing: float
+    outside: float
+    cancelled: float
+    nodes: NodeSources
+
+
+@singledispatch
+def area_elements(shape: Any) -> AreaElements:
+    """Lower a shape in space to simplices with vectors."""
+    raise SourceError(
+        f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
+        f"Polyline, not to a {type(shape).__name__}"
+    )
+
+
+@area_elements.register
+def _(shape: TriangleMesh) -> AreaElements:
+    corners = shape.vertices[shape.faces]
+    components = connected_components(shape.vertices, shape.faces)
+    return AreaElements(corners, shape.face_area_vectors, shape.face_areas, components)
+
+
+@area_elements.register
+def _(shape: PolygonMesh) -> AreaElements:
+    """Fans around the centroids: their vector areas add up to the polygon's, planar and convex or not."""
+    polygon = shape.corner_polygons
+    fans = np.stack([shape.corners, shape.next_corners], axis=1)
+    corners = np.concatenate([shape.polygon_centroids[polygon][:, None], shape.vertices[fans]], axis=1)
+    vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = shape.polygon_area_vectors
+    lengths = np.linalg.norm(total, axis=1, keepdims=True)
+    normals = total / np.where(lengths > 0, lengths, 1)
+    weights = np.einsum("ij,ij->i", vectors, normals[polygon])
+    return AreaElements(corners, vectors, weights, connected_components(shape.vertices, fans))
+
+
+@area_elements.register
+def _(shape: PointCloud) -> AreaElements:
+    if shape.normals is None:
+        raise SourceError(
+            "the point cloud has no normals, which say what is inside: give them, or estimate and orient them first"
+        )
+    areas = point_areas(shape.points) if shape.areas is None else shape.areas
+    components = np.zeros(shape.n_points, dtype=np.int64)
+    sides = shape.points.shape[1] - 1  # on a line a point is a whole boundary, with no gap to the next
+    spacing = float(np.mean(areas)) ** (1.0 / sides) if sides else 0.0
+    return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
+
+
+@singledispatch
+def extent(shape: Any) -> NDArray[np.float64]:
+    """(2, d) least and greatest coordinates of a shape."""
+    corners = area_elements(shape).corners
+    return np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
+
+
+@extent.register
+def _(shape: PointCloud) -> NDArray[np.float64]:
+    return np.stack([shape.points.min(axis=0), shape.points.max(axis=0)])
+
+
+@extent.register
+def _(shape: TriangleMesh) -> NDArray[np.float64]:
+    used = np.zeros(shape.n_vertices, dtype=bool)
+    used[shape.faces] = True
+    vertices = shape.vertices[used]
+    return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+
+
+def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = None) -> Grid:
+    """A grid of cubic cells around shapes, with `resolution` nodes along its longest side.
+
+    Examples
+    --------
+    >>> grid_around([PointCloud([[0, 0, 0], [1, 2, 4]])], 7, padding=1.0)
+    Grid(origin=[-1.0, -1.0, -1.0], spacing=[1.0, 1.0, 1.0], shape=(4, 5, 7))
+    """
+    extents = np.stack([extent(shape) for shape in shapes])
+    return Grid.around([extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)], resolution, padding)
+
+
+def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> NDArray[np.float64]:
+    """(n,) area that each point stands for: that of the disk which reaches its k-th neighbour, divided by k.
+
+    Points that coincide share one place. In d dimensions the disk is a ball of dimension d − 1.
+    """
+    from scipy.spatial import cKDTree
+
+    places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    dimension = points.shape[1] - 1
+    k = min(neighbours, len(places) - 1)
+    if dimension == 0 or k == 0:
+        return np.ones(len(points)) / counts[which.ravel()]
+    reach = cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
+    unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
+    return (unit_ball * reach**dimension / k / counts)[which.ravel()]
+
+
+def connected_components(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m,) connected component of each face; vertices at the same position are one vertex."""
+    from ..geometry.components import face_components, same_positions
+
+    return face_components(same_positions(vertices)[faces])
+
+
+def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSamples:
+    """Bisect the elements of shapes until no edge is longer than `size` cells, and merge them per cell and component.
+
+    Raises
+    ------
+    SourceError
+        If a shape cannot be used on this grid, or nothing of any lies within it.
+    """
+    from ..operators.grid.node_sources import NodeSources
+    from ..operators.grid.wavefront import padded_shape
+    from .grid.binning import merge_in_cells
+
+    steps = np.zeros(4)
+    steps[4 - grid.dimension :] = grid.spacing
+    nodes = NodeSources.empty(padded_shape(grid.shape), steps)
+    scale = float(np.prod(grid.spacing)) ** ((grid.dimension - 1) / grid.dimension)
+    parts, first, spacing = [], 0, 0.0
+    total = inside = 0.0
+    for owner, shape in enumerate(shapes):
+        elements = area_elements(shape)
+        if elements.corners.shape[2] != grid.dimension:
+            raise SourceError(
+                f"source {owner} lives in {elements.corners.shape[2]} dimensions, and the grid in {grid.dimension}"
+            )
+        order = np.argsort(elements.components, kind="stable")
+        corners = (elements.corners - grid.origin) / grid.spacing
+        samples, nodes = merge_in_cells(
+            corners,
+            elements.vectors,
+            elements.weights,
+            elements.components,
+            order,
+            np.array(grid.shape),
+            size,
+            nodes,
+            scale,
+        )
+        positions, vectors, weights, components = samples
+        total += float(elements.weights.sum())
+        inside += float(weights.sum())
+        spacing = max(spacing, elements.spacing)
+        parts.append((positions, vectors, weights, components + first, np.full(len(weights), owner)))
+        first += int(elements.components.max()) + 1
+    joined = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
+    if total <= 0:
+        raise SourceError("the source has no area: every face is degenerate")
+    if not len(joined[2]) or not joined[1].any():
+        raise SourceError(
+            f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape: move or enlarge it"
+        )
+    left = float(np.linalg.norm(joined[1], axis=1).sum() / joined[2].sum())
+    if left < ROUNDING:
+        raise SourceError(
+            "the normals of the source cancel each other everywhere, so that nothing tells inside from outside: "
+            "remove or turn one of its coinciding sides"
+        )
+    outside = max(0.0, 1.0 - inside / total)
+    return AreaSamples(*joined, spacing=spacing, outside=outside, cancelled=max(0.0, 1.0 - left), nodes=nodes)

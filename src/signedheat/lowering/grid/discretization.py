@@ -1,0 +1,111 @@
+"""Regular grids as a discretisation: diffusion by sweeps, integration by cosine transforms (Sec. 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...discretization import Diagnostics, discretize
+from ...domains.grid import Grid
+from ...errors import MemoryLimitError, SourceError
+from ...fields.grid_field import GridField
+from ..area_elements import sample_on_grid
+from .integration import GridIntegration
+from .source import GridSource
+
+if TYPE_CHECKING:
+    from ...operators.grid.multilevel import Level
+
+SAMPLE_SIZE = 1.0
+"""Longest edge, in cells, of the pieces into which faces are cut."""
+BYTES_PER_NODE = 46
+"""Peak of a distance computation, measured."""
+BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
+"""The same on grids with solid nodes, by dimension."""
+
+
+def memory_estimate(grid: Grid) -> int:
+    """Bytes that a distance computation on the grid takes at its peak.
+
+    Examples
+    --------
+    >>> memory_estimate(Grid((0, 0, 0), 1.0, (512, 512, 512))) < 10e9
+    True
+    """
+    per_node = BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS[grid.dimension]
+    return per_node * grid.n_nodes + 50_000_000
+
+
+def refuse_beyond_memory(grid: Grid) -> None:
+    """Raise `MemoryLimitError` if the grid cannot fit, before anything is allocated."""
+    import os
+
+    available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else None
+    needed = memory_estimate(grid)
+    if available is not None and needed > available:
+        raise MemoryLimitError(
+            f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, and this machine "
+            f"has {available / 1e9:.1f} GB: choose a lower resolution"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class GridDiscretization:
+    """A grid, as the three steps see it."""
+
+    grid: Grid
+
+    @cached_property
+    def integration(self) -> GridIntegration:
+        return GridIntegration(self.grid)
+
+    def adapt(self, sources: Sequence[Any]) -> tuple[GridDiscretization, Sequence[Any]]:
+        return self, sources
+
+    def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
+        samples = sample_on_grid(sources, self.grid, SAMPLE_SIZE)
+        return GridSource(samples, self.grid, diffusion)
+
+    def diffuse(self, source: GridSource) -> list[Level]:
+        from ...operators.grid.multilevel import diffuse_on_pyramid
+
+        return diffuse_on_pyramid(source.vectors, source.time_on, source.finest)
+
+    def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
+        from ...operators.grid.multilevel import collapse
+        from ...operators.grid.readout import unit_vectors
+        from ...operators.grid.wavefront import padded_shape
+
+        dimension = self.grid.dimension
+        directions = collapse(vectors, padded_shape(self.grid.shape), dimension, unit_vectors)
+        return np.moveaxis(directions.reshape(dimension, *self.grid.shape), 0, -1)
+
+    def divergence(self, directions: NDArray[np.floating]) -> NDArray[np.float64]:
+        from ...operators.grid.stencil import divergence
+
+        return divergence(directions, self.grid.spacing)
+
+    def field(self, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics) -> GridField:
+        notes = {
+            "samples": len(source.weights),
+            "area outside the grid": source.samples.outside,
+            "area that cancels": source.samples.cancelled,
+        }
+        return GridField(self.grid, values, replace(diagnostics, notes={**diagnostics.notes, **notes}))
+
+
+@discretize.register
+def _(domain: Grid) -> GridDiscretization:
+    if domain.dimension > 4:
+        raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}")
+    refuse_beyond_memory(domain)
+    if domain.mask is not None:
+        from .masked import MaskedGridDiscretization
+
+        return MaskedGridDiscretization(domain)
+    return GridDiscretization(domain)

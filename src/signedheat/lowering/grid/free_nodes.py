@@ -1,0 +1,155 @@
+"""Nodes of a grid around solid ones: the same stencil, with no flux into what is solid; straight lines between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...domains.grid import Grid
+
+ECHO = 3
+"""Nodes beside a wall whose gradients its echo turns by more than a degree."""
+
+
+@dataclass(frozen=True, eq=False)
+class OpenNodes:
+    """The nodes of a grid that are not solid, numbered in the order of the grid.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> nodes = OpenNodes(Grid(0.0, 0.5, 4, mask=np.array([False, False, True, False])))
+    >>> nodes.neighbors.tolist()
+    [[-1, 1], [0, -1], [-1, -1]]
+    >>> nodes.laplacian.toarray().tolist()
+    [[4.0, -4.0, 0.0], [-4.0, 4.0, 0.0], [0.0, 0.0, 0.0]]
+    """
+
+    grid: Grid
+
+    @cached_property
+    def ids(self) -> NDArray[np.int64]:
+        """(n,) node of the grid that each open node is."""
+        return np.flatnonzero(~self.grid.mask.ravel())
+
+    @cached_property
+    def numbers(self) -> NDArray[np.int64]:
+        """(n_nodes,) the opposite of `ids`; −1 for solid nodes."""
+        numbers = np.full(self.grid.n_nodes, -1, dtype=np.int64)
+        numbers[self.ids] = np.arange(len(self.ids))
+        return numbers
+
+    @cached_property
+    def indices(self) -> NDArray[np.int64]:
+        """(n, d) place of each open node, in cells."""
+        return np.stack(np.unravel_index(self.ids, self.grid.shape), axis=1)
+
+    @cached_property
+    def neighbors(self) -> NDArray[np.int64]:
+        """(n, 2d) open node before and after each along every axis; −1 where there is none."""
+        padded = np.pad(self.numbers.reshape(self.grid.shape), 1, constant_values=-1)
+        place = self.indices + 1
+        around = []
+        for axis in range(self.grid.dimension):
+            for step in (-1, 1):
+                there = place.copy()
+                there[:, axis] += step
+                around.append(padded[tuple(there.T)])
+        return np.stack(around, axis=1)
+
+    @cached_property
+    def laplacian(self) -> sparse.csr_matrix:
+        """C: positive semidefinite, with no flux through walls and into solid nodes."""
+        n, weights = len(self.ids), np.repeat(self.grid.spacing**-2.0, 2)
+        there = self.neighbors >= 0
+        rows, sides = np.nonzero(there)
+        parts = sparse.csr_matrix((weights[sides], (rows, self.neighbors[there])), shape=(n, n))
+        return sparse.csr_matrix(sparse.diags_array(there @ weights) - parts)
+
+    def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) −∇·Y, each face between two open nodes taking the mean of theirs, and all others nothing."""
+        result = np.zeros(len(directions))
+        for axis, step in enumerate(self.grid.spacing):
+            for side, sign in ((2 * axis, 1.0), (2 * axis + 1, -1.0)):
+                beside, component = self.neighbors[:, side], directions[:, axis]
+                result += np.where(beside >= 0, sign * (component + component[beside]) / (2 * step), 0.0)
+        return result
+
+    def gradients(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, d) central differences; beyond a wall a value is what it is before it.
+
+        Where values fall like the kernel of ``1 − tΔ`` this is the direction in which they come, exactly: the central
+        difference is the velocity that belongs to the symbol of the stencil, however few nodes √t spans.
+        """
+        slopes = np.empty((len(values), self.grid.dimension))
+        for axis, step in enumerate(self.grid.spacing):
+            before, after = self.neighbors[:, 2 * axis], self.neighbors[:, 2 * axis + 1]
+            ahead = np.where(after >= 0, values[after], values)
+            behind = np.where(before >= 0, values[before], values)
+            slopes[:, axis] = (ahead - behind) / (2 * step)
+        return slopes
+
+    def without_echo(self, directions: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Directions of the chosen nodes, those that lead into a wall taken from farther inside.
+
+        Heat that a wall throws back takes from the gradient what points into it, within a few √t, that is nodes.
+        """
+        result = directions.copy()
+        for axis in range(self.grid.dimension):
+            for wall in (0, 1):
+                inward, sign = self.neighbors[:, 2 * axis + 1 - wall], 2 * wall - 1
+                chain = [np.flatnonzero(chosen & (self.neighbors[:, 2 * axis + wall] < 0))]
+                for _ in range(ECHO):
+                    chain = [ids[inward[chain[-1]] >= 0] for ids in chain]
+                    chain.append(inward[chain[-1]])
+                    chain = [ids[chosen[chain[-1]]] for ids in chain]
+                leading = sign * directions[chain[-1], axis] > 0
+                for ids in chain[:-1]:
+                    result[ids[leading]] = directions[chain[-1][leading]]
+        return result
+
+    def see(self, targets: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) whether the straight line from each open node to its target, in cells, passes no solid node's box."""
+        counts = np.array(self.grid.shape)
+        strides = np.append(np.cumprod(counts[:0:-1])[::-1], 1)
+        return _see(self.indices, targets, self.grid.mask.ravel(), counts, strides)
+
+
+@njit(cache=True, nogil=True)
+def _see(starts, targets, solid, counts, strides):
+    n, dimension = starts.shape
+    seen = np.ones(n, dtype=np.bool_)
+    place = np.empty(dimension, dtype=np.int64)
+    last = np.empty(dimension, dtype=np.int64)
+    for i in range(n):
+        steps = 0
+        for d in range(dimension):
+            place[d] = starts[i, d]
+            last[d] = min(max(np.int64(np.floor(targets[i, d] + 0.5)), 0), counts[d] - 1)
+            steps += abs(last[d] - place[d])
+        entered = 0.0
+        for _ in range(steps):
+            axis, leave = -1, np.inf
+            for d in range(dimension):
+                way = targets[i, d] - starts[i, d]
+                if place[d] != last[d] and way != 0.0:
+                    at = (place[d] + (0.5 if way > 0.0 else -0.5) - starts[i, d]) / way
+                    if at < leave:
+                        axis, leave = d, at
+            node = 0
+            for d in range(dimension):
+                node += place[d] * strides[d]
+            # lines that touch a corner spend no time in the box beyond it
+            if solid[node] and leave > entered + 1e-9:
+                seen[i] = False
+                break
+            if axis < 0:
+                break
+            entered = max(entered, leave)
+            place[axis] += 1 if targets[i, axis] > starts[i, axis] else -1
+    return seen

@@ -1,0 +1,176 @@
+"""Step 3 on a grid: the cosine transform inverts C, and constraints are corrections of what it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...discretization import Levels
+from ...domains.grid import Grid
+from .source import GridSource
+
+TOLERANCE = 1e-6
+"""Relative residual at which conjugate gradients stop."""
+STIFFNESS = 10.0
+"""Penalty within the augmented Lagrangian, in 1/h."""
+MULTIPLIER_STEPS = 5
+"""Steps of the augmented Lagrangian."""
+
+
+@dataclass(frozen=True, eq=False)
+class GridIntegration:
+    """Step 3 on a grid."""
+
+    grid: Grid
+
+    def solve(self, divergence: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
+        from ...operators.grid.stencil import solve_poisson
+
+        phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
+        phi -= np.average(source.at_samples(phi), weights=source.weights)
+        return phi
+
+    def fit(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+        """Subtract from φ the mean of its error at the samples, weighted by how well each is seen from a node.
+
+        The weights are the samples' areas, diffused as the normals are.
+        """
+        phi = self.solve(divergence, source)
+        excess = deviation(source.at_samples(phi), source, levels)
+        phi -= diffused_mean(source, excess)
+        return phi
+
+    def penalize(self, divergence: NDArray[np.float64], source: GridSource, strength: float) -> NDArray[np.float64]:
+        levels = Levels(np.zeros(len(source.weights)))
+        zero = np.zeros(len(source.weights))
+        return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
+
+    def fit_exactly(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+        """Augmented Lagrangian, then the least correction at the nodes around the samples that leaves no deviation.
+
+        The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
+        small, and met directly. Rows that contradict each other are met in the mean.
+        """
+        strength = STIFFNESS / float(self.grid.spacing.mean())
+        phi = self.fit(divergence.copy(), source, levels)
+        multipliers = np.zeros(len(source.weights))
+        for _ in range(MULTIPLIER_STEPS):
+            phi = self._penalized(divergence, source, levels, strength, multipliers, phi)
+            multipliers += strength * deviation(source.at_samples(phi), source, levels)
+        return phi - least_correction(deviation(source.at_samples(phi), source, levels), source).reshape(phi.shape)
+
+    def _penalized(
+        self,
+        divergence: NDArray[np.float64],
+        source: GridSource,
+        levels: Levels,
+        strength: float,
+        multipliers: NDArray[np.float64],
+        start: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the deviations from the levels."""
+        from ...operators.grid.stencil import laplacian, solve_poisson
+
+        volume = float(np.prod(self.grid.spacing))
+        rows, weights = source.rows, source.weights / volume
+        free = Levels(np.zeros_like(levels.values), levels.groups)
+
+        def spread(at_samples: NDArray[np.float64]) -> NDArray[np.float64]:
+            return (rows.T @ (weights * at_samples)).reshape(self.grid.shape)
+
+        def apply(phi: NDArray[np.float64]) -> NDArray[np.float64]:
+            pull = strength * deviation(rows @ phi.ravel(), source, free)
+            return laplacian(phi, self.grid.spacing) + spread(pull)
+
+        # the constant, of which C knows nothing, costs what the penalty makes of it
+        constant = strength * float(weights.sum()) / self.grid.n_nodes
+
+        def precondition(residual: NDArray[np.float64]) -> NDArray[np.float64]:
+            return solve_poisson(residual, self.grid.spacing) + residual.mean() / constant
+
+        wanted = strength * deviation(levels.values, source, free) - deviation(multipliers, source, free)
+        right_hand_side = divergence + spread(wanted)
+        return conjugate_gradients(apply, right_hand_side, precondition, start)
+
+
+def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
+    """Values at the samples, less their level and, where there are groups, less their group's mean."""
+    excess = values - levels.values
+    if levels.groups is not None:
+        sums = np.bincount(levels.groups, source.weights * excess)
+        sizes = np.bincount(levels.groups, source.weights)
+        excess = excess - (sums / np.where(sizes > 0, sizes, 1))[levels.groups]
+    return excess
+
+
+def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(*grid.shape) mean of values given at the samples, weighted by area and nearness: as the normals are diffused.
+
+    It varies slowly, so the finest level of the pyramid is left out.
+    """
+    from ...operators.grid.multilevel import collapse, diffuse_on_pyramid, leave_out
+    from ...operators.grid.node_sources import NodeSources
+    from ...operators.grid.readout import quotients
+    from ...operators.grid.stencil import interpolation_stencil
+
+    largest = np.abs(values).max()
+    if largest == 0.0:
+        return np.zeros(source.grid.shape, dtype=np.float32)
+    finest, axes = source.vectors, slice(-source.grid.dimension, None)
+    left_out, shape, steps = leave_out(finest.shape, finest.steps, max(1, source.finest))
+    ratios = finest.steps[axes] / np.where(steps[axes] > 0, steps[axes], np.inf)
+    stencil = interpolation_stencil(source.samples.positions * ratios, shape[axes])
+    weights = source.weights / source.weights.max()
+    pairs = np.stack([weights, weights * values / largest], axis=1)
+    nodes = NodeSources.scattered(shape, steps, *stencil, pairs)
+    levels = left_out + diffuse_on_pyramid(nodes, source.time_on, rounds=1)
+    mean = collapse(levels, finest.shape, 1, quotients).reshape(source.grid.shape)
+    mean *= np.float32(largest)
+    return mean
+
+
+def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
+    """(nodes,) smallest change that takes these values at the samples, in the sense of least squares."""
+    from scipy.sparse.linalg import lsqr
+
+    touched = np.unique(source.rows.indices)
+    change = np.zeros(source.grid.n_nodes)
+    change[touched] = lsqr(source.rows[:, touched], values, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
+    return change
+
+
+def conjugate_gradients(
+    apply: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    right_hand_side: NDArray[np.float64],
+    precondition: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    start: NDArray[np.float64],
+    limit: int = 500,
+) -> NDArray[np.float64]:
+    """Solve a symmetric positive semidefinite system whose right-hand side it can reach.
+
+    Examples
+    --------
+    >>> conjugate_gradients(lambda x: 2 * x, np.array([2.0, 4.0]), lambda r: r, np.zeros(2))
+    array([1., 2.])
+    """
+    solution = start.copy()
+    residual = right_hand_side - apply(solution)
+    guess = precondition(residual)
+    direction = guess.copy()
+    product = float(np.vdot(residual, guess))
+    goal = TOLERANCE**2 * max(product, float(np.vdot(right_hand_side, precondition(right_hand_side))))
+    for _ in range(limit):
+        if product <= goal:
+            break
+        image = apply(direction)
+        step = product / float(np.vdot(direction, image))
+        solution += step * direction
+        residual -= step * image
+        guess = precondition(residual)
+        product, previous = float(np.vdot(residual, guess)), product
+        direction *= product / previous
+        direction += guess
+    return solution

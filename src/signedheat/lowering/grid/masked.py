@@ -1,0 +1,181 @@
+"""Grids with solid nodes as a discretisation: the stencil as a sparse matrix, directions that bend around corners."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...discretization import Diagnostics, Levels
+from ...domains.grid import Grid
+from ...errors import UnreachedWarning
+from ...fields.grid_field import GridField
+from ...linear import factorize, upper_triangle
+from ...linear.stages import solve_in_stages
+from ...method import unit
+from ..area_elements import sample_on_grid
+from ..direct_integration import DirectIntegration
+from ..tets.discretization import from_first
+from .free_nodes import OpenNodes
+from .integration import deviation
+from .masked_source import MaskedSource
+from .source import GridSource
+
+SAMPLE_SIZE = 1.0
+"""Longest edge, in cells, of the pieces into which sources are cut."""
+
+DIRECT_NODES = {1: 10_000_000, 2: 1_000_000, 3: 40_000, 4: 5_000}
+"""Up to this number of open nodes both systems are factorised; that grows the faster the higher the dimension."""
+
+DIRECTION_ERROR = 1e-4
+"""Componentwise residual at which conjugate gradients stop."""
+
+FACING = 1.5
+"""Cells by which a node may lie beside the end of a source at a wall and still be seen as in front of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class MaskedGridDiscretization:
+    """A grid with solid nodes, as the three steps see it."""
+
+    grid: Grid
+    _factors: dict[float, Any] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def nodes(self) -> OpenNodes:
+        """The nodes that are not solid."""
+        return OpenNodes(self.grid)
+
+    @property
+    def direct(self) -> bool:
+        """Whether systems are factorised; they are solved by conjugate gradients otherwise."""
+        return len(self.nodes.ids) <= DIRECT_NODES[self.grid.dimension]
+
+    @cached_property
+    def integration(self) -> MaskedIntegration:
+        """Step 3."""
+        matrix = upper_triangle(self.nodes.laplacian)
+        if self.direct:
+            return MaskedIntegration(matrix, diffusing=self)
+        return MaskedIntegration(matrix, factorize=from_first, spring=100.0, diffusing=self)
+
+    def adapt(self, sources: Sequence[Any]) -> tuple[MaskedGridDiscretization, Sequence[Any]]:
+        return self, sources
+
+    def lower(self, sources: Sequence[Any], diffusion: float) -> MaskedSource:
+        whole = GridSource(sample_on_grid(sources, self.grid, SAMPLE_SIZE), self.grid, diffusion)
+        return MaskedSource.of(whole, self.nodes)
+
+    def diffuse(self, source: MaskedSource) -> NDArray[np.float64]:
+        """Solve ``(1 − tΔ) X = X₀`` and turn X where the way from the source is bent.
+
+        In flat space diffusion carries vectors along without turning them. Where the straight line to the source passes
+        solid nodes, or leads past the end of a source that a wall ends, the way to it is bent, and has the direction in
+        which undirected heat falls (Crane et al. 2013). Its side is the one that this heat has come from.
+        """
+        from ...geometry.visibility import uphill_roots
+
+        nodes, dimension = self.nodes, self.grid.dimension
+        vectors = np.zeros((len(nodes.ids), dimension + 1))
+        slopes, heights = np.zeros((len(nodes.ids), dimension)), np.full(len(nodes.ids), -np.inf)
+        around = np.where(nodes.neighbors >= 0, nodes.neighbors, np.arange(len(nodes.ids))[:, None])
+        for values, logarithm in self.solve_heat(source.time, source.vectors):
+            missing = np.isnan(values[:, 0])
+            known = ~(missing | missing[around].any(axis=1))
+            vectors[known], slopes[known] = values[known], nodes.gradients(values[:, -1])[known]
+            with np.errstate(divide="ignore"):
+                heights[known] = np.log(np.maximum(values[known, -1], 0.0)) + logarithm
+        vectors, straight = vectors[:, :-1], self._straight(source)
+        falling = nodes.without_echo(-unit(slopes), ~straight)
+        roots = uphill_roots(heights, nodes.neighbors, straight)
+        side = np.sign(np.einsum("ij,ij->i", unit(vectors), falling))[roots]
+        return np.where(straight[:, None], vectors, side[:, None] * falling)
+
+    def solve_heat(self, time: float, loads: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
+        """``(1 − tΔ)⁻¹`` of columns, in stages."""
+        matrix = self._heat_matrix(time)
+        return solve_in_stages(matrix, self._solver(matrix, time), loads)
+
+    def _solver(self, matrix: sparse.csr_matrix, time: float) -> Any:
+        if self.direct:
+            if time not in self._factors:
+                self._factors.clear()
+                self._factors[time] = factorize(matrix)
+            return self._factors[time].solve
+        from ...linear.krylov import IncompleteCholesky, outward_order
+
+        def solve(loads: NDArray[np.float64]) -> NDArray[np.float64]:
+            order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
+            return IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
+
+        return solve
+
+    def _heat_matrix(self, time: float) -> sparse.csr_matrix:
+        matrix = self.nodes.laplacian
+        return sparse.csr_matrix(sparse.eye_array(matrix.shape[0]) + time * matrix)
+
+    def _straight(self, source: MaskedSource) -> NDArray[np.bool_]:
+        """(n,) nodes that the source reaches along a straight line."""
+        from scipy.spatial import cKDTree
+
+        nodes, spacing = self.nodes, self.grid.spacing
+        nearest = cKDTree(source.positions * spacing).query(nodes.indices * spacing, workers=-1)[1]
+        away = nodes.indices - source.positions[nearest]
+        normals = unit(source.normals * spacing)[nearest]
+        along = away - np.einsum("ij,ij->i", away, normals)[:, None] * normals
+        past_end = source.beside_solid[nearest] & (np.linalg.norm(along, axis=1) > FACING)
+        return nodes.see(source.positions[nearest]) & ~past_end
+
+    def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """X at the open nodes, where it is already."""
+        return vectors
+
+    def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """b, the right-hand side of ``C φ = b``."""
+        return self.nodes.divergence(directions)
+
+    def field(self, values: NDArray[np.float64], source: MaskedSource, diagnostics: Diagnostics) -> GridField:
+        """φ at the nodes of the grid, NaN at solid ones."""
+        everywhere = np.full(self.grid.n_nodes, np.nan)
+        everywhere[self.nodes.ids] = values
+        unreached = self.nodes.ids[np.isnan(values)]
+        if len(unreached):
+            warnings.warn(
+                f"{len(unreached)} of {len(values)} open nodes are cut off from every source by solid ones: the "
+                "distance there is NaN",
+                UnreachedWarning,
+                stacklevel=2,
+            )
+        notes = {
+            "samples": len(source.weights),
+            "area outside the grid": source.whole.samples.outside,
+            "area that cancels": source.whole.samples.cancelled,
+        }
+        found = replace(diagnostics, unreached=unreached, notes={**diagnostics.notes, **notes})
+        return GridField(self.grid, everywhere.reshape(self.grid.shape), found)
+
+
+@dataclass(frozen=True, eq=False)
+class MaskedIntegration(DirectIntegration):
+    """Step 3 on open nodes; levels are met as on other grids, by a smooth correction, unless exactly is asked for."""
+
+    diffusing: MaskedGridDiscretization | None = None
+
+    def fit(self, divergence: NDArray[np.float64], source: MaskedSource, levels: Levels) -> NDArray[np.float64]:
+        """Subtract from φ the mean of its error at the samples, weighted by area and by the heat that each sends."""
+        phi = self.solve(divergence, source)
+        excess = deviation(source.rows @ phi, source, levels)
+        if not excess.any():
+            return phi
+        loads = source.rows.T @ (source.weights[:, None] * np.stack([np.ones_like(excess), excess], axis=1))
+        mean = np.zeros_like(phi)
+        for values, _ in self.diffusing.solve_heat(source.time, loads):
+            known = values[:, 0] > 0
+            mean[known] = values[known, 1] / values[known, 0]
+        return phi - mean

@@ -1,0 +1,95 @@
+"""Sources on a grid with solid nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...errors import SourceError
+from .free_nodes import OpenNodes
+from .source import GridSource
+
+
+@dataclass(frozen=True, eq=False)
+class MaskedSource:
+    """Sources lowered to the open nodes of a grid.
+
+    Attributes
+    ----------
+    whole : GridSource
+        The same on the grid without solid nodes.
+    rows : (s, n) sparse
+        Interpolates at the samples, from those nodes around them that are open.
+    kept : (s,) int
+        Samples of `whole` that have one.
+    beside_solid : (s,) bool
+        Samples with a solid node no more than a cell or two away, so that a source that ends there ends at a wall.
+    """
+
+    whole: GridSource
+    rows: sparse.csr_matrix
+    kept: NDArray[np.int64]
+    beside_solid: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, whole: GridSource, nodes: OpenNodes) -> MaskedSource:
+        """Bring sources to open nodes.
+
+        Raises
+        ------
+        SourceError
+            If a source lies within solid nodes.
+        """
+        from scipy.ndimage import binary_dilation
+
+        ids, weights = whole.stencil
+        numbers = nodes.numbers[ids]
+        weights = np.where(numbers >= 0, weights, 0.0)
+        total = weights.sum(axis=1)
+        kept = np.flatnonzero(total > 0)
+        lost = np.setdiff1d(whole.owners, whole.owners[kept])
+        if len(lost):
+            raise SourceError(
+                f"source {lost[0]} lies within solid nodes of the grid, where nothing reaches it: move it out of them"
+            )
+        weights, numbers = weights[kept] / total[kept, None], numbers[kept]
+        row, corner = np.nonzero(weights)
+        shape = (len(kept), len(nodes.ids))
+        rows = sparse.csr_matrix((weights[row, corner], (row, numbers[row, corner])), shape=shape)
+        near_solid = binary_dilation(nodes.grid.mask).ravel()
+        return cls(whole, rows, kept, near_solid[ids[kept]].any(axis=1))
+
+    @property
+    def time(self) -> float:
+        return self.whole.time
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        return self.whole.weights[self.kept]
+
+    @property
+    def components(self) -> NDArray[np.int64]:
+        return self.whole.components[self.kept]
+
+    @property
+    def owners(self) -> NDArray[np.int64]:
+        return self.whole.owners[self.kept]
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """(s, d) area times unit normal of each sample."""
+        return self.whole.samples.vectors[self.kept]
+
+    @cached_property
+    def vectors(self) -> NDArray[np.float64]:
+        """(n, d + 1) X₀, and the area without direction."""
+        return self.rows.T @ np.concatenate([self.normals, self.weights[:, None]], axis=1)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(s, d) of the samples, in cells."""
+        return self.whole.samples.positions[self.kept]

@@ -1,0 +1,81 @@
+"""Sources on a grid: samples, and how they act on its nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...domains.grid import Grid
+from ..area_elements import AreaSamples
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+    from ...operators.grid.node_sources import NodeSources
+
+
+@dataclass(frozen=True, eq=False)
+class GridSource:
+    """Sources lowered to a grid."""
+
+    samples: AreaSamples
+    grid: Grid
+    diffusion: float
+
+    def time_on(self, spacing: float) -> float:
+        """t on a coarser grid of this mean spacing: on none does √t span less than a cell."""
+        return self.time if spacing <= self._step else max(self.time, spacing**2)
+
+    @property
+    def time(self) -> float:
+        return self.diffusion * max(self._step, self.samples.spacing) ** 2
+
+    @property
+    def finest(self) -> int:
+        """How many halvings of the grid still leave √t a cell to span: finer grids have nothing to add."""
+        return max(0, int(np.log2(np.sqrt(self.time) / self._step) + 1e-6))
+
+    @property
+    def _step(self) -> float:
+        return float(self.grid.spacing.mean())
+
+    @property
+    def vectors(self) -> NodeSources:
+        return self.samples.nodes
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        return self.samples.weights
+
+    @property
+    def components(self) -> NDArray[np.int64]:
+        return self.samples.components
+
+    @property
+    def owners(self) -> NDArray[np.int64]:
+        return self.samples.owners
+
+    @cached_property
+    def stencil(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Nodes and weights that interpolate at each sample."""
+        from ...operators.grid.stencil import interpolation_stencil
+
+        return interpolation_stencil(self.samples.positions, self.grid.shape)
+
+    @cached_property
+    def rows(self) -> csr_matrix:
+        from scipy.sparse import csr_matrix
+
+        nodes, weights = self.stencil
+        starts = np.arange(len(nodes) + 1) * nodes.shape[1]
+        size = (len(nodes), self.grid.n_nodes)
+        return csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=size)
+
+    def at_samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of the nodes, interpolated."""
+        nodes, weights = self.stencil
+        return np.einsum("ij,ij->i", values.ravel()[nodes], weights)

@@ -1,0 +1,101 @@
+"""Nonmanifold edges, seen from the sources: which of their faces the heat comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from ...geometry.curve_segments import Pieces
+from ...geometry.intrinsic_mesh import LaidOutTriangles
+
+
+def facing(
+    triangles: LaidOutTriangles, groups: Sequence[Sequence[Pieces]]
+) -> tuple[LaidOutTriangles, Sequence[Sequence[Pieces]]]:
+    """Make the face that is nearest to the sources the first of every edge with more than two faces.
+
+    A vector that leaves one face over such an edge enters all the others. The frame of the edge tells its first face
+    from the rest, so the first must be the one that heat leaves: otherwise what passes between two others is reflected.
+    Edges along which or past which heat runs keep their first face.
+
+    Parameters
+    ----------
+    triangles : LaidOutTriangles
+        The surface.
+    groups : sequence of sequences of Pieces
+        The sources on it.
+
+    Returns
+    -------
+    LaidOutTriangles
+        The very same ones where nothing changes.
+    sequence of sequences of Pieces
+        The sources in the new frames.
+
+    Examples
+    --------
+    >>> from signedheat.domains.curves import Curve
+    >>> from signedheat.geometry.curve_segments import in_pieces
+    >>> three = LaidOutTriangles.from_lengths(np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]), np.ones((3, 3)), 5)
+    >>> on_the_last = in_pieces([Curve([2, 2], [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])], three)
+    >>> facing(three, on_the_last)[0].first_sides.tolist()
+    [6, 1, 2, 4, 5, 7, 8]
+    """
+    table = triangles.edges
+    if table.face_counts.max(initial=0) <= 2:
+        return triangles, groups
+    parts = [part for group in groups for part in group]
+    distance = from_sources(triangles, parts)
+    holds = np.zeros(triangles.n_faces, dtype=bool)
+    holds[np.concatenate([part.faces[part.edges < 0] for part in parts])] = True
+    side = np.flatnonzero(table.face_counts[table.of_faces].ravel() > 2)
+    edge = table.of_faces.ravel()[side]
+    opposite = np.roll(triangles.corner_vertices, -2, axis=1).ravel()[side]
+    ends = distance[table.vertices[edge]].mean(axis=1)
+    first = np.full(triangles.n_edges, -1)
+    first[table.of_faces.ravel()[triangles.first_sides]] = triangles.first_sides
+    away = np.where(holds[side // 3], -1.0, distance[opposite])
+    order = np.lexsort([side != first[edge], away, edge])  # of equal ones, the first stays first
+    nearest = order[np.append(True, np.diff(edge[order]) > 0)]
+    nearest = nearest[(away[nearest] < ends[nearest]) & (side[nearest] != first[edge[nearest]])]
+    if not len(nearest):
+        return triangles, groups
+    changed = np.zeros(triangles.n_edges, dtype=bool)
+    changed[edge[nearest]] = True
+    first[edge[nearest]] = side[nearest]
+    turned = replace(triangles, leading_sides=first[first >= 0])
+    return turned, [[mirrored(part, changed) for part in group] for group in groups]
+
+
+def mirrored(part: Pieces, changed: NDArray[np.bool_]) -> Pieces:
+    """Vectors along edges whose frames have been reflected."""
+    here = (part.edges >= 0) & changed[part.edges]
+    return replace(part, vectors=np.where(here, np.conj(part.vectors), part.vectors)) if here.any() else part
+
+
+def from_sources(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> NDArray[np.float64]:
+    """(n_vertices,) about how far every vertex is from the sources: along edges."""
+    lengths = np.zeros(triangles.n_edges)
+    lengths[triangles.edges.of_faces] = triangles.edge_lengths
+    n = triangles.n_vertices
+    tail, head = triangles.edges.vertices.T
+    onto = [corner_distances(triangles, part) for part in parts]
+    vertices, offsets = (np.concatenate(a) for a in zip(*onto, strict=True))
+    rows, columns = np.concatenate([tail, np.full(len(vertices), n)]), np.concatenate([head, vertices])
+    shortest = np.lexsort([np.concatenate([lengths, offsets]), columns, rows])
+    first = np.append(True, (np.diff(rows[shortest]) != 0) | (np.diff(columns[shortest]) != 0))
+    kept = shortest[first]  # csr_matrix would add up entries that occur twice
+    graph = csr_matrix((np.concatenate([lengths, offsets])[kept], (rows[kept], columns[kept])), shape=(n + 1, n + 1))
+    return dijkstra(graph, directed=False, indices=n)[:n]
+
+
+def corner_distances(triangles: LaidOutTriangles, part: Pieces) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """How far the corners of a source's faces are from its nodes."""
+    corners = triangles.corner_positions[part.nodes.faces]
+    at = np.einsum("nk,nk->n", part.nodes.barycentric, corners)
+    return triangles.corner_vertices[part.nodes.faces].ravel(), np.abs(corners - at[:, None]).ravel()

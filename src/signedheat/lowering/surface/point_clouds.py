@@ -1,0 +1,28 @@
+"""Point clouds, lowered through their local triangulations (Sec. 8)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...discretization import discretize
+from ...domains.point_cloud import PointCloud
+from .discretization import SurfaceDiscretization
+
+
+@discretize.register
+def _(domain: PointCloud) -> SurfaceDiscretization:
+    """φ lives at the points; points that coincide share one unknown.
+
+    h is the mean distance between neighbouring points: triangles between samples say nothing of the surface below it.
+    """
+    mesh = domain.triangulation
+    used = np.zeros(domain.n_points, dtype=bool)
+    used[mesh.faces] = True
+    notes = {
+        "duplicate points": int((domain.representatives != np.arange(domain.n_points)).sum()),
+        "points without triangles": np.flatnonzero(~used[domain.representatives]),
+    }
+    spacing = float(mesh.edge_lengths.mean())
+    return replace(discretize(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)

@@ -1,0 +1,250 @@
+"""Sources on surfaces, lowered to X₀ of Eq. 12 and to the rows that interpolate φ on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, csr_matrix, vstack
+from scipy.sparse.csgraph import connected_components
+
+from ...errors import SourceError
+from ...geometry.curve_segments import Pieces, in_pieces, rows_of
+from ...geometry.intrinsic_mesh import LaidOutTriangles
+from ...geometry.surface_points import FACE, VERTEX, Places, chained, distinct, places_at, star
+from .free_ends import free_end_arcs
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceSource:
+    """Curves and points, lowered to a set of laid-out triangles.
+
+    Attributes
+    ----------
+    vectors : (1, e) complex sparse
+        X₀, in the frames of the edges; few are not zero.
+    time : float
+        t of Eq. 12.
+    rows : (s, n_vertices) sparse
+        Row i interpolates φ at sample i; samples are the distinct points of every source.
+    weights : (s,) float
+        Length of curve that belongs to each sample; `spacing` for isolated points.
+    components : (s,) int
+        Connected component of the sources taken together, numbered in the order in which the sources name them.
+    owners : (s,) int
+        Which source each sample belongs to.
+    oriented : bool
+        Whether any source has two sides; where none has, φ is an unsigned distance.
+    pinned : (s,) bool
+        Samples at which exact constraints hold: not those inside faces, where their component has others. Three of them
+        inside one face, however close to a line, would flatten φ on it.
+    triangles : LaidOutTriangles
+        What they were lowered to; the first vertices are those of the domain's own triangles.
+    parts : list of Pieces
+        The sources on these triangles.
+    """
+
+    vectors: csr_array
+    time: float
+    rows: csr_matrix
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    owners: NDArray[np.int64]
+    oriented: bool
+    pinned: NDArray[np.bool_]
+    triangles: LaidOutTriangles
+    parts: Sequence[Pieces]
+
+
+def surface_source(
+    triangles: LaidOutTriangles,
+    sources: Sequence[Any],
+    diffusion: float,
+    spacing: float,
+    positions: NDArray[np.float64] | None = None,
+) -> SurfaceSource:
+    """Lower sources to a set of triangles.
+
+    Parameters
+    ----------
+    triangles : LaidOutTriangles
+        The surface; face ids of the sources refer to it.
+    sources : sequence of Curve, SurfacePoints, Pieces or sequences of them
+        What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges
+        (`embedding.embed` brings them there).
+    diffusion : float
+        τ in ``t = τ h²``.
+    spacing : float
+        h: mean distance between unknowns. An isolated point weighs as much as a curve of this length.
+    positions : (n_vertices, 3) float, optional
+        Vertices in space, for curves whose normals are given.
+
+    Raises
+    ------
+    SourceError
+        If there is no source, one does not fit the surface, or they cancel.
+
+    Examples
+    --------
+    >>> from signedheat import Curve
+    >>> triangles = LaidOutTriangles.from_lengths(np.array([[0, 1, 2]]), np.ones((1, 3)), 3)
+    >>> across = Curve([0, 0], [[0.5, 0.5, 0.0], [0.5, 0.0, 0.5]])
+    >>> surface_source(triangles, [across], 1.0, 0.5).weights
+    array([0.25, 0.25])
+    """
+    groups = in_pieces(sources, triangles, positions)
+    parts = [part for group in groups for part in group]
+    if not parts or not all(groups):
+        raise SourceError("there is no source: pass at least one curve or point, and no empty lists")
+    if not all(part.fits for part in parts):
+        raise SourceError("unoriented curves inside faces must be embedded in the triangles first")
+    vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
+    vectors = vectors + unoriented_vectors(triangles, parts, spacing)
+    points = [p.nodes for p in parts if len(p.ends) == 0]
+    if points:
+        nodes = chained(points)
+        at_vertex = nodes.kinds == VERTEX
+        vectors = vectors + spacing * vertex_point_vectors(triangles, nodes.elements[at_vertex])
+        vectors = vectors + np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
+    elif np.abs(vectors.data).max(initial=0.0) <= 1e-12 * max(part.lengths.max() for part in parts):
+        raise SourceError(
+            "the curves cancel: all of them run both ways, or close inside single faces, so that no side is positive; "
+            "make them unoriented (oriented=False), or the faces smaller"
+        )
+
+    components = connected(parts)
+    outside = np.concatenate([p.nodes.kinds != FACE for p in parts])
+    sizes = [sum(len(p.nodes) for p in group) for group in groups]
+    return SurfaceSource(
+        vectors=vectors,
+        time=diffusion * spacing**2,
+        rows=vstack([rows_of(triangles, p.nodes) for p in parts], format="csr"),
+        weights=np.concatenate([line_elements(p, spacing) for p in parts]),
+        components=components,
+        owners=np.repeat(np.arange(len(groups)), sizes),
+        oriented=any(p.oriented for p in parts),
+        pinned=outside | ~np.isin(components, components[outside]),
+        triangles=triangles,
+        parts=parts,
+    )
+
+
+def oriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> csr_array:
+    """Eq. 11 without the value of ψ_e: i(b − a), on the edge that it runs along or in thirds on those of its face.
+
+    One third is the mean of ψ_e over a face; it gives both kinds of pieces of one curve the same weight. (The
+    published code adds the whole vector to each of the three edges.)
+    """
+    sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
+    for part in parts:
+        along, inside = part.edges >= 0, part.edges < 0
+        sums = sums + scatter(triangles.n_edges, part.edges[along], part.vectors[along])
+        sums = sums + from_faces(triangles, part.faces[inside], part.vectors[inside] / 3)
+    return sums
+
+
+def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces], spacing: float) -> csr_array:
+    """App. A.2: each side of a curve along edges points away from it, and round its free ends.
+
+    A face beside edge ij gets i(p_j − p_i), ij in its own order, on its other two edges; on ij itself the sides cancel.
+    """
+    curves = [p for p in parts if len(p.ends) and not p.oriented]
+    if not curves:
+        return csr_array((1, triangles.n_edges), dtype=np.complex128)
+    edges = np.unique(np.concatenate([p.edges for p in curves]))
+    marked = np.zeros(triangles.n_edges, dtype=bool)
+    marked[edges] = True
+    faces, sides = np.nonzero(marked[triangles.edges.of_faces])
+    inward = 1j * triangles.edge_vectors[faces, sides]
+    on_edges = in_frames(triangles, faces, inward)
+    on_edges[np.arange(len(faces)), sides] = 0
+    sums = scatter(triangles.n_edges, triangles.edges.of_faces[faces], on_edges)
+
+    touched = np.bincount(triangles.edges.vertices[edges].ravel(), minlength=triangles.n_vertices)
+    for part in parts:  # an end that lies on another source is not free
+        if len(part.ends) and part.oriented:
+            at_vertex = part.nodes.kinds == VERTEX
+            touched[part.nodes.elements[at_vertex]] += 2
+    ends_free = touched[triangles.edges.vertices[edges]] == 1
+    which, end = np.nonzero(ends_free)
+    faces, arcs = free_end_arcs(triangles, edges[which], triangles.edges.vertices[edges[which], end], spacing)
+    return sums + from_faces(triangles, faces, arcs)
+
+
+def vertex_point_vectors(triangles: LaidOutTriangles, vertices: NDArray[np.int64]) -> csr_array:
+    """App. A.1, Eq. 19: round vertex i, the corner of angle α gets i d (1 − e^{iα}) / Θ.
+
+    d is the direction of the first edge that leaves the corner, counter-clockwise, and Θ the total angle at the vertex.
+    """
+    marked = np.zeros(triangles.n_vertices, dtype=bool)
+    marked[vertices] = True
+    faces, corners = np.nonzero(marked[triangles.corner_vertices])
+    leaving = triangles.edge_vectors[faces, corners]
+    arriving = -triangles.edge_vectors[faces, (corners + 2) % 3]
+    angles = np.angle(arriving * np.conj(leaving))
+    owners = triangles.corner_vertices[faces, corners]
+    total = np.bincount(owners, weights=angles, minlength=triangles.n_vertices)[owners]
+    round_corner = 1j * (leaving / np.abs(leaving)) * (1 - np.exp(1j * angles)) / total
+    return from_faces(triangles, faces, round_corner)
+
+
+def inner_point_vectors(triangles: LaidOutTriangles, places: Places) -> csr_array:
+    """Points on edges and inside faces: −∇δ tested with the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
+
+    Diffused, this is minus the gradient of the heat kernel, which points away from p in all directions alike, whatever
+    the shape of the faces: on each, ``Σ_e ∇ψ_e = 0`` and ``Σ_e ∇ψ_e x_eᵀ`` is the identity. ∇ψ_e, constant on faces, is
+    averaged over those around each vertex and interpolated at p. A point at a vertex of equilateral triangles weighs
+    √3 h times what Eq. 19 gives it.
+    """
+    corner = np.argwhere(places.barycentric > 0)
+    vertices = triangles.corner_vertices[places.faces[corner[:, 0]], corner[:, 1]]
+    which, faces = star(triangles, places_at(triangles, vertices))
+    areas = triangles.face_areas[faces]
+    share = areas / np.bincount(which, areas, len(vertices))[which]
+    share = share * places.barycentric[corner[:, 0], corner[:, 1]][which]
+    outward = -1j * triangles.edge_vectors[faces] * (share / areas)[:, None]
+    turned = np.conj(triangles.edge_directions[faces]) * outward
+    turned = np.where(triangles.reflected[faces], np.conj(turned), turned)
+    return scatter(triangles.n_edges, triangles.edges.of_faces[faces], turned)
+
+
+def in_frames(
+    triangles: LaidOutTriangles, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """(k, 3) vectors in the layout of some faces, as the frames of their edges see them."""
+    turned = np.conj(triangles.edge_directions[faces]) * vectors[:, None]
+    return np.where(triangles.reflected[faces], np.conj(turned), turned)
+
+
+def from_faces(triangles: LaidOutTriangles, faces: NDArray[np.int64], vectors: NDArray[np.complex128]) -> csr_array:
+    """(1, e) sums of face vectors over the three edges of each face."""
+    return scatter(triangles.n_edges, triangles.edges.of_faces[faces], in_frames(triangles, faces, vectors))
+
+
+def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> csr_array:
+    """(1, n) sums of values with the same index, few beside n."""
+    flat = index.ravel()
+    return csr_array((values.ravel(), (np.zeros(len(flat), dtype=np.int64), flat)), shape=(1, n), dtype=np.complex128)
+
+
+def line_elements(part: Pieces, spacing: float) -> NDArray[np.float64]:
+    """(s,) half of the lengths that meet at each node; `spacing` at isolated points."""
+    if len(part.ends) == 0:
+        return np.full(len(part.nodes), spacing)
+    return 0.5 * np.bincount(part.ends.ravel(), np.repeat(part.lengths, 2), len(part.nodes))
+
+
+def connected(parts: Sequence[Pieces]) -> NDArray[np.int64]:
+    """(s,) connected component of every node, over all sources, in order of first appearance."""
+    first, who = distinct(chained([p.nodes for p in parts]))
+    offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
+    ends = who[np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])]
+    graph = csr_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(first), len(first)))
+    labels = connected_components(graph, directed=False)[1]
+    seen, order = np.unique(labels, return_index=True)
+    rank = np.empty(len(seen), dtype=np.int64)
+    rank[np.argsort(order)] = np.arange(len(seen))
+    return rank[labels][who]

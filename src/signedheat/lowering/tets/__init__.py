@@ -1,0 +1,1 @@
+"""Tet meshes, and the shapes in them, lowered to Crouzeix–Raviart elements."""

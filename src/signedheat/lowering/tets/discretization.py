@@ -1,0 +1,248 @@
+"""Tet meshes as a discretisation: one vector per face, one value per vertex (Sec. 8.1)."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...discretization import Diagnostics, discretize
+from ...domains.tet_mesh import TetMesh
+from ...errors import UnreachedWarning
+from ...fields.tet_field import TetField
+from ...linear import factorize, upper_triangle, whole
+from ...linear.stages import solve_in_stages
+from ...method import unit
+from .integration import TetIntegration
+
+if TYPE_CHECKING:
+    from ...geometry.tet_clipping import Planes
+    from ...linear.krylov import IncompleteCholesky
+    from .source import TetSource
+
+DIRECT_FACES = 20_000
+"""Up to this number of faces step 1 is factorised: that grows like n², conjugate gradients like n⁴ᐟ³."""
+
+DIRECT_VERTICES = 40_000
+"""Up to this number of vertices step 3 is factorised."""
+
+DIRECTION_ERROR = 1e-3
+"""Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
+
+SPRINGS = 30.0
+"""Strength with which levels are imposed, over one edge length."""
+
+
+@dataclass(frozen=True, eq=False)
+class TetDiscretization:
+    """A tet mesh as the three steps see it.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The domain.
+    direct : bool
+        Whether to factorise the system of step 1; it is solved by conjugate gradients otherwise.
+    """
+
+    mesh: TetMesh
+    direct: bool
+    _factors: dict[float, Any] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def planes(self) -> Planes:
+        """The planes of the faces, against which sources are clipped."""
+        from ...geometry.tet_clipping import Planes
+
+        return Planes.of(self.mesh)
+
+    @cached_property
+    def spacing(self) -> float:
+        """h: mean distance between the barycentres of two faces of a tet, a third of the edge between their corners."""
+        corners = self.mesh.vertices[self.mesh.tets]
+        pairs = [corners[:, a] - corners[:, b] for a in range(4) for b in range(a)]
+        return float(np.mean([np.linalg.norm(edge, axis=1).mean() for edge in pairs])) / 3
+
+    @cached_property
+    def unknowns(self) -> NDArray[np.int64]:
+        """(m, 4) unknown of φ at each corner.
+
+        Heat flows through faces. Parts of the mesh that touch in an edge or a vertex alone are separate domains, and a
+        vertex that they share is an unknown in each.
+        """
+        parts = self.mesh.parts
+        keys = self.mesh.tets * (parts.max() + 1) + parts[:, None]
+        return np.unique(keys, return_inverse=True)[1].reshape(-1, 4)
+
+    @cached_property
+    def n_unknowns(self) -> int:
+        """Number of unknowns of φ."""
+        return int(self.unknowns.max()) + 1
+
+    @cached_property
+    def integration(self) -> TetIntegration:
+        """Step 3."""
+        matrix = upper_triangle(self.mesh.geometry.vertex_laplacian(self.unknowns, self.n_unknowns))
+        strength = SPRINGS / (3 * self.spacing)
+        if self.n_unknowns <= DIRECT_VERTICES:
+            return TetIntegration(matrix, strength=strength, gradients=self._gradients)
+        return TetIntegration(matrix, factorize=from_first, spring=1e4, strength=strength, gradients=self._gradients)
+
+    def _gradients(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns)
+
+    def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
+        """Tets hold sources in any position."""
+        return self, sources
+
+    def lower(self, sources: Sequence[Any], diffusion: float) -> TetSource:
+        """X₀ and the rows that average φ over the sources."""
+        from .source import tet_source
+
+        return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
+
+    def diffuse(self, source: TetSource) -> NDArray[np.float64]:
+        """Solve ``(M + tL) X = X₀``: one vector per face, averaged in the tets."""
+        if self._is_convex:
+            return self._in_tets(self._stages(source.time, source.vectors))[0]
+        loads = np.concatenate([source.vectors, source.strengths[:, None]], axis=1)
+        return self._bend(*self._in_tets(self._stages(source.time, loads)), source)
+
+    def _stages(self, time: float, loads: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
+        """X at the faces, in stages: it leaves the range of floating-point numbers a few hundred faces away."""
+        matrix = self._heat_matrix(time)
+        return solve_in_stages(matrix, lambda forces: self._solve(matrix, time, forces), loads)
+
+    def _in_tets(
+        self, stages: list[tuple[NDArray[np.float64], float]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Means of X, multiples of the gradient of its last column, and logarithms of the factors of both.
+
+        They are those of the last stage that knows all four faces of a tet.
+        """
+        of_tets = self.mesh.faces.of_tets
+        means, gradients, factors = None, None, np.full(self.mesh.n_tets, -np.inf)
+        for vectors, factor in stages:
+            of_faces = vectors[of_tets]
+            known = ~np.isnan(of_faces[..., 0]).any(axis=1)
+            if means is None:
+                means, gradients = np.zeros((self.mesh.n_tets, vectors.shape[1])), np.zeros((self.mesh.n_tets, 3))
+            means[known] = of_faces[known].mean(axis=1)
+            slopes = np.einsum("mki,mk->mi", self.mesh.geometry.area_vectors[known], of_faces[known, :, -1])
+            gradients[known], factors[known] = slopes, factor
+        return means, gradients, factors
+
+    def _bend(
+        self,
+        means: NDArray[np.float64],
+        gradients: NDArray[np.float64],
+        factors: NDArray[np.float64],
+        source: TetSource,
+    ) -> NDArray[np.float64]:
+        """X at the tets, turned where it has come round a corner.
+
+        In flat space diffusion carries vectors along without turning them. Where the straight line to the source leaves
+        the domain, the shortest way to it is bent, and its direction is that in which undirected heat falls
+        (Crane et al. 2013). The side it is on is the one from which that heat has come.
+        """
+        from scipy.spatial import cKDTree
+
+        from ...geometry.visibility import tet_neighbors, uphill_roots, visible
+
+        planes, centers = self.planes, self.mesh.tet_barycenters
+        nearest = source.centers[cKDTree(source.centers).query(centers)[1]]
+        neighbors = tet_neighbors(self.mesh.faces)
+        ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
+        straight = visible(*ends, neighbors, self.mesh.faces.of_tets, planes.normals, planes.offsets, planes.signs)
+        vectors, strengths = means[:, :3], means[:, 3]
+        with np.errstate(divide="ignore"):
+            heights = np.log(np.maximum(strengths, 0)) + factors
+        roots = uphill_roots(heights, neighbors, straight)
+        side = -np.sign(np.einsum("mi,mi->m", unit(vectors), gradients))[roots]
+        return np.where(straight[:, None], vectors, -side[:, None] * gradients)
+
+    def _solve(self, matrix: sparse.csr_matrix, time: float, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self.direct:
+            if time not in self._factors:
+                self._factors.clear()
+                self._factors[time] = factorize(matrix)
+            return self._factors[time].solve(loads)
+        from ...linear.krylov import IncompleteCholesky, outward_order
+
+        order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
+        return IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
+
+    def _heat_matrix(self, time: float) -> sparse.csr_matrix:
+        matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass(self.mesh.faces)
+        matrix.setdiag(matrix.diagonal() + mass)
+        return matrix
+
+    @cached_property
+    def _laplacian(self) -> sparse.csr_matrix:
+        return self.mesh.geometry.face_laplacian(self.mesh.faces)
+
+    def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """X at the tets, where it is already."""
+        return vectors
+
+    @cached_property
+    def _is_convex(self) -> bool:
+        """Whether the mesh fills its convex hull."""
+        from scipy.spatial import ConvexHull
+
+        hull = ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
+        return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
+
+    def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """b, the right-hand side of ``C φ = b``."""
+        return self.mesh.geometry.divergence(directions, self.unknowns, self.n_unknowns)
+
+    @cached_property
+    def vertices(self) -> NDArray[np.int64]:
+        """(n,) vertex of the mesh at which each unknown is."""
+        vertices = np.empty(self.n_unknowns, dtype=np.int64)
+        vertices[self.unknowns] = self.mesh.tets
+        return vertices
+
+    def at_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of the mesh: means where parts of it touch, NaN where nothing is known."""
+        known = np.flatnonzero(~np.isnan(values))
+        vertices, n = self.vertices[known], self.mesh.n_vertices
+        counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[known], n)
+        return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+
+    def field(self, values: NDArray[np.float64], source: TetSource, diagnostics: Diagnostics) -> TetField:
+        """φ at the vertices of the mesh."""
+        at_vertices = self.at_vertices(values)
+        unreached = np.flatnonzero(np.isnan(at_vertices))
+        if np.isnan(values).any():
+            warnings.warn(
+                f"{np.isnan(values[self.unknowns]).any(axis=1).sum()} of {self.mesh.n_tets} tets are not connected to "
+                "any source through faces: the distance there is NaN",
+                UnreachedWarning,
+                stacklevel=2,
+            )
+        notes = {**diagnostics.notes, **source.notes}
+        if len(self.mesh.reoriented):
+            notes["tets turned"] = len(self.mesh.reoriented)
+        return TetField(self.mesh, at_vertices, replace(diagnostics, unreached=unreached, notes=notes), source)
+
+
+def from_first(matrix: sparse.csr_matrix) -> IncompleteCholesky:
+    """Conjugate gradients on a matrix given by its upper triangle, in the order of its own graph from unknown 0."""
+    from ...linear.krylov import IncompleteCholesky, outward_order
+
+    full = whole(matrix)
+    _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
+    return IncompleteCholesky.of(full, outward_order(full, first))
+
+
+@discretize.register
+def _(domain: TetMesh) -> TetDiscretization:
+    return TetDiscretization(domain, direct=len(domain.faces.vertices) <= DIRECT_FACES)

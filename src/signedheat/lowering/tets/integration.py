@@ -1,0 +1,83 @@
+"""Step 3 on tets: levels are imposed by springs where the source cuts through tets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...discretization import Levels, SourceTerm
+from ..direct_integration import DirectIntegration
+
+PIN = 1e6
+"""Stiffness at vertices that the source passes through, times the largest diagonal entry of C."""
+
+
+@dataclass(frozen=True, eq=False)
+class TetIntegration(DirectIntegration):
+    """As for surfaces, but for `fit`, and for the level that φ, linear on tets, is to have on a curved source.
+
+    A function that is linear on tets cannot be level on a curved surface that cuts through them, but by being flat
+    around it. Springs of a strength that suits the tets leave less error on the source, and everywhere, than exact
+    levels do. Vertices on the source are pinned.
+
+    Nor should it have the level there that the distance has: the linear interpolant of a curved function lies off it.
+    By how much, the gradients at the corners tell to second order, once there is a first φ.
+
+    Parameters
+    ----------
+    strength : float
+        Of the springs, in 1/length.
+    gradients : callable
+        From φ at the unknowns, (n, 3) gradients there.
+    """
+
+    strength: float = 0.0
+    gradients: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.zeros_like
+
+    def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups."""
+        rows = source.rows
+        springs, factor = self.springs(source), self.anchored(source)
+        pull = sparse.csr_matrix(rows.T @ sparse.diags_array(springs))
+        fitted = factor.solve(divergence + pull @ levels.values)
+        values = levels.values - self._bend(fitted, source)
+        fitted = factor.solve(divergence + pull @ values)
+        if levels.groups is None:
+            return self._reached(fitted, rows)
+        parts = self._part_of(rows)
+        first = levels.groups[np.unique(parts, return_index=True)[1]]  # one group of each part keeps its level
+        others = np.setdiff1d(levels.groups, first)
+        if len(others):
+            members = (levels.groups[:, None] == others).astype(np.float64)
+            lifted = factor.solve(pull @ members)
+            forces = (springs[:, None] * members).T
+            balance = forces @ (members - rows @ lifted)
+            fitted = fitted + lifted @ np.linalg.solve(balance, forces @ (rows @ fitted - values))
+        return self._centered(fitted, source)
+
+    def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels at the samples, exactly."""
+        bend = self._bend(self.factor.solve(divergence), source)
+        return super().fit_exactly(divergence, source, replace(levels, values=levels.values - bend))
+
+    def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
+        """``(C + λ Aᵀ W A) φ = b``, with φ on the source for A φ."""
+        free = super().penalize(divergence, source, strength)
+        pull = source.rows.T @ (strength * source.weights * self._bend(free, source))
+        return super().penalize(divergence - pull, source, strength)
+
+    def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        return super()._at_samples(values, source) + self._bend(values, source)
+
+    def _bend(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        """(s,) how far φ lies above its interpolant on the source."""
+        return source.bends @ self.gradients(np.nan_to_num(values)).ravel()
+
+    def springs(self, source: SourceTerm) -> NDArray[np.float64]:
+        """(s,) stiff at vertices, soft inside tets."""
+        at_vertex = np.diff(source.rows.indptr) == 1
+        return np.where(at_vertex, PIN * self.stiffness.diagonal().max(), self.strength * source.weights)

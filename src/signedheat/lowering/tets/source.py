@@ -1,0 +1,220 @@
+"""Shapes in space, lowered to a tet mesh: X₀ of Eq. 12, and the rows that average φ over the source."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...domains.tet_mesh import TetMesh
+from ...errors import SourceError
+from ...geometry.tet_clipping import Pieces, Planes, barycentric, clip_triangles, locate
+from ...method import unit
+from ..area_elements import AreaElements, area_elements
+
+WHOLE = 1 - 1e-6
+"""Fraction of a face that a source must cover for the face to count as part of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class TetSource:
+    """Sources lowered to a tet mesh.
+
+    Attributes
+    ----------
+    vectors : (f, 3) float
+        X₀ at the faces.
+    strengths : (f,) float
+        The same for areas without direction: what an unsigned distance starts from.
+    centers : (p, 3) float
+        Points on the source, one for each piece of it.
+    time : float
+        t of Eq. 12.
+    rows : (s, n) sparse
+        Row i averages φ over patch i of the source: what lies nearest to one vertex of the tets that it crosses.
+        Where the source follows faces of the mesh, the patch is the vertex itself.
+    bends : (s, 3n) sparse
+        What `rows` lack of being exact for quadratic φ, from the gradients of φ at the unknowns, x, y, z of each in
+        turn.
+    weights : (s,) float
+        Area of each patch.
+    components, owners : (s,) int
+        Connected component, and source, that each patch lies on.
+    notes : mapping
+        What of the sources was lost outside the mesh.
+    """
+
+    vectors: NDArray[np.float64]
+    strengths: NDArray[np.float64]
+    centers: NDArray[np.float64]
+    time: float
+    rows: sparse.csr_matrix
+    bends: sparse.csr_matrix
+    weights: NDArray[np.float64]
+    components: NDArray[np.int64]
+    owners: NDArray[np.int64]
+    notes: Mapping[str, Any]
+
+
+def tet_source(
+    mesh: TetMesh,
+    planes: Planes,
+    unknowns: NDArray[np.int64],
+    sources: Sequence[Any],
+    diffusion: float,
+    spacing: float,
+) -> TetSource:
+    """Lower sources to a tet mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The domain.
+    planes : Planes
+        Of its faces.
+    unknowns : (m, 4) int
+        Unknown of φ at each corner of each tet.
+    sources : sequence of TriangleMesh, PolygonMesh or PointCloud
+        What distance is measured to, in any position. What lies outside the mesh is left out, and noted.
+    diffusion, spacing : float
+        τ and h in ``t = τ max(h, h_source)²``.
+
+    Raises
+    ------
+    SourceError
+        If a source is of another kind, lies outside the mesh, has no normals, or cancels itself.
+    """
+    cuts, components, notes, n_components, n_unknowns = [], [], {}, 0, int(unknowns.max()) + 1
+    for number, source in enumerate(sources):
+        elements = area_elements(source)
+        if elements.corners.shape[2] != 3:
+            raise SourceError(f"source {number} ({source!r}) does not lie in space of three dimensions, as tets do")
+        if not elements.vectors.any():
+            raise SourceError(f"source {number} ({source!r}) has no area at all: its faces are degenerate")
+        pieces = _cut(mesh, planes, elements)
+        if len(pieces.tets) == 0:
+            raise SourceError(
+                f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}: move it into "
+                "the mesh, or check that both have the same units"
+            )
+        outside = 1 - pieces.areas.sum() / elements.weights.sum()
+        if outside > 1e-9:
+            notes[f"source {number} outside the mesh"] = f"{100 * outside:.3g} % of its area, left out"
+        spacing = max(spacing, elements.spacing)
+        cuts.append(pieces)
+        components.append(elements.components[pieces.parents] + n_components)
+        n_components = int(components[-1].max()) + 1
+    time = diffusion * spacing**2
+    loads = sum(_loads(mesh, pieces, np.sqrt(time)) for pieces in cuts)
+    if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
+        raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
+    patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
+    rows, bends, weights, members = zip(*patches, strict=True)
+    return TetSource(
+        vectors=loads[:, :3],
+        strengths=loads[:, 3],
+        centers=np.concatenate([_centers(mesh, pieces) for pieces in cuts]),
+        time=time,
+        rows=sparse.vstack(rows, format="csr"),
+        bends=sparse.vstack(bends, format="csr"),
+        weights=np.concatenate(weights),
+        components=np.unique(np.concatenate(members), return_inverse=True)[1],
+        owners=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
+        notes=notes,
+    )
+
+
+def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> Pieces:
+    if elements.corners.shape[1] == 3:
+        pieces = clip_triangles(mesh, planes, elements.corners)
+        sizes = np.linalg.norm(elements.vectors, axis=1)
+        counted = elements.weights / np.where(sizes > 0, sizes, 1)  # −1 where a fan leaves its polygon
+        return replace(pieces, areas=pieces.areas * counted[pieces.parents])
+    tets = locate(mesh, planes, elements.corners[:, 0])
+    k = np.flatnonzero(tets >= 0)
+    centers = barycentric(mesh, tets[k], elements.corners[k, 0])
+    return Pieces(tets[k], k, elements.vectors[k], elements.weights[k], centers, np.full(len(k), -1))
+
+
+def _loads(mesh: TetMesh, pieces: Pieces, width: float) -> NDArray[np.float64]:
+    """(f, 4) X₀ at the faces, and the same for areas without direction.
+
+    It is ∫ ψ N, without the parts where ψ is negative, which would send out waves of the wrong sign: on a face of the
+    mesh ψ is one, and zero on the others. But plane waves along the normal of a piece fall by e^(−r/√t), and a face
+    that lies δ √t in front of it sends e^δ times what is due ahead, and e^−δ times what is due backwards. Shares
+    weighted by a mean of e^−δ and e^δ send as much as the piece itself both ways, wherever such a mean exists.
+    """
+    shares = np.maximum(1 - 3 * pieces.barycentric, 0)
+    corners = mesh.vertices[mesh.tets[pieces.tets]]
+    face_centers = (corners.sum(axis=1, keepdims=True) - corners) / 3
+    away = np.einsum("pki,pi->pk", face_centers - _centers(mesh, pieces)[:, None], unit(pieces.area_vectors))
+    ahead = np.exp(np.clip(away / width, -20, 20))
+    sent = [(shares * weight * (ahead - 1 / ahead)).sum(axis=1) for weight in (1 / ahead, ahead)]
+    mean = [np.maximum(sign * excess, 1e-300)[:, None] for sign, excess in zip((1, -1), sent[::-1], strict=True)]
+    shares *= mean[0] / ahead + mean[1] * ahead
+    shares /= (shares * (ahead + 1 / ahead)).sum(axis=1, keepdims=True) / 2
+    faces, n = mesh.faces.of_tets[pieces.tets].ravel(), len(mesh.faces.vertices)
+    columns = [*pieces.area_vectors.T, pieces.areas]
+    return np.stack([np.bincount(faces, (shares * column[:, None]).ravel(), n) for column in columns], axis=1)
+
+
+def _patches(
+    mesh: TetMesh, unknowns: NDArray[np.int64], n_unknowns: int, pieces: Pieces, components: NDArray[np.int64]
+) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
+    """Rows, bends, areas and components of the patches.
+
+    One row for each piece would say more than φ, linear on every tet, can obey but by being flat around the source.
+    A quadratic φ is at x, of barycentric coordinates λ between corners v, ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
+    """
+    corners = unknowns[pieces.tets]
+    conforming = _on_whole_faces(mesh, pieces, components)
+    k = np.flatnonzero(conforming)
+    of_face = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[pieces.in_face[k]]
+    at_vertices = corners[k[:, None], of_face].ravel()
+    inside = np.flatnonzero(~conforming)
+    nearest = corners[inside, pieces.barycentric[inside].argmax(axis=1)]
+
+    keys = np.concatenate([np.repeat(components[k], 3), components[inside]]) * n_unknowns
+    keys += np.concatenate([at_vertices, nearest])
+    areas = np.concatenate([np.repeat(pieces.areas[k] / 3, 3), pieces.areas[inside]])
+    found, patch = np.unique(keys, return_inverse=True)
+    weights = np.bincount(patch, weights=areas)
+    real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # and not fans that cancel outside a polygon
+    n_on = len(at_vertices)
+    columns = np.concatenate([at_vertices, corners[inside].ravel()])
+    entries = np.concatenate([areas[:n_on], (areas[n_on:, None] * pieces.barycentric[inside]).ravel()])
+    index = np.concatenate([patch[:n_on], np.repeat(patch[n_on:], 4)])
+    rows = sparse.csr_matrix(
+        (entries / np.where(real, weights, 1)[index], (index, columns)), shape=(len(found), n_unknowns)
+    )
+    rows.eliminate_zeros()
+    away = (_centers(mesh, pieces)[:, None] - mesh.vertices[mesh.tets[pieces.tets]])[inside].reshape(-1, 3)
+    steps = (entries / np.where(real, weights, 1)[index])[n_on:, None] * away / 2
+    places = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
+    bends = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
+    return rows[real], bends[real], weights[real], found[real] // n_unknowns
+
+
+def _centers(mesh: TetMesh, pieces: Pieces) -> NDArray[np.float64]:
+    return np.einsum("pk,pki->pi", pieces.barycentric, mesh.vertices[mesh.tets[pieces.tets]])
+
+
+def _on_whole_faces(mesh: TetMesh, pieces: Pieces, components: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which pieces lie in faces that their component covers."""
+    on = pieces.in_face >= 0
+    covered = np.zeros(len(on), dtype=bool)
+    if on.any():
+        n_faces = len(mesh.faces.vertices)
+        face = mesh.faces.of_tets[pieces.tets[on], pieces.in_face[on]]
+        _, which = np.unique(components[on] * n_faces + face, return_inverse=True)
+        area = np.linalg.norm(mesh.geometry.area_vectors[pieces.tets[on], pieces.in_face[on]], axis=1)
+        covered[on] = np.bincount(which, weights=pieces.areas[on])[which] >= WHOLE * area
+    return covered
+
+
+def _box(mesh: TetMesh) -> str:
+    return " × ".join(f"[{a:.4g}, {b:.4g}]" for a, b in mesh.bounds.T)

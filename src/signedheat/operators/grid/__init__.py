@@ -1,0 +1,1 @@
+"""The stencil of regular grids, matrix free: sweeps, multilevel diffusion, cosine transforms."""

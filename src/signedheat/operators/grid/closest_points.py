@@ -1,0 +1,297 @@
+"""Closest points on the zero set of a grid function.
+
+Where the zero set crosses edges of the grid, how it bends there, and which crossing is nearest to each node. Positions
+are in units of length from the grid's origin. Arrays have four axes and vectors four components; those in front are
+unused in fewer dimensions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ...errors import OutsideError
+from .stencil import by_slabs
+from .wavefront import padded_shape, sweep_lines
+
+
+def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(*shape) distance of each node to the zero set of values, with the sign of its value.
+
+    Crossings are moved onto the zero set of the cubic interpolant. Each node finds the nearest of them by sweeps
+    (Danielsson 1980), then the distance to the circle that touches the zero set there and bends as it does: second
+    order, exact for planes and spheres.
+
+    Raises
+    ------
+    OutsideError
+        If the values have one sign.
+    """
+    shape = padded_shape(values.shape)
+    steps = np.ones(4)
+    steps[4 - values.ndim :] = spacing
+    field = np.ascontiguousarray(values).reshape(shape)
+    edges = _crossed_edges(field)
+    if not len(edges):
+        raise OutsideError("the field has one sign everywhere, so there is no zero set to measure distance to")
+    crossings = _crossings(field, edges, steps)
+    nearest = np.full(shape, -1, dtype=np.int32)
+    squares = np.full(shape, np.inf, dtype=np.float32)
+    points = crossings[:, :4].astype(np.float32)
+    _seed(nearest, squares, edges, points, steps)
+    sweep_lines(_nearest_tiles, shape, 1, nearest, squares, points, steps)
+    del squares
+    result = np.empty(shape)
+    reach = float(np.linalg.norm(spacing))  # no point of the zero set is farther from its nearest crossing
+    by_slabs(shape, _distances, field, nearest, crossings, steps, reach, result)
+    return result.reshape(values.shape)
+
+
+@njit(cache=True, nogil=True)
+def _crossed_edges(field):
+    """(e, 5) node and axis of each edge whose ends differ in sign; zero counts as positive."""
+    n0, n1, n2, n3 = field.shape
+    capacity, count = 4096, 0
+    edges = np.empty((capacity, 5), dtype=np.int32)
+    for i in range(n0):
+        for j in range(n1):
+            for k in range(n2):
+                for m in range(n3):
+                    sign = field[i, j, k, m] >= 0
+                    if count + 4 > capacity:
+                        grown = np.empty((2 * capacity, 5), dtype=np.int32)
+                        for e in range(count):
+                            for d in range(5):
+                                grown[e, d] = edges[e, d]
+                        edges = grown
+                        capacity *= 2
+                    for axis in range(4):
+                        a, b, c, d = i, j, k, m
+                        if axis == 0:
+                            a += 1
+                        elif axis == 1:
+                            b += 1
+                        elif axis == 2:
+                            c += 1
+                        else:
+                            d += 1
+                        if a < n0 and b < n1 and c < n2 and d < n3 and (field[a, b, c, d] >= 0) != sign:
+                            edges[count, 0], edges[count, 1], edges[count, 2], edges[count, 3] = i, j, k, m
+                            edges[count, 4] = axis
+                            count += 1
+    return edges[:count]
+
+
+@njit(cache=True, nogil=True)
+def _cubic(field, place, weights, gradient):
+    """Value of the cubic convolution interpolant (Keys 1981) at a place in cells; its gradient goes to `gradient`."""
+    base = np.empty(4, dtype=np.int64)
+    for axis in range(4):
+        n = field.shape[axis]
+        base[axis] = min(max(np.int64(np.floor(place[axis])), 0), max(n - 2, 0))
+        f = place[axis] - base[axis]
+        g = 1.0 - f
+        for side in range(2):  # the value's weights, and the slope's
+            if n == 1:
+                w0, w1, w2, w3 = 0.0, 1.0 - side, 0.0, 0.0
+            elif side == 0:
+                w0, w3 = -0.5 * f * g * g, -0.5 * f * f * g
+                w1, w2 = g * (1.0 + f - 1.5 * f * f), f * (1.0 + g - 1.5 * g * g)
+            else:
+                w0, w3 = -0.5 * g * (1.0 - 3.0 * f), 0.5 * f * (1.0 - 3.0 * g)
+                w1, w2 = f * (4.5 * f - 5.0), -g * (4.5 * g - 5.0)
+            if n > 1 and base[axis] == 0:  # continue straight beyond the walls
+                w1, w2, w0 = w1 + 2.0 * w0, w2 - w0, 0.0
+            if n > 1 and base[axis] == n - 2:
+                w2, w1, w3 = w2 + 2.0 * w3, w1 - w3, 0.0
+            weights[side, axis, 0], weights[side, axis, 1] = w0, w1
+            weights[side, axis, 2], weights[side, axis, 3] = w2, w3
+    value = 0.0
+    gradient[:] = 0.0
+    for i in range(4):
+        wi, si = weights[0, 0, i], weights[1, 0, i]
+        if wi == 0.0 and si == 0.0:
+            continue
+        for j in range(4):
+            wj, sj = weights[0, 1, j], weights[1, 1, j]
+            if wj == 0.0 and sj == 0.0:
+                continue
+            for k in range(4):
+                wk, sk = weights[0, 2, k], weights[1, 2, k]
+                if wk == 0.0 and sk == 0.0:
+                    continue
+                line, slope = 0.0, 0.0
+                for m in range(4):
+                    if weights[0, 3, m] != 0.0 or weights[1, 3, m] != 0.0:
+                        here = field[base[0] + i - 1, base[1] + j - 1, base[2] + k - 1, base[3] + m - 1]
+                        line += weights[0, 3, m] * here
+                        slope += weights[1, 3, m] * here
+                value += wi * wj * wk * line
+                gradient[0] += si * wj * wk * line
+                gradient[1] += wi * sj * wk * line
+                gradient[2] += wi * wj * sk * line
+                gradient[3] += wi * wj * wk * slope
+    return value
+
+
+@njit(cache=True, nogil=True)
+def _crossings(field, edges, steps):
+    """(e, 18) position, unit normal and shape operator (symmetric, ten numbers) of the zero set at crossed edges."""
+    result = np.zeros((len(edges), 18))
+    weights = np.empty((2, 4, 4))
+    slope, start, place, ahead, behind = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    bend = np.empty((4, 4))
+    for e in range(len(edges)):
+        axis = edges[e, 4]
+        i, j, k, m = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+        here = field[i, j, k, m]
+        there = field[i + (axis == 0), j + (axis == 1), k + (axis == 2), m + (axis == 3)]
+        for d in range(4):
+            start[d] = edges[e, d]
+        start[axis] += here / (here - there)
+        for d in range(4):
+            place[d] = start[d]
+        # onto the zero set of the interpolant, along its gradient; back to the crossing if that leads away
+        for _ in range(3):
+            value = _cubic(field, place, weights, slope)
+            square, moved = 0.0, 0.0
+            for d in range(4):
+                slope[d] /= steps[d]
+                square += slope[d] ** 2
+            for d in range(4):
+                if square > 0.0:
+                    place[d] -= value * slope[d] / (square * steps[d])
+                moved = max(moved, abs(place[d] - start[d]))
+                if place[d] < 0.0 or place[d] > field.shape[d] - 1:
+                    moved = 2.0
+            if not moved < 1.0:
+                for d in range(4):
+                    place[d] = start[d]
+                break
+        _cubic(field, place, weights, slope)
+        square = 0.0
+        for d in range(4):
+            slope[d] /= steps[d]
+            square += slope[d] ** 2
+        length = np.sqrt(square)
+        if length == 0.0:
+            slope[axis] = 1.0 if there > here else -1.0
+            length = 1.0
+        for d in range(4):
+            result[e, d] = place[d] * steps[d]
+            result[e, 4 + d] = slope[d] / length
+        # differences of the gradient one cell apart
+        for d in range(4):
+            for f in range(4):
+                ahead[f] = behind[f] = place[f]
+                bend[d, f] = 0.0
+            ahead[d] = min(place[d] + 1.0, field.shape[d] - 1.0)
+            behind[d] = max(place[d] - 1.0, 0.0)
+            span = (ahead[d] - behind[d]) * steps[d] * length
+            if span > 0.0:
+                _cubic(field, ahead, weights, slope)
+                for f in range(4):
+                    bend[d, f] += slope[f] / steps[f] / span
+                _cubic(field, behind, weights, slope)
+                for f in range(4):
+                    bend[d, f] -= slope[f] / steps[f] / span
+        at = 8
+        for d in range(4):
+            for f in range(d + 1):
+                result[e, at] = 0.5 * (bend[d, f] + bend[f, d])
+                at += 1
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _seed(nearest, squares, edges, points, steps):
+    """Both ends of a crossed edge begin with its crossing."""
+    for e in range(len(edges)):
+        for end in range(2):
+            i, j, k, m = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+            axis = edges[e, 4]
+            if end == 1:
+                i, j, k, m = i + (axis == 0), j + (axis == 1), k + (axis == 2), m + (axis == 3)
+            square = (points[e, 0] - i * steps[0]) ** 2 + (points[e, 1] - j * steps[1]) ** 2
+            square += (points[e, 2] - k * steps[2]) ** 2 + (points[e, 3] - m * steps[3]) ** 2
+            if square < squares[i, j, k, m]:
+                squares[i, j, k, m] = square
+                nearest[i, j, k, m] = e
+
+
+@njit(cache=True, nogil=True)
+def _nearest_tiles(nearest, squares, points, steps, tiles):
+    """Take over the nearest crossing of lines already visited, and along each line both ways."""
+    n0, n1, n2, n = nearest.shape
+    step = np.float32(steps[3])
+    for tile in tiles:
+        for i in range(tile[0], tile[1], tile[2]):
+            for j in range(tile[3], tile[4], tile[5]):
+                for k in range(tile[6], tile[7], tile[8]):
+                    own, square = nearest[i, j, k], squares[i, j, k]
+                    x, y, z = np.float32(i * steps[0]), np.float32(j * steps[1]), np.float32(k * steps[2])
+                    for side in range(1, 8):
+                        a = i - (tile[2] if side & 4 else 0)
+                        b = j - (tile[5] if side & 1 else 0)
+                        c = k - (tile[8] if side & 2 else 0)
+                        if not (0 <= a < n0 and 0 <= b < n1 and 0 <= c < n2):
+                            continue
+                        other = nearest[a, b, c]
+                        for m in range(n):
+                            p = other[m]
+                            if p >= 0 and p != own[m]:
+                                w = m * step - points[p, 3]
+                                s = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2 + w * w
+                                if s < square[m]:
+                                    square[m], own[m] = s, p
+                    for way in range(2):
+                        p = np.int32(-1)
+                        for count in range(n):
+                            m = count if way == 0 else n - 1 - count
+                            if p >= 0 and p != own[m]:
+                                w = m * step - points[p, 3]
+                                s = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2 + w * w
+                                if s < square[m]:
+                                    square[m], own[m] = s, p
+                            p = own[m]
+
+
+@njit(cache=True, nogil=True)
+def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
+    """Distance to the touching circle in the plane of node, crossing and normal.
+
+    With s along the normal, r across it and bending k in the direction of r, the distance to the circle of radius 1/k
+    is ``(√((1 + ks)² + k²r²) − 1) / k``, here without the cancellation.
+    """
+    n0, n1, n2, n = nearest.shape
+    away, across = np.empty(4), np.empty(4)
+    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
+        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
+            for k in range(n2):
+                for m in range(n):
+                    crossing = crossings[nearest[i, j, k, m]]
+                    away[0], away[1] = i * steps[0] - crossing[0], j * steps[1] - crossing[1]
+                    away[2], away[3] = k * steps[2] - crossing[2], m * steps[3] - crossing[3]
+                    s, square = 0.0, 0.0
+                    for d in range(4):
+                        s += away[d] * crossing[4 + d]
+                        square += away[d] ** 2
+                    side = 0.0
+                    for d in range(4):
+                        across[d] = away[d] - s * crossing[4 + d]
+                        side += across[d] ** 2
+                    distance = np.sqrt(square)
+                    if side > 1e-12 * square:
+                        bend, at = 0.0, 8
+                        for d in range(4):
+                            for f in range(d):
+                                bend += 2.0 * across[d] * crossing[at] * across[f]
+                                at += 1
+                            bend += across[d] ** 2 * crossing[at]
+                            at += 1
+                        bend /= side
+                        root = np.sqrt(max(0.0, 1.0 + 2.0 * bend * s + bend * bend * square))
+                        circle = abs(2.0 * s + bend * square) / (1.0 + root)
+                        distance = min(distance, max(circle, distance - reach))
+                    out[i, j, k, m] = distance if field[i, j, k, m] >= 0 else -distance
