@@ -10,7 +10,7 @@ from surface_cases import band, book, flipped, laid_out, positions, sphere, squa
 
 import signedheat as sh
 from signedheat.domains.projection import closest_points
-from signedheat.geometry.curve_segments import pieces
+from signedheat.domains.segments import pieces
 from signedheat.geometry.surface_points import EDGE, FACE, VERTEX, distinct, locate
 
 

@@ -9,7 +9,7 @@ from scipy.sparse.linalg import spsolve
 
 import signedheat as sh
 from signedheat.discretization import discretize
-from signedheat.method import unit
+from signedheat.geometry.directions import unit
 from signedheat.operators.grid.node_sources import NodeSources
 from signedheat.operators.grid.stencil import divergence, laplacian, solve_poisson
 from signedheat.operators.grid.sweeps import diffuse_by_sweeps

@@ -8,7 +8,7 @@ import pytest
 from surface_cases import band, book, flipped, laid_out, positions, sphere, square
 
 import signedheat as sh
-from signedheat.geometry.curve_segments import in_pieces, pieces
+from signedheat.domains.segments import in_pieces, pieces
 from signedheat.geometry.intrinsic.conforming_refinement import embed
 from signedheat.geometry.surface_points import locate
 from signedheat.lowering.surface.source import surface_source

@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 from tet_cases import boxes, lattice, plain_recipe, rectangle, rms, sphere
 
 import signedheat as sh
+from signedheat.geometry.directions import unit
 from signedheat.lowering.tets import discretization as lowering
-from signedheat.method import unit
 
 
 def distance(mesh, sources, constraint=None, diffusion=1.0):

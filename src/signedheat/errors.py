@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+
 
 class SignedHeatError(ValueError):
     """Base class of every error that signedheat raises for bad input."""
@@ -37,3 +40,12 @@ class FileFormatError(SignedHeatError):
 
 class UnreachedWarning(UserWarning):
     """Parts of the domain hold no source; their distance is NaN."""
+
+
+def warn_user(message: str, category: type[Warning]) -> None:
+    """Warn at the line of the caller that called this package, however deep within it the reason was found."""
+    package = __name__.partition(".")[0]
+    depth, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
+        frame, depth = frame.f_back, depth + 1
+    warnings.warn(message, category, stacklevel=depth)

@@ -8,8 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .domains.grid import Grid
 from .domains.point_cloud import PointCloud
 from .domains.triangle_mesh import TriangleMesh
+from .fields.grid_field import GridField
 
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:
@@ -74,9 +76,6 @@ def duck(n: int = 56) -> TriangleMesh:
     n : int
         Cells along the length from which the body is contoured.
     """
-    from .domains.grid import Grid
-    from .fields.grid_field import GridField
-
     lower, upper = np.array([-1.15, -0.8, -0.75]), np.array([1.0, 0.8, 1.15])
     spacing = 2.15 / n
     grid = Grid(lower, spacing, np.ceil((upper - lower) / spacing).astype(int) + 1)

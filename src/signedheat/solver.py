@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
@@ -16,14 +13,13 @@ from .constraints import Constraint, ZeroSet
 from .discretization import Diagnostics, Discretization, discretize
 from .domains.validation import positive_number
 from .errors import SourceError
+from .fields.to_field import to_field
+from .lowering.area_elements import grid_around
+from .lowering.surface.intrinsic import Retriangulated
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
-
-logger = logging.getLogger("signedheat")
+from .progress import Progress, Stopwatch
 
 _BATCH = 16  # sources diffused at a time
-
-Progress = Callable[[float, str], None]
-"""Called with the fraction done, from 0 to 1, and the name of the step that begins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +59,6 @@ class SignedHeatSolver:
     def discretization(self) -> Discretization:
         """The domain as the method sees it."""
         if self.intrinsic:
-            from .domains.intrinsic_triangulation import Retriangulated
-
             progress = self.progress
             report = None if progress is None else lambda share: progress((1 + share) / 5, "refine")
             return Retriangulated(self.domain, report)
@@ -122,7 +116,7 @@ class SignedHeatSolver:
         with stopwatch("integrate"):
             values = integrate(discretization, directions, source, constraint)
         diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time)
-        return discretization.field(values, source, diagnostics)
+        return to_field(discretization, values, source, diagnostics)
 
     def distance_many(self, sources: Sequence[Any], constraint: Constraint | None = None) -> list[Any]:
         """Signed distance to each of several sources on its own; cheaper than one after the other.
@@ -156,7 +150,7 @@ class SignedHeatSolver:
                 seconds = {step: total / len(lowered) for step, total in stopwatch.seconds.items()}
                 for source, values in zip(lowered, solved, strict=True):
                     diagnostics = Diagnostics(timings=seconds, time=source.time)
-                    fields.append(discretization.field(values, source, diagnostics))
+                    fields.append(to_field(discretization, values, source, diagnostics))
         return fields
 
 
@@ -235,26 +229,5 @@ def signed_distance(
     array([False,  True])
     """
     if domain is None:
-        from .lowering.area_elements import grid_around
-
         domain = grid_around(as_list(source), resolution, padding)
     return SignedHeatSolver(domain, diffusion, progress).distance(source, constraint)
-
-
-class Stopwatch:
-    """Times named steps, logs them, and reports progress."""
-
-    def __init__(self, progress: Progress | None, steps: int) -> None:
-        self.seconds: dict[str, float] = {}
-        self._progress, self._steps = progress, steps
-
-    @contextmanager
-    def __call__(self, step: str) -> Iterator[None]:
-        if self._progress is not None:
-            self._progress(len(self.seconds) / self._steps, step)
-        begin = time.perf_counter()
-        yield
-        self.seconds[step] = time.perf_counter() - begin
-        logger.info("%s: %.3f s", step, self.seconds[step])
-        if self._progress is not None and len(self.seconds) == self._steps:
-            self._progress(1.0, "done")

@@ -8,6 +8,7 @@ from typing import Any
 from ..extensions.close_curves import refuse_without_sides
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
 from ..visualization.slices import PICTURE_FORMATS
+from ..visualization.surfaces import save_surface
 from .computing import naming
 from .options import Summary, add_command
 from .surface import add_curves_and_output, advice, measured
@@ -38,8 +39,6 @@ def run(arguments: Namespace) -> Summary:
         found = field.contour(0.0)
     write_curves(arguments.output, found, surface)
     if arguments.preview:
-        from ..visualization.surfaces import save_surface
-
         save_surface(field, arguments.preview, found)
     closed = sum(curve.closed for curve in found)
     summary = {

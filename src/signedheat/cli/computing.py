@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import sharpen
 from ..domains.grid import Grid
 from ..errors import SignedHeatError
 from ..fields.grid_field import GridField
@@ -94,8 +95,6 @@ def bounds_of(shape: Any) -> Any:
 
 def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
     """The field, sharpened unless the options say otherwise, or the grid has walls."""
-    from .. import sharpen
-
     plain = arguments.plain or grid.mask is not None
     with ProgressBar(arguments.quiet or arguments.json) as progress:
         share = 1.0 if plain else 0.8

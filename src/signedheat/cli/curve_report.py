@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..domains.curves import Curve
-from ..geometry.curve_segments import pieces
+from ..domains.segments import pieces
 from ..geometry.geodesics.paths import gaps
 from ..geometry.intrinsic_mesh import LaidOutTriangles
 from ..geometry.surface_points import EDGE, FACE, VERTEX, locate

@@ -12,7 +12,9 @@ from ..errors import SourceError
 from ..io import FIELD_FORMATS, load_field, read, read_curves, read_polylines
 from ..io.files import extension
 from ..io.obj import read_obj_lines
+from ..lowering.grid.discretization import memory_estimate
 from .computing import bounds_of, describe, is_planar
+from .curve_report import as_text, curve_reports
 from .options import Summary, add_command, whole_number
 
 
@@ -58,8 +60,6 @@ def run(arguments: Namespace) -> Summary:
             raise SourceError(
                 f"{arguments.curves}: curves lie on meshes and point clouds, not a {type(shape).__name__}"
             )
-        from .curve_report import as_text, curve_reports
-
         summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
         text += f"\n\n{arguments.curves}\n{as_text(summary['curves'])}"
     return summary, text
@@ -84,8 +84,6 @@ def lines_report(arguments: Namespace) -> Summary:
 
 def _memory(shape: Any, resolution: int) -> int | None:
     """Estimate for a grid around the shape; nothing where the shape is a single place."""
-    from ..lowering.grid.discretization import memory_estimate
-
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None
     return memory_estimate(Grid.around(shape.bounds, resolution))

@@ -12,7 +12,9 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
+from ..solver import SignedHeatSolver
 from ..visualization.slices import PICTURE_FORMATS
+from ..visualization.surfaces import save_surface
 from .computing import naming
 from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
 from .progress import ProgressBar
@@ -69,8 +71,6 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     if arguments.intrinsic and not isinstance(surface, TriangleMesh):
         raise SourceError(f"{arguments.mesh}: --intrinsic is for triangle meshes; this is a {type(surface).__name__}")
     curves = read_curves(arguments.curves, surface)
-    from ..solver import SignedHeatSolver
-
     with naming(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
         solver = SignedHeatSolver(surface, arguments.diffusion, progress, arguments.intrinsic)
         field = solver.distance(curves, arguments.constraint)
@@ -107,8 +107,6 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         lines = [curve for level in levels for curve in field.contour(float(level))]
         write_curves(summary["contours"], lines, surface)
     if arguments.preview:
-        from ..visualization.surfaces import save_surface
-
         save_surface(field, arguments.preview, curves, arguments.contours or 20)
     text = f"{arguments.output}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
     if summary["unreached"]:

@@ -15,6 +15,7 @@ from ..io import FIELD_FORMATS, ensure_writable, load_field, read
 from ..io.files import extension
 from ..io.tets import TET_FIELD_FORMATS
 from ..visualization.slices import PICTURE_FORMATS, save_scene, save_slices
+from ..visualization.surfaces import save_surface
 from .computing import naming
 from .options import Summary, add_command
 from .tets import on_grid
@@ -39,8 +40,6 @@ def run(arguments: Namespace) -> Summary:
     thing = shape_or_field(arguments.file)
     with naming(arguments.file):
         if isinstance(thing, VertexField):
-            from ..visualization.surfaces import save_surface
-
             save_surface(thing, arguments.output)
         elif isinstance(thing, GridField):
             save_slices(thing, arguments.output)

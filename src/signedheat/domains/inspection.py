@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..operators.tetrahedral import FLAT
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .tet_mesh import TetMesh
@@ -160,8 +161,6 @@ def inspect(shape: TriangleMesh | PolygonMesh | PointCloud | TetMesh) -> Surface
 
 
 def _inspect_tets(mesh: TetMesh) -> TetReport:
-    from ..operators.tetrahedral import FLAT
-
     counts = mesh.faces.tet_counts
     return TetReport(
         n_vertices=mesh.n_vertices,

@@ -7,7 +7,7 @@ angles alone: nothing of the surface changes. Flips give the intrinsic Delaunay 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
@@ -17,23 +17,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import discretize
 from ..errors import GeometryError
-from ..geometry.curve_segments import Pieces, in_pieces, pieces
+from ..geometry.curve_segments import Pieces
+from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
+from ..geometry.intrinsic.refinement import refine_all
 from ..geometry.intrinsic.transfer import Embedding, carry_pieces
 from ..geometry.intrinsic_mesh import LaidOutTriangles
 from ..geometry.mollification import mollify
-from ..lowering.surface.discretization import SurfaceDiscretization
-from ..solver import Progress, Stopwatch
+from ..progress import Progress, Stopwatch
+from .segments import in_pieces, pieces
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
 MARGIN = 1e-14
 """Triangle inequalities hold at least by this fraction of the mean length; flat triangles are thickened to it."""
-
-THICKNESS = 1e-9
-"""The same, for what is computed on a triangulation that has been made."""
 
 LARGEST_ANGLE = 30.0
 """Degrees; refinement is not sure to end for more."""
@@ -233,9 +231,6 @@ def intrinsic_delaunay(
     >>> bool(abs(better.triangles.face_areas.sum() - 10) < 1e-12)
     True
     """
-    from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
-    from ..geometry.intrinsic.refinement import refine_all
-
     if not isinstance(mesh, TriangleMesh):
         raise GeometryError(f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(mesh).__name__}")
     if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
@@ -270,52 +265,3 @@ def laid_out(mesh: TriangleMesh) -> tuple[LaidOutTriangles, float]:
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
     return LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added
-
-
-@discretize.register
-def _(domain: IntrinsicTriangulation) -> SurfaceDiscretization:
-    return lowered(domain)
-
-
-@dataclass(frozen=True, eq=False)
-class Retriangulated:
-    """A mesh that gets an intrinsic triangulation of its own for every set of sources; fields stay on the mesh.
-
-    Stands in for the mesh's discretisation until the sources are known.
-    """
-
-    mesh: TriangleMesh
-    progress: Callable[[float], None] | None = field(default=None, repr=False)
-
-    def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Refine the mesh with the sources along edges."""
-        inner = None if self.progress is None else lambda share, _: self.progress(share)
-        domain = intrinsic_delaunay(self.mesh, keep=sources, refine=True, progress=inner)
-        own = np.arange(self.mesh.n_vertices)
-        return lowered(domain, domain=self.mesh, restriction=own).adapt(sources)
-
-
-def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
-    """An intrinsic triangulation as the three steps see it; what is flat against an edge that stays, is thickened."""
-    triangles = triangulation.triangles
-    lengths, added = mollify(triangles.edge_lengths, THICKNESS)
-    if added:
-        corners, edges = triangles.corner_vertices, triangles.edges
-        triangles = LaidOutTriangles.from_lengths(corners, lengths, triangles.n_vertices, edges)
-    options = {
-        "domain": triangulation,
-        "bring": triangulation.bring,
-        "spacing": spacing(triangles),
-        "notes": {"intrinsic triangulation": triangulation.summary},
-        **options,
-    }
-    return SurfaceDiscretization(triangles=triangles, **options)
-
-
-def spacing(triangles: LaidOutTriangles) -> float:
-    """h: half the mean edge length, where the mean is over the area of the surface.
-
-    The plain mean would follow the many small triangles that refinement puts where the mesh needs them, and then
-    ``√t`` would not bridge the others.
-    """
-    return 0.5 * float(triangles.face_areas @ triangles.edge_lengths.mean(axis=1) / triangles.face_areas.sum())

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SourceError
+from ..geometry.meshes import Triangles
 from ..geometry.polylines import chains
 from .curves import Curve
 
-if TYPE_CHECKING:
-    from .triangle_mesh import TriangleMesh
 
-
-def level_set(mesh: TriangleMesh, values: NDArray[np.float64], level: float) -> list[Curve]:
+def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> list[Curve]:
     """Marching triangles: where a piecewise linear function takes a value, with larger values to the left.
 
     Values equal to the level count as larger, so that every face is crossed along one segment or not at all; loops that
@@ -55,7 +51,7 @@ def level_set(mesh: TriangleMesh, values: NDArray[np.float64], level: float) -> 
 
 
 def on_sides(
-    mesh: TriangleMesh, faces: NDArray[np.int64], sides: NDArray[np.int64], along: NDArray[np.float64]
+    mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64], along: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(k, 3) barycentric coordinates of points on sides of faces, from fractions of edges."""
     row = np.arange(len(faces))
@@ -67,7 +63,7 @@ def on_sides(
     return weights
 
 
-def gradients(mesh: TriangleMesh, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
     """(k, 3) gradients of a piecewise linear function on some faces, up to a positive factor."""
     corners = mesh.vertices[mesh.faces[faces]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -77,19 +73,19 @@ def gradients(mesh: TriangleMesh, values: NDArray[np.float64], faces: NDArray[np
     return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
 
 
-def region_boundary(mesh: TriangleMesh, mask: NDArray[np.bool_]) -> list[Curve]:
+def region_boundary(mesh: Triangles, mask: NDArray[np.bool_]) -> list[Curve]:
     """Edges between faces in a region and faces outside, with the region to the left."""
     inside = np.bincount(mesh.edges.of_faces.ravel(), np.repeat(mask, 3), len(mesh.edges.vertices))
     between = (inside > 0) & (inside < mesh.edges.face_counts)
     return along_sides(mesh, between[mesh.edges.of_faces] & mask[:, None])
 
 
-def boundary_curves(mesh: TriangleMesh) -> list[Curve]:
+def boundary_curves(mesh: Triangles) -> list[Curve]:
     """Edges of a single face, with the surface to the left."""
     return along_sides(mesh, (mesh.edges.face_counts == 1)[mesh.edges.of_faces])
 
 
-def along_sides(mesh: TriangleMesh, chosen: NDArray[np.bool_]) -> list[Curve]:
+def along_sides(mesh: Triangles, chosen: NDArray[np.bool_]) -> list[Curve]:
     """Curves along chosen sides of faces, each face to the left of its own."""
     faces, sides = np.nonzero(chosen)
     following = (sides + 1) % 3
@@ -107,7 +103,7 @@ def along_sides(mesh: TriangleMesh, chosen: NDArray[np.bool_]) -> list[Curve]:
     return curves
 
 
-def inward(mesh: TriangleMesh, faces: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.float64]:
+def inward(mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.float64]:
     """(k, 3) directions in faces, at right angles to sides of theirs, inward."""
     corners = mesh.vertices[mesh.faces[faces]]
     row = np.arange(len(faces))
@@ -115,7 +111,7 @@ def inward(mesh: TriangleMesh, faces: NDArray[np.int64], sides: NDArray[np.int64
     return np.cross(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), along)
 
 
-def is_consistent(mesh: TriangleMesh) -> bool:
+def is_consistent(mesh: Triangles) -> bool:
     """Whether no two faces run along an edge in the same direction."""
     edges = mesh.edges
     ahead = np.bincount(edges.of_faces.ravel(), edges.forward.ravel(), len(edges.vertices))

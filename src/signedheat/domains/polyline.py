@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from ..geometry.marching import level_lines
 from .validation import finite_rows
 
 
@@ -76,9 +77,6 @@ class Polyline:
         >>> dot.points.tolist(), dot.closed
         ([[1.0, 1.5], [1.5, 1.0], [1.0, 0.5], [0.5, 1.0]], True)
         """
-        from ..geometry.marching import level_lines
-        from .grid import Grid
-
         inside = np.asarray(mask)
         if inside.ndim != 2 or inside.dtype != np.bool_ or not inside.any():
             raise GeometryError(
@@ -87,8 +85,8 @@ class Polyline:
             )
         steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), 2)
         padded = np.pad(inside, 1)
-        grid = Grid(np.asarray(origin, dtype=np.float64) - steps, steps, padded.shape)
-        return level_lines(grid, 0.5 - padded, 0.0)
+        lines = level_lines(0.5 - padded, np.asarray(origin, dtype=np.float64) - steps, steps, 0.0)
+        return [cls(points, closed) for points, closed in lines]
 
     @property
     def n_points(self) -> int:

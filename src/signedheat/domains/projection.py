@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,15 +9,14 @@ from ..errors import SourceError
 from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.meshes import Triangles
+from ..geometry.nearest import nearest_on_triangles
 from ..geometry.surface_points import locate
 from .curves import Curve, finite
 
-if TYPE_CHECKING:
-    from .triangle_mesh import TriangleMesh
-
 
 def projected_curve(
-    mesh: TriangleMesh, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
+    mesh: Triangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
 ) -> Curve:
     """The curve through the closest points of a mesh, with shortest lines across faces between them."""
     points = finite(points, "points of the polyline")
@@ -45,11 +42,9 @@ def projected_curve(
 
 
 def closest_points(
-    mesh: TriangleMesh, points: NDArray[np.float64]
+    mesh: Triangles, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Face, barycentric coordinates and distance of the point of a mesh closest to each point."""
-    from ..geometry.nearest import nearest_on_triangles
-
     corners = mesh.vertices[mesh.faces]
     tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
     faces, weights = nearest_on_triangles(corners, tree, np.ascontiguousarray(points))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SourceError
+from ..geometry.meshes import Triangles
+from ..geometry.surface_points import corners_at
 from .curves import Curve, SurfacePoints
-
-if TYPE_CHECKING:
-    from .triangle_mesh import TriangleMesh
+from .level_sets import boundary_curves, level_set, region_boundary
+from .projection import projected_curve
 
 
 class Surface:
@@ -20,8 +19,14 @@ class Surface:
     Face ids of curves and points refer to `triangulation`, vertex ids to the domain.
     """
 
-    triangulation: TriangleMesh
-    on_triangulation: Any
+    @property
+    def triangulation(self) -> Triangles:
+        """The triangles that curves refer to."""
+        raise NotImplementedError
+
+    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of `triangulation`, from values at the vertices of the domain."""
+        raise NotImplementedError
 
     def path(self, vertices: ArrayLike, closed: bool = False, oriented: bool = True) -> Curve:
         """Curve through vertices, in order; φ > 0 to its left.
@@ -103,8 +108,6 @@ class Surface:
         >>> mesh.polyline([[0.8, 0.2, 0.01], [0.2, 0.8, 0.01]]).barycentric.round(3).tolist()
         [[0.2, 0.6, 0.2], [0.5, 0.0, 0.5], [0.2, 0.2, 0.6]]
         """
-        from .projection import projected_curve
-
         return projected_curve(self.triangulation, points, closed, oriented, max_distance)
 
     def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
@@ -133,8 +136,6 @@ class Surface:
         >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).level_set([0.0, 1.0, 1.0], 0.5)
         [Curve(2 points, open, oriented)]
         """
-        from .level_sets import level_set
-
         values = np.asarray(values, dtype=np.float64)
         return level_set(self.triangulation, self.on_triangulation(values), float(level))
 
@@ -163,8 +164,6 @@ class Surface:
         >>> mesh.region_boundary([True, False])
         [Curve(2 points, open, oriented)]
         """
-        from .level_sets import region_boundary
-
         return region_boundary(self.triangulation, self._triangle_mask(np.asarray(face_mask)))
 
     def boundary_curves(self) -> list[Curve]:
@@ -181,13 +180,9 @@ class Surface:
         >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).boundary_curves()
         [Curve(3 points, closed, oriented)]
         """
-        from .level_sets import boundary_curves
-
         return boundary_curves(self.triangulation)
 
     def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        from ..geometry.surface_points import corners_at
-
         ids = self._triangulation_vertices(np.atleast_1d(np.asarray(vertices)))
         mesh = self.triangulation
         corners = corners_at(mesh.faces, ids, mesh.n_vertices, name)

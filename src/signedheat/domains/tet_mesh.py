@@ -11,6 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from ..geometry.box_tree import BoxTree
+from ..geometry.tet_faces import tet_faces
+from ..operators.tetrahedral import Tetrahedra, signed_volumes
+from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
 from .validation import element_ids, finite_rows, frozen
 
@@ -52,8 +56,6 @@ class TetMesh:
     reoriented: NDArray[np.int64]
 
     def __init__(self, vertices: ArrayLike, tets: ArrayLike) -> None:
-        from ..operators.tetrahedral import signed_volumes
-
         positions = finite_rows(vertices, "vertices", 3)
         ids = element_ids(tets, "tets", 4, len(positions))
         volumes = signed_volumes(positions, ids)
@@ -80,15 +82,11 @@ class TetMesh:
     @cached_property
     def geometry(self) -> Any:
         """Areas, volumes and the operators made of them: an `operators.tetrahedral.Tetrahedra`."""
-        from ..operators.tetrahedral import Tetrahedra
-
         return Tetrahedra(self.vertices, self.tets)
 
     @cached_property
     def faces(self) -> Any:
         """The triangles between and around the tets: an `operators.tetrahedral.FaceTable`."""
-        from ..operators.tetrahedral import tet_faces
-
         return tet_faces(self.tets)
 
     @property
@@ -120,8 +118,6 @@ class TetMesh:
     @cached_property
     def search_tree(self) -> Any:
         """A tree of the tets' boxes: an `operators.box_tree.BoxTree`."""
-        from ..geometry.box_tree import BoxTree
-
         corners = self.vertices[self.tets]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
@@ -133,9 +129,7 @@ class TetMesh:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a ``.mesh``, ``.msh``, ``.vtu``, ``.vtk``, or ``.node`` and ``.ele`` file."""
-        from ..io.tets import write_tets
-
-        write_tets(self, path)
+        save_shape(self, path)
 
     @classmethod
     def from_meshio(cls, mesh: Any) -> TetMesh:

@@ -9,16 +9,15 @@ import numpy as np
 
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
+from ..operators.grid.closest_points import distance_to_zero_set
 from ..parallel import attended
-from ..solver import Progress
+from ..progress import Progress
 from .sharpening import sharpen
 
 
 @sharpen.register
 def sharpen_grid(field: GridField, progress: Progress | None = None) -> GridField:
     """Distance of every node to the zero set; signs stay as they are. Second order on smooth shapes."""
-    from ..operators.grid.closest_points import distance_to_zero_set
-
     if not np.isfinite(field.values).all():
         raise GeometryError(
             "a field around solid nodes, or with parts that no source reaches, cannot be sharpened: straight lines to "

@@ -7,7 +7,6 @@ where Y is not integrable.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,7 +20,7 @@ from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
-from ..errors import SourceError, UnreachedWarning
+from ..errors import SourceError, UnreachedWarning, warn_user
 from ..fields.piecewise_field import PiecewiseField
 from ..geometry.curve_segments import Pieces
 from ..geometry.face_pairs import FacePairs, face_pairs
@@ -30,7 +29,8 @@ from ..geometry.surface_points import VERTEX, barycentric_in
 from ..linear import factorize
 from ..method import diffuse, normalize
 from ..operators.cotan import cotan_matrix
-from ..solver import Progress, SignedHeatSolver, Stopwatch, as_list
+from ..progress import Progress, Stopwatch
+from ..solver import SignedHeatSolver, as_list
 from .intrinsic_piecewise import IntrinsicPiecewiseField
 from .jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 
@@ -139,7 +139,7 @@ def piecewise_distance(
         error = integration_error(phi, directions)
     unreached = np.flatnonzero(np.isnan(phi.values[:, 0]))
     if len(unreached):
-        warnings.warn(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning, stacklevel=2)
+        warn_user(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning)
     notes = {
         "objective": solution.objective,
         "bound": solution.bound,

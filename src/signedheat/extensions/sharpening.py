@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..discretization import Diagnostics, Discretization
 from ..errors import GeometryError, OutsideError
 from ..operators.linear_elements import LinearElements
-from ..solver import Progress
+from ..progress import Progress
+from .sharpening_methods import Geodesic
 
 
 class Method(Protocol):
@@ -87,8 +88,6 @@ def sharpened(
     progress: Progress | None,
 ) -> tuple[NDArray[np.float64], Diagnostics]:
     """What fields on surfaces and on tets have in common: new values, and diagnostics that compare the slopes."""
-    from .sharpening_methods import Geodesic
-
     method = Geodesic() if method is None else method
     if isinstance(method, type) or not hasattr(method, "sharpened"):
         raise TypeError(f"{method!r} is no method of sharpening: pass Geodesic() or Convex()")

@@ -17,7 +17,7 @@ from ..domains.validation import finite_number, positive_number
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..operators.linear_elements import LinearElements
 from ..parallel import attended
-from ..solver import Progress
+from ..progress import Progress
 
 
 @dataclass(frozen=True)

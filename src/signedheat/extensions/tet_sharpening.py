@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 
 from ..discretization import discretize
 from ..fields.tet_field import TetField
+from ..geometry.box_tree import BoxTree
+from ..geometry.geodesics.any_angle import Walls, bent_distance
+from ..geometry.marching_tets import level_triangles
+from ..geometry.nearest import nearest_on_triangles
+from ..geometry.tet_clipping import barycentric
+from ..geometry.visibility import tet_neighbors
 from ..lowering.tets.discretization import TetDiscretization
 from ..operators.linear_elements import LinearElements
 from .sharpening import Method, Progress, sharpen, sharpened
@@ -39,13 +45,6 @@ def _(
     Where the linear interpolant vanishes, φ itself does not if it is curved. By how much it differs there, its
     gradients at the corners of the tet tell to second order: ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)``.
     """
-    from ..geometry.box_tree import BoxTree
-    from ..geometry.geodesics.any_angle import Walls, bent_distance
-    from ..geometry.marching_tets import level_triangles
-    from ..geometry.nearest import nearest_on_triangles
-    from ..geometry.tet_clipping import barycentric
-    from ..geometry.visibility import tet_neighbors
-
     mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
     points = mesh.vertices[lowered.vertices] - planes.center
     positions, corners, owners = level_triangles(points, unknowns, values, 0.0)

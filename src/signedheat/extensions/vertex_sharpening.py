@@ -13,6 +13,7 @@ from ..discretization import discretize
 from ..errors import GeometryError
 from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import Pieces, rows_of
+from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
 from ..geometry.intrinsic_mesh import LaidOutTriangles
 from ..geometry.surface_points import VERTEX, barycentric_in, chained, star
 from ..lowering.surface.discretization import SurfaceDiscretization
@@ -59,8 +60,6 @@ def _(
     surface: SurfaceDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
 ) -> tuple[NDArray[np.float64], dict[str, Any]]:
     """Along the faces, from the line on which values vanish and from sources without sides."""
-    from ..geometry.geodesics.exact import distance_to_zero_line
-
     parts = getattr(source, "parts", ())
     unsided = [part for part in parts if not part.oriented]
     if not unsided:
@@ -107,8 +106,6 @@ def distance_to_pieces(
     triangles: LaidOutTriangles, parts: list[Pieces], tolerance: float
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to curves along edges and to points anywhere; and the windows that it took."""
-    from ..geometry.geodesics.exact import distance_to_edges_and_points
-
     nodes = chained([part.nodes for part in parts])
     at_vertex = nodes.kinds == VERTEX
     inside = nodes[~at_vertex]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +15,8 @@ from ..domains.grid import Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
-
-if TYPE_CHECKING:
-    from os import PathLike
+from ..geometry.marching import closed_surface, level_lines
+from .files import save_field
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,10 +130,11 @@ class GridField:
         GeometryError
             If the grid has neither 2 nor 3 dimensions, or values are infinite.
         """
-        from ..geometry.marching import closed_surface, level_lines
-
-        contoured = level_lines if self.grid.dimension == 2 else closed_surface
-        return contoured(self.grid, self.values, level)
+        grid = self.grid
+        if grid.dimension == 2:
+            lines = level_lines(self.values, grid.origin, grid.spacing, level)
+            return [Polyline(points, closed) for points, closed in lines]
+        return TriangleMesh(*closed_surface(self.values, grid.origin, grid.spacing, level))
 
     def offset(self, distance: float) -> TriangleMesh | list[Polyline]:
         """What lies at a signed distance from the shape: `contour`, but refused where the grid is too small for it.
@@ -161,9 +162,7 @@ class GridField:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format that its name ends with; `signedheat.load_field` gives the field back."""
-        from .. import io
-
-        io.save_field(self, path)
+        save_field(self, path)
 
     def _wall_range(self) -> tuple[float, float]:
         """Least and greatest φ on the walls of the box."""

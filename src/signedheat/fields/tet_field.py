@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +14,11 @@ from ..discretization import Diagnostics
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
-
-if TYPE_CHECKING:
-    from os import PathLike
+from ..geometry.box_tree import BoxTree
+from ..geometry.marching_tets import closed_level_set
+from ..geometry.nearest import nearest_on_triangles
+from ..geometry.tet_clipping import Planes, barycentric, locate
+from .files import save_field
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,9 +135,7 @@ class TetField:
         OutsideError
             If φ does not take the level anywhere in the mesh.
         """
-        from ..geometry.marching_tets import closed_level_set
-
-        return closed_level_set(self.mesh, self.values, self._vertex_gradients, level)
+        return TriangleMesh(*closed_level_set(self.mesh, self.values, self._vertex_gradients, level))
 
     def offset(self, distance: float) -> TriangleMesh:
         """The surface at a signed distance from the shape: `contour`, but refused where the mesh is too small for it.
@@ -162,9 +163,7 @@ class TetField:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write mesh and values to a ``.vtu``, ``.vtk`` or ``.msh`` file; `signedheat.load_field` reads it."""
-        from ..io.tets import save_tet_field
-
-        save_tet_field(self, path)
+        save_field(self, path)
 
     @cached_property
     def _vertex_gradients(self) -> NDArray[np.float64]:
@@ -181,22 +180,15 @@ class TetField:
 
     @cached_property
     def _planes(self) -> Any:
-        from ..geometry.tet_clipping import Planes
-
         return Planes.of(self.mesh)
 
     @cached_property
     def _wall_tree(self) -> Any:
-        from ..geometry.box_tree import BoxTree
-
         corners = self.mesh.vertices[self.mesh.boundary.faces]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
     def _place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Vertices and weights that interpolate at each point or the nearest on the boundary, and the way from it."""
-        from ..geometry.nearest import nearest_on_triangles
-        from ..geometry.tet_clipping import barycentric, locate
-
         tets = locate(self.mesh, self._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
         corners = np.zeros((len(points), 4), dtype=np.int64)

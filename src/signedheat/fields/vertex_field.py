@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..discretization import Diagnostics
 from ..domains.curves import Curve, SurfacePoints
+from ..domains.projection import closest_points
+from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_rows
 from ..errors import OutsideError
-
-if TYPE_CHECKING:
-    from os import PathLike
-
-    from ..domains.triangle_mesh import TriangleMesh
+from .files import save_field
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,9 +132,7 @@ class VertexField:
         FileFormatError
             If the format is unknown or the file cannot be written.
         """
-        from ..io.surface_fields import save_vertex_field
-
-        save_vertex_field(self.restrict(), path)
+        save_field(self.restrict(), path)
 
     def restrict(self) -> VertexField:
         """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself."""
@@ -156,7 +153,5 @@ class VertexField:
                     f"{mesh.n_faces - 1}: was it made for another surface?"
                 )
             return mesh, values, points.faces, points.barycentric
-        from ..domains.projection import closest_points
-
         faces, weights, _ = closest_points(mesh, finite_rows(points, "points", 3))
         return mesh, values, faces, weights

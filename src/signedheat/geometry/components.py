@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..compiled import compiled
 
 
 def same_positions(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -29,7 +30,7 @@ def face_components(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     return _face_components(np.ascontiguousarray(faces), int(faces.max()) + 1)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _same_positions(vertices):
     count, dimension = vertices.shape
     bits = vertices.view(np.uint64)
@@ -62,7 +63,7 @@ def _same_positions(vertices):
     return result
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _face_components(faces, n_vertices):
     parent = np.arange(n_vertices)
     for f in range(faces.shape[0]):

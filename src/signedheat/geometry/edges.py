@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .triangle_kernels import find_edges
+
 
 @dataclass(frozen=True, eq=False)
 class EdgeTable:
@@ -57,7 +59,5 @@ def face_edges(faces: NDArray[np.int64]) -> EdgeTable:
     >>> table.of_faces.tolist()
     [[0, 1, 2], [1, 3, 4]]
     """
-    from .triangle_kernels import find_edges
-
     faces = np.ascontiguousarray(faces, dtype=np.int64)
     return EdgeTable(*find_edges(faces, np.bincount(faces.ravel())))

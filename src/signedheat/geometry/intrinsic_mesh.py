@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .edges import EdgeTable, face_edges
+from .triangle_kernels import gather, join_faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +143,6 @@ class LaidOutTriangles:
     @cached_property
     def face_parts(self) -> NDArray[np.int64]:
         """(m,) part of the surface that each face lies in, named by its first face; parts may share vertices."""
-        from .triangle_kernels import join_faces
-
         return join_faces(self.edges.of_faces, self.n_edges)
 
     def in_edge_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -158,7 +157,5 @@ class LaidOutTriangles:
 
     def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """(m,) sum of the vectors of an (e,) edge array at the three edges of each face, in its layout."""
-        from .triangle_kernels import gather
-
         vectors = np.ascontiguousarray(vectors)
         return gather(self.edges.of_faces, self.edge_directions, self.reflected, vectors)

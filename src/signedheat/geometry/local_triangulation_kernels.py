@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
+
+from ..compiled import compiled, prange
 
 MAX_SIDES = 64
 TOUCHING = 1e-7  # radians by which sectors may overlap
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def voronoi_fans(
     x: NDArray[np.float64], y: NDArray[np.float64], reach: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -80,7 +81,7 @@ def voronoi_fans(
     return neighbours, counts
 
 
-@njit(cache=True)
+@compiled
 def accept_apart(
     triangles: NDArray[np.int64], starts: NDArray[np.float64], widths: NDArray[np.float64], n_points: int
 ) -> NDArray[np.bool_]:
@@ -112,7 +113,7 @@ def accept_apart(
     return accepted
 
 
-@njit(cache=True)
+@compiled
 def signs_from_parents(
     order: NDArray[np.int64], parents: NDArray[np.int64], relative: NDArray[np.int64]
 ) -> NDArray[np.int64]:

@@ -16,6 +16,7 @@ from scipy import sparse
 
 from .edges import face_edges
 from .hole_filling import hole_fillings
+from .local_triangulation_kernels import accept_apart, signs_from_parents, voronoi_fans
 
 _CHUNK = 65536
 
@@ -108,8 +109,6 @@ def offers(
     points: NDArray[np.float64], axes: NDArray[np.float64], neighbors: NDArray[np.int64], reach: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Triangles (m, 3) of all fans, each once, corners in increasing order; how many of its corners offer each."""
-    from .local_triangulation_kernels import voronoi_fans
-
     triangles = []
     for begin in range(0, len(points), _CHUNK):
         chunk = slice(begin, begin + _CHUNK)
@@ -150,8 +149,6 @@ def agreed(points: NDArray[np.float64], axes: NDArray[np.float64], triangles: ND
 
     Overlap is told by the sector that a triangle takes up in the tangent plane of its corner.
     """
-    from .local_triangulation_kernels import accept_apart
-
     starts, widths = np.empty(triangles.shape), np.empty(triangles.shape)
     for k in range(3):
         here, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
@@ -175,8 +172,6 @@ def aligned(
     Each connected part then points where most of its given normals do, or else outward: the side on which its volume,
     seen from its centroid, is positive.
     """
-    from .local_triangulation_kernels import signs_from_parents
-
     n = len(points)
     tail, head = face_edges(faces).vertices.T
     bend = 1.0 - np.abs((normals[tail] * normals[head]).sum(axis=1))

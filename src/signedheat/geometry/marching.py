@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.grid import Grid
-from ..domains.polyline import Polyline
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
 
 CLEARANCE = 1e-3
@@ -16,41 +13,60 @@ CAP = 0.01
 """Fraction of a cell by which a surface closed along the box lies outside it."""
 
 
-def closed_surface(grid: Grid, values: NDArray[np.float64], level: float) -> TriangleMesh:
-    """Marching cubes (Lewiner et al. 2003), with closed, manifold, outward-oriented output for every input."""
+def closed_surface(
+    values: NDArray[np.float64], origin: NDArray[np.float64], spacing: NDArray[np.float64], level: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Marching cubes (Lewiner et al. 2003), with closed, manifold, outward-oriented output for every input.
+
+    Parameters
+    ----------
+    values : (nx, ny, nz) float
+        At ``origin + (i, j, k) * spacing``.
+    origin, spacing : (3,) float
+        Of the grid.
+    level : float
+        Which level set.
+
+    Returns
+    -------
+    vertices : (n, 3) float
+    faces : (m, 3) int
+    """
     from skimage.measure import marching_cubes
 
-    if grid.dimension != 3:
-        raise GeometryError(f"fields are contoured in 2 and 3 dimensions, and this grid has {grid.dimension}")
+    if values.ndim != 3:
+        raise GeometryError(f"fields are contoured in 2 and 3 dimensions, and this grid has {values.ndim}")
     if np.isinf(values).any():
         raise GeometryError("infinite values have no contour")
-    height = closed_at_unknown(heights_above(grid, values, level))
+    height = closed_at_unknown(heights_above(values, spacing, level))
     shift = 0
     if wall_signs(height) == {True, False}:
         height, shift = capped(height), 1
     vertices, faces, _, _ = marching_cubes(height, 0.0, gradient_direction="descent")
-    vertices = grid.origin + (vertices.astype(np.float64) - shift) * grid.spacing
-    return TriangleMesh(vertices, faces)
+    return origin + (vertices.astype(np.float64) - shift) * spacing, faces
 
 
-def level_lines(grid: Grid, values: NDArray[np.float64], level: float) -> list[Polyline]:
-    """Marching squares: greater values to the left, closed where they do not end at the box or at NaN.
+def level_lines(
+    values: NDArray[np.float64], origin: NDArray[np.float64], spacing: NDArray[np.float64], level: float
+) -> list[tuple[NDArray[np.float64], bool]]:
+    """Marching squares: points (k, 2) of each line, greater values to the left, and whether it closes.
+
+    Lines are closed where they do not end at the box or at NaN.
 
     Examples
     --------
-    >>> grid = Grid((0, 0), 1.0, (4, 3))
-    >>> [line] = level_lines(grid, grid.points[..., 0], 1.5)
-    >>> line.points.tolist()
-    [[1.5, 2.0], [1.5, 1.0], [1.5, 0.0]]
+    >>> [(points, closed)] = level_lines(np.array([[0.0] * 3, [1.0] * 3]), np.zeros(2), np.ones(2), 0.5)
+    >>> points.tolist(), closed
+    ([[0.5, 2.0], [0.5, 1.0], [0.5, 0.0]], False)
     """
     from skimage.measure import find_contours
 
-    lines = find_contours(heights_above(grid, values, level), 0.0, positive_orientation="high")
+    lines = find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
     closed = [len(line) > 3 and bool((line[0] == line[-1]).all()) for line in lines]
-    return [Polyline(grid.origin + at * grid.spacing, end) for at, end in zip(lines, closed, strict=True)]
+    return [(origin + at * spacing, end) for at, end in zip(lines, closed, strict=True)]
 
 
-def heights_above(grid: Grid, values: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     """Values less the level, which some must reach and none comes closer to than `CLEARANCE`."""
     height = values - level
     known = height[np.isfinite(height)]
@@ -60,7 +76,7 @@ def heights_above(grid: Grid, values: NDArray[np.float64], level: float) -> NDAr
             f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}: "
             "choose another level or a larger grid"
         )
-    least = CLEARANCE * float(grid.spacing.min())
+    least = CLEARANCE * float(spacing.min())
     height[(height >= 0) & (height < least)] = least
     height[(height < 0) & (height > -least)] = -least
     return height

@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..domains.tet_mesh import TetMesh
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import OutsideError
-from ..operators.tetrahedral import tet_faces
+from .meshes import Tets
+from .tet_faces import tet_faces
 
 CLEARANCE = 1e-3
 """Crossings keep this fraction of an edge from its ends, so that no two vertices of a surface coincide."""
@@ -38,9 +37,9 @@ _LIDS = {
 
 
 def closed_level_set(
-    mesh: TetMesh, values: NDArray[np.float64], gradients: NDArray[np.float64], level: float
-) -> TriangleMesh:
-    """The surface between the vertices below a level and the others, facing the others.
+    mesh: Tets, values: NDArray[np.float64], gradients: NDArray[np.float64], level: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and triangles of the surface between the vertices below a level and the others, facing the others.
 
     Its own vertices lie where φ takes the level to second order, by its gradients at the vertices. Where it meets the
     boundary of the mesh it is closed along the boundary, on the side below the level. Tets with NaN count as outside
@@ -121,7 +120,9 @@ def _triangles(
     return np.concatenate(found), np.concatenate(owners)
 
 
-def manifold(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> TriangleMesh:
+def manifold(
+    positions: NDArray[np.float64], triangles: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """A closed oriented surface with its vertices and edges split wherever it touches itself.
 
     Every halfedge is paired with one that runs the other way; corners that meet across a pair are one vertex.
@@ -130,7 +131,7 @@ def manifold(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> Tr
     --------
     >>> tet = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
     >>> two = np.concatenate([tet, np.where(tet > 0, tet + 3, 0)])  # sharing vertex 0
-    >>> manifold(np.zeros((7, 3)), two).n_vertices
+    >>> len(manifold(np.zeros((7, 3)), two)[0])
     8
     """
     m = len(triangles)
@@ -146,4 +147,4 @@ def manifold(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> Tr
     graph = sparse.coo_matrix((np.ones(len(joins[0]), dtype=np.int8), joins), shape=(3 * m, 3 * m))
     _, vertex = sparse.csgraph.connected_components(graph, directed=False)
     _, first = np.unique(vertex, return_index=True)
-    return TriangleMesh(positions[tails[first]], vertex.reshape(m, 3))
+    return positions[tails[first]], vertex.reshape(m, 3)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..compiled import compiled
 from .box_tree import LEAF, BoxTree
 
 
@@ -25,7 +25,7 @@ def nearest_on_triangles(
     return _nearest(np.ascontiguousarray(triangles), tree.bounds, tree.items, points)
 
 
-@njit(cache=True)
+@compiled
 def _nearest(triangles, bounds, items, points):
     found = np.zeros(len(points), dtype=np.int64)
     weights = np.zeros((len(points), 3))
@@ -64,7 +64,7 @@ def _nearest(triangles, bounds, items, points):
     return found, weights
 
 
-@njit(cache=True)
+@compiled
 def _box_distance(box, x, y, z):
     a = max(box[0] - x, x - box[3], 0.0)
     b = max(box[1] - y, y - box[4], 0.0)
@@ -72,7 +72,7 @@ def _box_distance(box, x, y, z):
     return a * a + b * b + c * c
 
 
-@njit(cache=True)
+@compiled
 def place_on_triangle(triangle, x, y, z):
     """Squared distance of the nearest place in a triangle, and its barycentric coordinates.
 
@@ -101,7 +101,7 @@ def place_on_triangle(triangle, x, y, z):
     return third, r, 0.0, 1.0 - r
 
 
-@njit(cache=True)
+@compiled
 def _on_side(px, py, pz, dx, dy, dz):
     """Squared distance of p from the segment from 0 to d, and the fraction of it at which the nearest place lies."""
     length = dx * dx + dy * dy + dz * dz

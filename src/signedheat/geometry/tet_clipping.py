@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from ..domains.tet_mesh import TetMesh
+from ..compiled import compiled
 from .box_tree import LEAF
+from .meshes import Tets
 
 FLAT = 1e-10
 """Tets whose volume is below this, over the cube of the longest edge, hold no piece of a source."""
@@ -82,7 +82,7 @@ class Planes:
     center: NDArray[np.float64]
 
     @classmethod
-    def of(cls, mesh: TetMesh) -> Planes:
+    def of(cls, mesh: Tets) -> Planes:
         """The planes of a tet mesh."""
         faces, geometry = mesh.faces, mesh.geometry
         center = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
@@ -105,11 +105,12 @@ class Planes:
         )
 
 
-def clip_triangles(mesh: TetMesh, planes: Planes, triangles: NDArray[np.float64]) -> Pieces:
+def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -> Pieces:
     """Cut (k, 3, 3) triangles by the tets that they cross; what lies outside the mesh is left out.
 
     Examples
     --------
+    >>> from signedheat import TetMesh
     >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
     >>> across = np.array([[[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]]])
     >>> clip_triangles(mesh, Planes.of(mesh), across).area_vectors
@@ -133,11 +134,12 @@ def clip_triangles(mesh: TetMesh, planes: Planes, triangles: NDArray[np.float64]
     return Pieces(tets, parents, area_vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face)
 
 
-def locate(mesh: TetMesh, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
+def locate(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
     """(k,) a tet that each point lies in, −1 outside the mesh.
 
     Examples
     --------
+    >>> from signedheat import TetMesh
     >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
     >>> locate(mesh, Planes.of(mesh), np.array([[0.1, 0.1, 0.1], [1.0, 1.0, 1.0]]))
     array([ 0, -1])
@@ -157,7 +159,7 @@ def locate(mesh: TetMesh, planes: Planes, points: NDArray[np.float64]) -> NDArra
     )
 
 
-def barycentric(mesh: TetMesh, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def barycentric(mesh: Tets, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(k, 4) barycentric coordinates of points in given tets, none negative, each row with sum one."""
     from_corner = points[:, None] - mesh.vertices[mesh.tets[tets][:, [1, 0, 0, 0]]]  # on the face opposite each corner
     inward = -np.einsum("pki,pki->pk", mesh.geometry.area_vectors[tets], from_corner)
@@ -165,7 +167,7 @@ def barycentric(mesh: TetMesh, tets: NDArray[np.int64], points: NDArray[np.float
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-@njit(cache=True)
+@compiled
 def _locate(points, bounds, items, center, of_tets, normals, offsets, tolerances, signs, solid):
     found = np.full(len(points), -1, dtype=np.int64)
     stack = np.empty(128, dtype=np.int64)
@@ -211,7 +213,7 @@ def _locate(points, bounds, items, center, of_tets, normals, offsets, tolerances
     return found
 
 
-@njit(cache=True)
+@compiled
 def _clip(triangles, bounds, items, center, of_tets, normals, offsets, tolerances, signs, shares, solid):
     size = 64 + 4 * len(triangles)
     tets = np.empty(size, dtype=np.int64)
@@ -306,7 +308,7 @@ def _clip(triangles, bounds, items, center, of_tets, normals, offsets, tolerance
     )
 
 
-@njit(cache=True)
+@compiled
 def _beyond(a, b, c, faces, normals, offsets, tolerances, signs):
     """Whether a triangle lies wholly on the far side of one of the faces."""
     for k in range(4):
@@ -322,7 +324,7 @@ def _beyond(a, b, c, faces, normals, offsets, tolerances, signs):
     return False
 
 
-@njit(cache=True)
+@compiled
 def _cut(polygon, n, other, heights, normal, offset, tolerance, sign):
     """Keep what lies behind a plane. Also whether the whole polygon lay in it.
 
@@ -354,7 +356,7 @@ def _cut(polygon, n, other, heights, normal, offset, tolerance, sign):
     return kept, False
 
 
-@njit(cache=True)
+@compiled
 def _measure(polygon, n, normal, area_vector, center):
     """Area vector and centre of a convex polygon; returns its area, negative if it is turned over by rounding."""
     area_vector[:] = 0.0
@@ -379,14 +381,14 @@ def _measure(polygon, n, normal, area_vector, center):
     return total
 
 
-@njit(cache=True)
+@compiled
 def _longer(array, size):
     longer = np.empty(size, dtype=array.dtype)
     longer[: len(array)] = array
     return longer
 
 
-@njit(cache=True)
+@compiled
 def _taller(array, size):
     taller = np.empty((size, array.shape[1]), dtype=array.dtype)
     taller[: len(array)] = array

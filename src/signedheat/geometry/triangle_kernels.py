@@ -1,10 +1,11 @@
 """Loops over triangles, compiled at first use."""
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def find_edges(faces, degrees):
     """Edges are kept in one list per vertex, that of the end with fewer faces, so that no list gets long."""
     first = np.full(len(degrees), -1)
@@ -33,7 +34,7 @@ def find_edges(faces, degrees):
     return vertices[:count].copy(), of_faces, forward
 
 
-@njit(cache=True)
+@compiled
 def add_up(unknowns, diagonal, coupling, n):
     starts = np.zeros(n + 1, dtype=np.int64)
     for f in range(len(unknowns)):
@@ -63,7 +64,7 @@ def add_up(unknowns, diagonal, coupling, n):
     return _merge(starts, columns, values)
 
 
-@njit(cache=True)
+@compiled
 def _merge(starts, columns, values):
     """Sort every row by column and add up what falls together, in place."""
     n, total = len(starts) - 1, 0
@@ -92,7 +93,7 @@ def _merge(starts, columns, values):
     return merged, columns[:total].copy(), values[:total].copy()
 
 
-@njit(cache=True)
+@compiled
 def gather(of_faces, directions, reflected, vectors):
     """Sum of the three edge vectors of each face, in its layout."""
     sums = np.empty(len(of_faces), dtype=np.complex128)
@@ -105,7 +106,7 @@ def gather(of_faces, directions, reflected, vectors):
     return sums
 
 
-@njit(cache=True)
+@compiled
 def add_fluxes(corners, positions, directions, n):
     """Half of each face's opposite edge, turned inward, times the face's direction, summed at every vertex."""
     sums = np.zeros(n)
@@ -116,7 +117,7 @@ def add_fluxes(corners, positions, directions, n):
     return sums
 
 
-@njit(cache=True)
+@compiled
 def join_faces(of_faces, n_edges):
     """Which connected part each face lies in, where faces are joined along edges only: its first face."""
     leader = np.arange(len(of_faces))
@@ -133,7 +134,7 @@ def join_faces(of_faces, n_edges):
     return leader
 
 
-@njit(cache=True)
+@compiled
 def _root(leader, f):
     while leader[f] != f:
         leader[f] = leader[leader[f]]
@@ -141,7 +142,7 @@ def _root(leader, f):
     return f
 
 
-@njit(cache=True)
+@compiled
 def extremes(vectors):
     """Smallest and largest of the vectors' larger components, whose squares may underflow."""
     smallest, largest = np.inf, 0.0

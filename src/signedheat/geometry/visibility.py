@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from ..operators.tetrahedral import FaceTable
+from ..compiled import compiled
+from .tet_faces import FaceTable
 
 
 def tet_neighbors(faces: FaceTable) -> NDArray[np.int64]:
@@ -14,7 +14,7 @@ def tet_neighbors(faces: FaceTable) -> NDArray[np.int64]:
 
     Examples
     --------
-    >>> from .tetrahedral import tet_faces
+    >>> from signedheat.geometry.tet_faces import tet_faces
     >>> tet_neighbors(tet_faces(np.array([[0, 1, 2, 3], [4, 1, 3, 2]]))).tolist()
     [[1, -1, -1, -1], [0, -1, -1, -1]]
     """
@@ -50,7 +50,7 @@ def visible(
     return _visible(starts, targets, neighbors, of_tets, normals, offsets, signs)
 
 
-@njit(cache=True)
+@compiled
 def _visible(starts, targets, neighbors, of_tets, normals, offsets, signs):
     seen = np.ones(len(starts), dtype=np.bool_)
     for t in range(len(starts)):

@@ -1,5 +1,6 @@
 """Reading and writing: shapes, and the fields computed from them."""
 
+from . import interop as _interop  # noqa: F401  provides the exchange with other packages
 from .curves import CURVE_FORMATS, read_curves, write_curves
 from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable

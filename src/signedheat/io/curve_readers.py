@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve
+from ..domains.projection import closest_points
 from ..errors import FileFormatError, SourceError
 from ..geometry.polylines import chains
 from .files import PathLike, text
@@ -210,8 +211,6 @@ def read_obj(path: PathLike, domain: Any) -> Iterable[Group | Curve]:
 
 def projected_nodes(domain: Any, points: NDArray[np.float64]) -> list[Node]:
     """Closest points of a surface, as nodes."""
-    from ..domains.projection import closest_points
-
     faces, weights, _ = closest_points(domain.triangulation, points)
     return nodes_of(faces, weights, domain)
 

@@ -14,12 +14,13 @@ import numpy as np
 
 from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError
+from ..fields.files import save_field as save_any_field
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
 from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
-from .surface_fields import is_vertex_field, load_vertex_field
-from .tets import TET_FIELD_FORMATS, load_tet_field
+from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
+from .tets import TET_FIELD_FORMATS, load_tet_field, save_tet_field
 from .vtk_xml import read_vti, write_vti
 
 CONVENTION = (
@@ -30,6 +31,16 @@ NAME = "signed_distance"
 
 Parts = tuple[Any, ...]
 """Values, origin, spacing; and the mask, where there is one."""
+
+
+@save_any_field.provide
+def _(field: GridField | TetField | VertexField, path: PathLike) -> None:
+    if isinstance(field, GridField):
+        save_field(field, path)
+    elif isinstance(field, TetField):
+        save_tet_field(field, path)
+    else:
+        save_vertex_field(field, path)
 
 
 def save_field(field: GridField, path: PathLike) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.exchange import shape_from, shape_to
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
@@ -108,3 +109,17 @@ def _build(
     if len(wrong):
         raise GeometryError(f"face {wrong[0]} has {counts[wrong[0]]} corners, not 3: use PolygonMesh instead")
     return TriangleMesh(points, corners.reshape(-1, 3))
+
+
+_FROM = {"trimesh": from_trimesh, "pyvista": from_pyvista, "meshio": from_meshio}
+_TO = {"trimesh": to_trimesh, "pyvista": to_pyvista, "meshio": to_meshio}
+
+
+@shape_from.provide
+def _(package: str, kind: type, thing: Any) -> Any:
+    return _FROM[package](kind, thing)
+
+
+@shape_to.provide
+def _(package: str, shape: Any) -> Any:
+    return _TO[package](shape)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from ..domains.exchange import save_shape
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
 from .files import PathLike, extension, replacing, unknown_extension
@@ -91,6 +92,7 @@ def read(path: PathLike) -> Any:
         raise GeometryError(f"{path}: {error}") from error
 
 
+@save_shape.provide
 def save(shape: Any, path: PathLike) -> None:
     """Write a shape; the extension says the format.
 

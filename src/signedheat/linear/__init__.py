@@ -8,8 +8,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from . import cholmod, pardiso
+from .cholmod import CholmodFactor
 from .matrices import upper_triangle, whole
 from .ordering import elimination_order
+from .pardiso import PardisoFactor
+from .superlu import SuperLUFactor
 
 __all__ = ["Factor", "available_backends", "elimination_order", "factorize", "upper_triangle", "whole"]
 
@@ -26,8 +30,6 @@ class Factor(Protocol):
 
 def available_backends() -> list[str]:
     """Names of the back ends that this machine has, best first."""
-    from . import cholmod, pardiso
-
     return [
         *(["pardiso"] if pardiso.is_available() else []),
         *(["cholmod"] if cholmod.is_available() else []),
@@ -68,13 +70,7 @@ def factorize(
         raise ValueError(f"the solver {name!r} is not available here: choose one of {', '.join(available)}")
     upper = upper_triangle(matrix)
     if name == "pardiso":
-        from .pardiso import PardisoFactor
-
         return PardisoFactor(upper, None if reused else order)
     if name == "cholmod":
-        from .cholmod import CholmodFactor
-
         return CholmodFactor(upper, order)
-    from .superlu import SuperLUFactor
-
     return SuperLUFactor(upper, order)

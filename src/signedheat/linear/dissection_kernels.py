@@ -1,10 +1,11 @@
 """Nested dissection by breadth-first levels, compiled at first use."""
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def dissect(starts, neighbors, leaf):
     """Elimination order: both sides of a small separator first, then the separator; the sides likewise.
 
@@ -87,7 +88,7 @@ def dissect(starts, neighbors, leaf):
     return order
 
 
-@njit(cache=True)
+@compiled
 def _levels(starts, neighbors, region, here, seed, level, queue, begin):
     """Breadth-first search within a region, into the queue from `begin` on; where the queue then ends."""
     level[seed] = 0
@@ -105,7 +106,7 @@ def _levels(starts, neighbors, region, here, seed, level, queue, begin):
     return tail
 
 
-@njit(cache=True)
+@compiled
 def _thinnest(level, queue, reached, last):
     """The smallest level that leaves at least 40 % on either side, or the median level."""
     best, size, median = -1, reached, level[queue[reached // 2]]

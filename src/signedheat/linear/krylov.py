@@ -9,9 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+
+from ..compiled import compiled
 
 SMALLEST = 1e-290
 """Unknowns below this have lost bits to underflow and stop nothing."""
@@ -105,7 +106,7 @@ def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArra
     return _breadth_first(matrix.indptr, matrix.indices, matrix.data, np.asarray(seeds, dtype=np.int64))
 
 
-@njit(cache=True)
+@compiled
 def _breadth_first(indptr, indices, data, seeds):
     n = len(indptr) - 1
     seen = np.zeros(n, dtype=np.bool_)
@@ -129,7 +130,7 @@ def _breadth_first(indptr, indices, data, seeds):
     return queue[:end].copy()
 
 
-@njit(cache=True)
+@compiled
 def _lower_triangle(indptr, indices, data, order, n):
     """Diagonal and strictly lower triangle, rows and columns in `order`, columns sorted."""
     place = np.full(n, -1, dtype=np.int64)
@@ -164,7 +165,7 @@ def _lower_triangle(indptr, indices, data, order, n):
     return starts, columns, lower, diagonal
 
 
-@njit(cache=True)
+@compiled
 def _factorize(indptr, indices, factor, pivots):
     """IC(0) in place; `pivots` becomes the inverse diagonal. False where a pivot is not clearly positive."""
     for i in range(len(pivots)):
@@ -192,7 +193,7 @@ def _factorize(indptr, indices, factor, pivots):
     return True
 
 
-@njit(cache=True)
+@compiled
 def _precondition(indptr, indices, factor, pivots, r, z):
     """z = (L Lᵀ)⁻¹ r, row by row down and up."""
     n, width = r.shape
@@ -212,7 +213,7 @@ def _precondition(indptr, indices, factor, pivots, r, z):
                 z[indices[k], c] -= factor[k] * z[i, c]
 
 
-@njit(cache=True)
+@compiled
 def _conjugate_gradients(indptr, indices, diagonal, lower, pivots, factor, b, relative, componentwise, most):
     n, width = b.shape
     x = np.zeros((n, width))

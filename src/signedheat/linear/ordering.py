@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .dissection_kernels import dissect
 from .matrices import whole
 
 _LEAF = 3  # unknowns that are not dissected further
@@ -26,7 +27,5 @@ def elimination_order(upper: Any) -> NDArray[np.int64]:
     >>> bool(8 <= elimination_order(path)[-1] <= 12)  # what separates two halves comes last
     True
     """
-    from .dissection_kernels import dissect
-
     graph = whole(upper)
     return dissect(graph.indptr, graph.indices, _LEAF)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from math import gamma, pi
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,10 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
-
-if TYPE_CHECKING:
-    from ..operators.grid.node_sources import NodeSources
+from ..geometry.components import face_components, same_positions
+from ..operators.grid.node_sources import NodeSources
+from ..operators.grid.wavefront import padded_shape
+from .grid.binning import merge_in_cells
 
 NEIGHBOURS = 8
 """Neighbours from which the area of an oriented point is estimated."""
@@ -186,8 +187,6 @@ def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> ND
 
 def connected_components(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m,) connected component of each face; vertices at the same position are one vertex."""
-    from ..geometry.components import face_components, same_positions
-
     return face_components(same_positions(vertices)[faces])
 
 
@@ -199,10 +198,6 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
     SourceError
         If a shape cannot be used on this grid, or nothing of any lies within it.
     """
-    from ..operators.grid.node_sources import NodeSources
-    from ..operators.grid.wavefront import padded_shape
-    from .grid.binning import merge_in_cells
-
     steps = np.zeros(4)
     steps[4 - grid.dimension :] = grid.spacing
     nodes = NodeSources.empty(padded_shape(grid.shape), steps)

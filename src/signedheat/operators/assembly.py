@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..geometry.triangle_kernels import add_up
+
 
 def assemble(
     unknowns: NDArray[np.int64], diagonal: NDArray[np.float64], coupling: NDArray[Any], n: int
@@ -32,7 +34,5 @@ def assemble(
            [0.+0.j, 1.+0.j, 2.+0.j],
            [0.+0.j, 0.+0.j, 1.+0.j]])
     """
-    from ..geometry.triangle_kernels import add_up
-
     starts, columns, values = add_up(unknowns, diagonal, coupling, n)
     return sparse.csr_matrix((values, columns, starts), shape=(n, n))

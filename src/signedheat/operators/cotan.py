@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.triangle_kernels import add_fluxes
 from .assembly import assemble
 
 
@@ -33,7 +34,5 @@ def divergence(triangles: LaidOutTriangles, directions: NDArray[np.complex128]) 
 
     The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
     """
-    from ..geometry.triangle_kernels import add_fluxes
-
     directions = np.ascontiguousarray(directions)
     return add_fluxes(triangles.corner_vertices, triangles.corner_positions, directions, triangles.n_vertices)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-if TYPE_CHECKING:
-    from ..geometry.intrinsic_mesh import LaidOutTriangles
-    from .tetrahedral import Tetrahedra
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from .tetrahedral import Tetrahedra
 
 
 @dataclass(frozen=True, eq=False)

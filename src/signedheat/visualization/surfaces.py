@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import compiled
 from ..domains.curves import Curve
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable
@@ -153,16 +154,15 @@ def rasterised(
     corners: NDArray[np.float64], values: NDArray[np.float64], width: int, height: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
     """Depth, face and value at each pixel: (height, width), face −1 where there is none."""
-    from numba import njit
-
     depth = np.full((height, width), -np.inf)
     face = np.full((height, width), -1, dtype=np.int64)
     shown = np.full((height, width), np.nan)
-    njit(cache=True)(_fill)(corners, values, depth, face, shown)
+    _fill(corners, values, depth, face, shown)
     return depth, face, shown
 
 
-def _fill(corners, values, depth, face, shown):  # compiled where it is called
+@compiled
+def _fill(corners, values, depth, face, shown):
     height, width = depth.shape
     for f in range(len(corners)):
         (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[f]

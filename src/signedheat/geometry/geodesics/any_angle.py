@@ -12,9 +12,9 @@ import heapq
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from ..nearest import place_on_triangle
 
 
@@ -29,7 +29,7 @@ class Walls(NamedTuple):
     signs: NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _beyond(walls, tet, k, x, y, z):
     """How far a point lies outside the face opposite corner k of a tet."""
     f = walls.of_tets[tet, k]
@@ -37,7 +37,7 @@ def _beyond(walls, tet, k, x, y, z):
     return walls.signs[tet, k] * height
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _seen(walls, points, first_tet, tets_at, v, target, slack):
     """Whether the segment from vertex v to a target lies in the mesh; the target does."""
     x, y, z = points[v]
@@ -68,7 +68,7 @@ def _seen(walls, points, first_tet, tets_at, v, target, slack):
     return False
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _foot(triangles, triangles_at, first_triangle, corners, near, x, y, z):
     """The nearest point on the triangles that share a corner with one: its triangle, and where it is."""
     best, found, place = np.inf, near, np.zeros(3)
@@ -82,12 +82,12 @@ def _foot(triangles, triangles_at, first_triangle, corners, near, x, y, z):
     return found, place
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _length(point, x, y, z):
     return np.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def bent_distance(
     walls, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, owners, nearest, slack
 ):

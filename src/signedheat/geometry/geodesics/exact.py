@@ -13,9 +13,9 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from ..intrinsic_mesh import LaidOutTriangles
 from .initial_windows import Faces, Lamps, emit, light
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, hit, merge, outrun, put, ray, trim
@@ -100,7 +100,7 @@ def bends_light(triangles: LaidOutTriangles) -> NDArray[np.bool_]:
     return special
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _reach(v, length, heap, distance, bends):
     """Note a path to a vertex; one that light bends round is queued."""
     if length < distance[v] * (1.0 - 1e-14):
@@ -109,7 +109,7 @@ def _reach(v, length, heap, distance, bends):
             heapq.heappush(heap, (length, -1 - v))
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _collect(state, latest, halfedge, at_tail, at_head, length, slack, tolerance):
     """The windows queued for a halfedge, in order along it, trimmed, and made fewer where one will do for several."""
     windows, following, _ = state
@@ -146,7 +146,7 @@ def _collect(state, latest, halfedge, at_tail, at_head, length, slack, tolerance
     return chosen, kept
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _propagate(faces, bends, lamps, tolerance):
     n = len(bends)
     distance = np.full(n, np.inf)

@@ -6,9 +6,9 @@ import heapq
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from ..intrinsic_mesh import LaidOutTriangles
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun, put
 
@@ -60,7 +60,7 @@ class Lamps(NamedTuple):
     positions: NDArray[np.complex128]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def emit(faces, state, heap, latest, distance, face, side, kind, t0, t1, point, normal, sigma, slack):
     """Queue light that crosses a side of a face from within for the faces beyond; returns the windows.
 
@@ -110,7 +110,7 @@ def emit(faces, state, heap, latest, distance, face, side, kind, t0, t1, point, 
     return windows, following, count
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _segment(faces, values, face):
     """Whether the line crosses a face, the two sides it crosses, and where."""
     first, second, start, end = -1, -1, 0j, 0j
@@ -126,7 +126,7 @@ def _segment(faces, values, face):
     return second >= 0 and abs(end - start) > 0.0, first, second, start, end
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _light_corners(faces, distance, face, start, end):
     """Distance of the corners of a face to a segment or a point in it."""
     along = end - start
@@ -137,7 +137,7 @@ def _light_corners(faces, distance, face, start, end):
         distance[v] = min(distance[v], abs(r - t * along))
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _emit_beam(faces, state, heap, latest, distance, face, start, end, normal, slack):
     """Straight waves from a segment in a face, along a normal to it, to the sides that they meet."""
     along = (end - start) / abs(end - start)
@@ -157,7 +157,7 @@ def _emit_beam(faces, state, heap, latest, distance, face, start, end, normal, s
     return state
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _emit_fan(faces, values, state, heap, latest, distance, face, side, point, other, slack):
     """Round waves from the end of a segment, between its beams and those of its neighbours across the side there."""
     here = (other - point) / abs(other - point)
@@ -191,7 +191,7 @@ def _emit_fan(faces, values, state, heap, latest, distance, face, side, point, o
     return state
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def light(faces, lamps, state, heap, latest, distance, slack):
     """Distance at the corners of faces with lamps, then the first windows."""
     for face in range(len(faces.vertices)):

@@ -9,10 +9,11 @@ from __future__ import annotations
 from heapq import heappop, heappush
 
 import numpy as np
-from numba import njit
+
+from ...compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def group(members, n):
     """Positions of 0 … n−1 in `members`: where each one's begin, and the positions themselves."""
     begin = np.zeros(n + 1, np.int64)
@@ -28,13 +29,13 @@ def group(members, n):
     return begin, positions
 
 
-@njit(cache=True)
+@compiled
 def middle(corners, h):
     """Midpoint of a side, in the layout of its face."""
     return 0.5 * (corners[h // 3, h % 3] + corners[h // 3, (h % 3 + 1) % 3])
 
 
-@njit(cache=True)
+@compiled
 def find_sleeve(corners, edge_of, around, starts, start_points, ends, end_points, cost, leave, enter):
     """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
 
@@ -89,7 +90,7 @@ def find_sleeve(corners, edge_of, around, starts, start_points, ends, end_points
     return left[::-1], entered[::-1]
 
 
-@njit(cache=True)
+@compiled
 def unfold(corners, forward, left, entered):
     """Lay out a sleeve in the plane of its first face: tails and heads of the sides left, and the last face.
 
@@ -115,13 +116,13 @@ def unfold(corners, forward, left, entered):
     return tails, heads, over, placed
 
 
-@njit(cache=True)
+@compiled
 def turns(a, b):
     """Positive where b is counter-clockwise of a."""
     return a.real * b.imag - a.imag * b.real
 
 
-@njit(cache=True)
+@compiled
 def pull(tails, heads, over, start, end):
     """Pull a string tight inside an unfolded sleeve: the portals at which it bends, and whether to their left.
 
@@ -170,7 +171,7 @@ def pull(tails, heads, over, start, end):
     return bends, to_left, total + abs(end - apex)
 
 
-@njit(cache=True)
+@compiled
 def other_way(edge_of, forward, around, left, entered, tails, heads, bend, point):
     """The sleeve that passes the vertex of a bend on its other side; empty where no faces lead there."""
     begin, sides = around
@@ -209,13 +210,13 @@ def other_way(edge_of, forward, around, left, entered, tails, heads, bend, point
     return left[:0], entered[:0]
 
 
-@njit(cache=True)
+@compiled
 def turned(h, at_tail):
     """The other side of a face at the tail of a side, or at its head."""
     return h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
 
 
-@njit(cache=True)
+@compiled
 def point_in(faces, points, face):
     """The point of a face in its layout, from a list."""
     for s in range(len(faces)):
@@ -224,7 +225,7 @@ def point_in(faces, points, face):
     return points[0]
 
 
-@njit(cache=True)
+@compiled
 def straighten(corners, edge_of, forward, around, left, entered, starts, start_points, ends, end_points):
     """The shortest line in a sleeve, and in those that can be had from it by passing vertices on their other side.
 
@@ -273,7 +274,7 @@ def straighten(corners, edge_of, forward, around, left, entered, starts, start_p
     return left, fractions
 
 
-@njit(cache=True)
+@compiled
 def locate_end(corners, entered, placed, over, ends, end_points):
     """The end of a line in the plane of its sleeve's first face."""
     face = entered[-1] // 3
@@ -286,7 +287,7 @@ def locate_end(corners, entered, placed, over, ends, end_points):
     return placed[0] + ratio * (placed[1] - placed[0])
 
 
-@njit(cache=True)
+@compiled
 def shortest_lines(corners, edge_of, forward, n_edges, starts, start_points, start_at, ends, end_points, end_at):
     """Shortest lines for many pairs of places: sides crossed, fractions along them, and their number for each pair.
 

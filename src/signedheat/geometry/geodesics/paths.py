@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from ...errors import SourceError
 from ..intrinsic_mesh import LaidOutTriangles
 from ..surface_points import Places, barycentric_in, chained, locate, places_at, shared_faces, star
+from .path_kernels import shortest_lines
 
 
 def join(
@@ -66,8 +67,6 @@ def trace(triangles: LaidOutTriangles, start: Places, end: Places, name: str = "
     SourceError
         If no way along the surface leads from a start to its end.
     """
-    from .path_kernels import shortest_lines
-
     starts, ends = faces_at(triangles, start), faces_at(triangles, end)
     edges = triangles.edges
     sides, fractions, counts = shortest_lines(

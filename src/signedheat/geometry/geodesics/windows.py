@@ -9,20 +9,21 @@ along the direction (p, q > 0), σ their distance at the tail.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ...compiled import compiled
 
 POINT, BEAM, FOCUS = 1.0, 0.0, -1.0
 S0, S1, P, Q, SIGMA, KIND = range(6)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def put(window, rows, k):
     """Write a window to row k. By hand, as below: slices of arrays take long to compile."""
     for i in range(6):
         rows[k, i] = window[i]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def arrival(w, x, y):
     """From the source of a window to a point in the frame of its edge."""
     if w[KIND] == BEAM:
@@ -30,7 +31,7 @@ def arrival(w, x, y):
     return w[SIGMA] + w[KIND] * np.sqrt((x - w[P]) ** 2 + (y - w[Q]) ** 2)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def ray(w, x):
     """Direction of the light at a point of the edge; of any length."""
     if w[KIND] == BEAM:
@@ -38,7 +39,7 @@ def ray(w, x):
     return w[KIND] * (x - w[P]), -w[KIND] * w[Q]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def outrun(w, at_tail, at_head, length, slack):
     """Whether paths through an end of the edge reach all of the window sooner."""
     if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
@@ -46,7 +47,7 @@ def outrun(w, at_tail, at_head, length, slack):
     return at_head + length - w[S0] < arrival(w, w[S0], 0.0) - slack
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def trim(a, b):
     """Cut back two windows, a beginning first, where they overlap and the other is nearer."""
     if b[S0] >= a[S1]:
@@ -76,7 +77,7 @@ def trim(a, b):
             b[S1] = high
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def merge(a, b, length, tolerance):
     """Make a stand for b too, if the two are neighbours and one wave fits both: true where it does."""
     if abs(a[S1] - b[S0]) > 1e-6 * length:
@@ -114,7 +115,7 @@ def merge(a, b, length, tolerance):
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def clip(s0, s1, at_start, slope):
     """The part of [s0, s1] where ``at_start + slope s ≤ 0``."""
     if slope > 0.0:
@@ -126,7 +127,7 @@ def clip(s0, s1, at_start, slope):
     return s0, s1
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def hit(x0, dx, dy, ax, ay, bx, by):
     """Where on the segment from a to b, as a fraction, the ray from (x0, 0) along (dx, dy) meets its line."""
     ex, ey = bx - ax, by - ay

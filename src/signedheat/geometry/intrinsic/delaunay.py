@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..edges import EdgeTable
 from ..intrinsic_mesh import LaidOutTriangles
-
-if TYPE_CHECKING:
-    from .gluing_kernels import Gluing
+from .gluing_kernels import Gluing, settle
 
 
 def flip_to_delaunay(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = None) -> LaidOutTriangles:
@@ -49,8 +45,6 @@ def flip_to_delaunay(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_]
 
 def glue(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = None) -> Gluing:
     """Start an intrinsic triangulation, with an empty history."""
-    from .gluing_kernels import Gluing
-
     edges = triangles.edges
     edge, n_edges = edges.of_faces.ravel(), triangles.n_edges
     order = np.argsort(edge, kind="stable")
@@ -85,8 +79,6 @@ def glue(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = No
 
 def flip_all(gluing: Gluing) -> Gluing:
     """Flip to Delaunay; the same triangulation, with room for its longer history."""
-    from .gluing_kernels import settle
-
     n_edges = int(gluing.counts[1])
     gluing.counts[4] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)

@@ -9,10 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-kernel = njit(cache=True, error_model="numpy")  # without exceptions to unwind it compiles in half the time
+from ...compiled import compiled
+
+kernel = compiled(error_model="numpy")  # without exceptions to unwind it compiles in half the time
 
 FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
 """Kinds of steps in a history."""

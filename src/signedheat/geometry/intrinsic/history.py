@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..intrinsic_mesh import LaidOutTriangles
 from .delaunay import glue
+from .transfer_kernels import carry, walk_both_ways
 
 
 class Lines(NamedTuple):
@@ -85,8 +86,6 @@ class History:
         barycentric: NDArray[np.float64],
         vectors: NDArray[np.float64] | None,
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        from .transfer_kernels import carry
-
         faces, barycentric = np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64)
         vectors = np.zeros((len(faces), 0, 3)) if vectors is None else np.array(vectors, dtype=np.float64)
         n_faces = max(self.before.n_faces, self.after.n_faces)
@@ -112,8 +111,6 @@ def straight(
     vectors: NDArray[np.float64],
 ) -> Lines:
     """Straight lines given by their middle points and, as the first vector at each, their whole extent."""
-    from .transfer_kernels import walk_both_ways
-
     gluing = glue(triangles)
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
     halves[:, 0] *= 0.5

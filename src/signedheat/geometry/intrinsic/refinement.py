@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
-from .delaunay import doubled
-
-if TYPE_CHECKING:
-    from .gluing_kernels import Gluing
-    from .refinement_kernels import Agenda
+from .coincidence_kernels import coinciding
+from .delaunay import doubled, lay_out
+from .gluing_kernels import Gluing
+from .refinement_kernels import FULL, GROW, N_BINS, NARROW, PAUSED, Agenda, Goal, list_all, refine
 
 PER_FACE = ("tail", "edge", "forward", "front", "ring")
 PER_EDGE = ("start", "length", "fixed", "flips")
@@ -55,8 +53,6 @@ def refine_all(
     bool
         Whether it was finished before the limit.
     """
-    from .refinement_kernels import FULL, GROW, PAUSED, Goal, list_all, refine
-
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, max_vertices)
     list_all(gluing, agenda, goal)
@@ -93,9 +89,6 @@ def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
 
 def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:
     """The fixed edges, and what there is to do; boundary and nonmanifold edges become fixed."""
-    from .coincidence_kernels import coinciding
-    from .refinement_kernels import N_BINS, Agenda
-
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
     gluing.fixed[:n_edges] |= counts != 2
@@ -128,8 +121,6 @@ def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:
 
 def narrow_vertices(gluing: Gluing) -> NDArray[np.bool_]:
     """(n,) vertices at which two fixed edges meet, or the surface closes up, at less than 60°."""
-    from .refinement_kernels import NARROW
-
     corners, total = sectors(gluing)
     narrow = np.zeros(int(gluing.counts[2]), dtype=bool)
     narrow[gluing.tail[: len(corners)][total[corners] < NARROW]] = True
@@ -138,8 +129,6 @@ def narrow_vertices(gluing: Gluing) -> NDArray[np.bool_]:
 
 def sectors(gluing: Gluing) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Which sector every corner belongs to, and the angle of each: from fixed edge to fixed edge around a vertex."""
-    from .delaunay import lay_out
-
     n = 3 * int(gluing.counts[0])
     h = np.flatnonzero(~gluing.fixed[gluing.edge[:n]])
     t = gluing.ring[h]

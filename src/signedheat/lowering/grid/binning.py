@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from ...operators.grid.node_sources import STRETCH, NodeSources, with_room
 
 
@@ -59,7 +59,7 @@ def merge_in_cells(
     return samples, NodeSources(sources.places, nodes, sources.shape, sources.steps)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _merge(corners, vectors, weights, components, order, shape, size, slots, nodes, places, scale):
     """Sums of weight · position, vector and weight per (component, cell).
 

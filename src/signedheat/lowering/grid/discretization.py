@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...discretization import Diagnostics, discretize
+from ...discretization import discretize
 from ...domains.grid import Grid
 from ...errors import MemoryLimitError, SourceError
-from ...fields.grid_field import GridField
+from ...operators.grid.multilevel import Level, collapse, diffuse_on_pyramid
+from ...operators.grid.readout import unit_vectors
+from ...operators.grid.stencil import divergence
+from ...operators.grid.wavefront import padded_shape
 from ..area_elements import sample_on_grid
 from .integration import GridIntegration
+from .masked import MaskedGridDiscretization
 from .source import GridSource
-
-if TYPE_CHECKING:
-    from ...operators.grid.multilevel import Level
 
 SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the pieces into which faces are cut."""
@@ -72,31 +73,15 @@ class GridDiscretization:
         return GridSource(samples, self.grid, diffusion)
 
     def diffuse(self, source: GridSource) -> list[Level]:
-        from ...operators.grid.multilevel import diffuse_on_pyramid
-
         return diffuse_on_pyramid(source.vectors, source.time_on, source.finest)
 
     def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
-        from ...operators.grid.multilevel import collapse
-        from ...operators.grid.readout import unit_vectors
-        from ...operators.grid.wavefront import padded_shape
-
         dimension = self.grid.dimension
         directions = collapse(vectors, padded_shape(self.grid.shape), dimension, unit_vectors)
         return np.moveaxis(directions.reshape(dimension, *self.grid.shape), 0, -1)
 
     def divergence(self, directions: NDArray[np.floating]) -> NDArray[np.float64]:
-        from ...operators.grid.stencil import divergence
-
         return divergence(directions, self.grid.spacing)
-
-    def field(self, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics) -> GridField:
-        notes = {
-            "samples": len(source.weights),
-            "area outside the grid": source.samples.outside,
-            "area that cancels": source.samples.cancelled,
-        }
-        return GridField(self.grid, values, replace(diagnostics, notes={**diagnostics.notes, **notes}))
 
 
 @discretize.register
@@ -105,7 +90,5 @@ def _(domain: Grid) -> GridDiscretization:
         raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}")
     refuse_beyond_memory(domain)
     if domain.mask is not None:
-        from .masked import MaskedGridDiscretization
-
         return MaskedGridDiscretization(domain)
     return GridDiscretization(domain)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...compiled import compiled
 from ...domains.grid import Grid
 
 ECHO = 3
@@ -120,7 +120,7 @@ class OpenNodes:
         return _see(self.indices, targets, self.grid.mask.ravel(), counts, strides)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _see(starts, targets, solid, counts, strides):
     n, dimension = starts.shape
     seen = np.ones(n, dtype=np.bool_)

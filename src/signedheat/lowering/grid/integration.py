@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 
 from ...discretization import Levels
 from ...domains.grid import Grid
+from ...operators.grid.multilevel import collapse, diffuse_on_pyramid, leave_out
+from ...operators.grid.node_sources import NodeSources
+from ...operators.grid.readout import quotients
+from ...operators.grid.stencil import interpolation_stencil, laplacian, solve_poisson
 from .source import GridSource
 
 TOLERANCE = 1e-6
@@ -27,8 +31,6 @@ class GridIntegration:
     grid: Grid
 
     def solve(self, divergence: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
-        from ...operators.grid.stencil import solve_poisson
-
         phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
         phi -= np.average(source.at_samples(phi), weights=source.weights)
         return phi
@@ -72,8 +74,6 @@ class GridIntegration:
         start: NDArray[np.float64],
     ) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the deviations from the levels."""
-        from ...operators.grid.stencil import laplacian, solve_poisson
-
         volume = float(np.prod(self.grid.spacing))
         rows, weights = source.rows, source.weights / volume
         free = Levels(np.zeros_like(levels.values), levels.groups)
@@ -111,11 +111,6 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
 
     It varies slowly, so the finest level of the pyramid is left out.
     """
-    from ...operators.grid.multilevel import collapse, diffuse_on_pyramid, leave_out
-    from ...operators.grid.node_sources import NodeSources
-    from ...operators.grid.readout import quotients
-    from ...operators.grid.stencil import interpolation_stencil
-
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -12,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...discretization import Diagnostics, Levels
+from ...discretization import Levels
 from ...domains.grid import Grid
-from ...errors import UnreachedWarning
-from ...fields.grid_field import GridField
+from ...geometry.directions import unit
+from ...geometry.visibility import uphill_roots
 from ...linear import factorize, upper_triangle
+from ...linear.krylov import IncompleteCholesky, outward_order
 from ...linear.stages import solve_in_stages
-from ...method import unit
 from ..area_elements import sample_on_grid
 from ..direct_integration import DirectIntegration
 from ..tets.discretization import from_first
@@ -79,8 +78,6 @@ class MaskedGridDiscretization:
         solid nodes, or leads past the end of a source that a wall ends, the way to it is bent, and has the direction in
         which undirected heat falls (Crane et al. 2013). Its side is the one that this heat has come from.
         """
-        from ...geometry.visibility import uphill_roots
-
         nodes, dimension = self.nodes, self.grid.dimension
         vectors = np.zeros((len(nodes.ids), dimension + 1))
         slopes, heights = np.zeros((len(nodes.ids), dimension)), np.full(len(nodes.ids), -np.inf)
@@ -108,7 +105,6 @@ class MaskedGridDiscretization:
                 self._factors.clear()
                 self._factors[time] = factorize(matrix)
             return self._factors[time].solve
-        from ...linear.krylov import IncompleteCholesky, outward_order
 
         def solve(loads: NDArray[np.float64]) -> NDArray[np.float64]:
             order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
@@ -139,26 +135,6 @@ class MaskedGridDiscretization:
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
         """b, the right-hand side of ``C φ = b``."""
         return self.nodes.divergence(directions)
-
-    def field(self, values: NDArray[np.float64], source: MaskedSource, diagnostics: Diagnostics) -> GridField:
-        """φ at the nodes of the grid, NaN at solid ones."""
-        everywhere = np.full(self.grid.n_nodes, np.nan)
-        everywhere[self.nodes.ids] = values
-        unreached = self.nodes.ids[np.isnan(values)]
-        if len(unreached):
-            warnings.warn(
-                f"{len(unreached)} of {len(values)} open nodes are cut off from every source by solid ones: the "
-                "distance there is NaN",
-                UnreachedWarning,
-                stacklevel=2,
-            )
-        notes = {
-            "samples": len(source.weights),
-            "area outside the grid": source.whole.samples.outside,
-            "area that cancels": source.whole.samples.cancelled,
-        }
-        found = replace(diagnostics, unreached=unreached, notes={**diagnostics.notes, **notes})
-        return GridField(self.grid, everywhere.reshape(self.grid.shape), found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...domains.grid import Grid
+from ...operators.grid.node_sources import NodeSources
+from ...operators.grid.stencil import interpolation_stencil
 from ..area_elements import AreaSamples
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
-
-    from ...operators.grid.node_sources import NodeSources
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +62,6 @@ class GridSource:
     @cached_property
     def stencil(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Nodes and weights that interpolate at each sample."""
-        from ...operators.grid.stencil import interpolation_stencil
-
         return interpolation_stencil(self.samples.positions, self.grid.shape)
 
     @cached_property

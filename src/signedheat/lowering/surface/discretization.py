@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -12,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...discretization import Diagnostics, discretize
+from ...discretization import discretize
+from ...domains.segments import in_pieces
 from ...domains.triangle_mesh import TriangleMesh
-from ...errors import GeometryError, UnreachedWarning
-from ...fields.vertex_field import VertexField
+from ...errors import GeometryError
+from ...geometry.intrinsic.conforming_refinement import embed
 from ...geometry.intrinsic_mesh import LaidOutTriangles
 from ...geometry.mollification import mollify
 from ...linear import elimination_order, factorize
 from ...operators.cotan import cotan_matrix, divergence
 from ..direct_integration import DirectIntegration
+from .nonmanifold_frames import facing
+from .source import surface_source
 from .vector_heat import VectorHeat
 
 
@@ -82,10 +84,6 @@ class SurfaceDiscretization:
         """Unoriented curves and points inside faces get edges and vertices; nonmanifold edges are told from where."""
         if self.bring is not None:
             sources = [self.bring(source) for source in sources]
-        from ...geometry.curve_segments import in_pieces
-        from ...geometry.intrinsic.conforming_refinement import embed
-        from .nonmanifold_frames import facing
-
         positions = self.positions
         if positions is None and self.bring is None:
             positions = self.domain.triangulation.vertices
@@ -121,8 +119,6 @@ class SurfaceDiscretization:
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
         """X₀ and the rows that interpolate φ along the sources."""
-        from .source import surface_source
-
         return surface_source(self.triangles, sources, diffusion, self.spacing)
 
     def diffuse(self, source: Any) -> list[NDArray[np.complex128]]:
@@ -150,23 +146,7 @@ class SurfaceDiscretization:
         """b, the right-hand side of ``C φ = b``."""
         return divergence(self.triangles, directions)
 
-    def field(self, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> VertexField:
-        """φ at the vertices of the domain; NaN where nothing was diffused, beyond single vertices for instance."""
-        values = np.where(self._reached_by(source.vectors), values, np.nan)
-        if self.restriction is not None:
-            values = values[self.restriction]
-        unreached = np.flatnonzero(np.isnan(values))
-        if len(unreached):
-            warnings.warn(
-                f"no source is connected to {len(unreached)} of {len(values)} vertices, the first of them number "
-                f"{unreached[0]}: distance there is NaN. Put a source on every part, or join the parts",
-                UnreachedWarning,
-                stacklevel=3,
-            )
-        diagnostics = replace(diagnostics, unreached=unreached, notes={**diagnostics.notes, **self.notes})
-        return VertexField(self.domain, values, diagnostics, source)
-
-    def _reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
+    def reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
         """(n_vertices,) whether a vertex has a face on a part that holds vectors. Vectors only pass along edges."""
         parts = self.triangles.face_parts
         if not parts.any():

@@ -40,7 +40,7 @@ def facing(
     Examples
     --------
     >>> from signedheat.domains.curves import Curve
-    >>> from signedheat.geometry.curve_segments import in_pieces
+    >>> from signedheat.domains.segments import in_pieces
     >>> three = LaidOutTriangles.from_lengths(np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]), np.ones((3, 3)), 5)
     >>> on_the_last = in_pieces([Curve([2, 2], [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])], three)
     >>> facing(three, on_the_last)[0].first_sides.tolist()

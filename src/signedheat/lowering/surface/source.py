@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, csr_matrix, vstack
 from scipy.sparse.csgraph import connected_components
 
+from ...domains.segments import in_pieces
 from ...errors import SourceError
-from ...geometry.curve_segments import Pieces, in_pieces, rows_of
+from ...geometry.curve_segments import Pieces, rows_of
 from ...geometry.intrinsic_mesh import LaidOutTriangles
 from ...geometry.surface_points import FACE, VERTEX, Places, chained, distinct, places_at, star
 from .free_ends import free_end_arcs

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ...geometry.intrinsic_mesh import LaidOutTriangles
+from ...geometry.triangle_kernels import extremes
 from ...linear import Factor, factorize
 from ...operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
 
@@ -62,8 +63,6 @@ class VectorHeat:
         return [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
 
     def _carried_on(self, start: NDArray[np.complex128], near: NDArray[np.complex128]) -> list[NDArray[np.complex128]]:
-        from ...geometry.triangle_kernels import extremes
-
         stages = [near]
         smallest, largest = extremes(near)
         if smallest >= _FAINT * largest:

@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...discretization import Diagnostics, discretize
+from ...discretization import discretize
 from ...domains.tet_mesh import TetMesh
-from ...errors import UnreachedWarning
-from ...fields.tet_field import TetField
+from ...geometry.directions import unit
+from ...geometry.tet_clipping import Planes
+from ...geometry.visibility import tet_neighbors, uphill_roots, visible
 from ...linear import factorize, upper_triangle, whole
+from ...linear.krylov import IncompleteCholesky, outward_order
 from ...linear.stages import solve_in_stages
-from ...method import unit
 from .integration import TetIntegration
-
-if TYPE_CHECKING:
-    from ...geometry.tet_clipping import Planes
-    from ...linear.krylov import IncompleteCholesky
-    from .source import TetSource
+from .source import TetSource, tet_source
 
 DIRECT_FACES = 20_000
 """Up to this number of faces step 1 is factorised: that grows like n², conjugate gradients like n⁴ᐟ³."""
@@ -58,8 +54,6 @@ class TetDiscretization:
     @cached_property
     def planes(self) -> Planes:
         """The planes of the faces, against which sources are clipped."""
-        from ...geometry.tet_clipping import Planes
-
         return Planes.of(self.mesh)
 
     @cached_property
@@ -103,8 +97,6 @@ class TetDiscretization:
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> TetSource:
         """X₀ and the rows that average φ over the sources."""
-        from .source import tet_source
-
         return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
 
     def diffuse(self, source: TetSource) -> NDArray[np.float64]:
@@ -153,8 +145,6 @@ class TetDiscretization:
         """
         from scipy.spatial import cKDTree
 
-        from ...geometry.visibility import tet_neighbors, uphill_roots, visible
-
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[cKDTree(source.centers).query(centers)[1]]
         neighbors = tet_neighbors(self.mesh.faces)
@@ -173,8 +163,6 @@ class TetDiscretization:
                 self._factors.clear()
                 self._factors[time] = factorize(matrix)
             return self._factors[time].solve(loads)
-        from ...linear.krylov import IncompleteCholesky, outward_order
-
         order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
         return IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
 
@@ -217,27 +205,9 @@ class TetDiscretization:
         counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[known], n)
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
-    def field(self, values: NDArray[np.float64], source: TetSource, diagnostics: Diagnostics) -> TetField:
-        """φ at the vertices of the mesh."""
-        at_vertices = self.at_vertices(values)
-        unreached = np.flatnonzero(np.isnan(at_vertices))
-        if np.isnan(values).any():
-            warnings.warn(
-                f"{np.isnan(values[self.unknowns]).any(axis=1).sum()} of {self.mesh.n_tets} tets are not connected to "
-                "any source through faces: the distance there is NaN",
-                UnreachedWarning,
-                stacklevel=2,
-            )
-        notes = {**diagnostics.notes, **source.notes}
-        if len(self.mesh.reoriented):
-            notes["tets turned"] = len(self.mesh.reoriented)
-        return TetField(self.mesh, at_vertices, replace(diagnostics, unreached=unreached, notes=notes), source)
-
 
 def from_first(matrix: sparse.csr_matrix) -> IncompleteCholesky:
     """Conjugate gradients on a matrix given by its upper triangle, in the order of its own graph from unknown 0."""
-    from ...linear.krylov import IncompleteCholesky, outward_order
-
     full = whole(matrix)
     _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
     return IncompleteCholesky.of(full, outward_order(full, first))

@@ -12,8 +12,8 @@ from scipy import sparse
 
 from ...domains.tet_mesh import TetMesh
 from ...errors import SourceError
+from ...geometry.directions import unit
 from ...geometry.tet_clipping import Pieces, Planes, barycentric, clip_triangles, locate
-from ...method import unit
 from ..area_elements import AreaElements, area_elements
 
 WHOLE = 1 - 1e-6

@@ -8,9 +8,9 @@ unused in fewer dimensions.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from ...errors import OutsideError
 from .stencil import by_slabs
 from .wavefront import padded_shape, sweep_lines
@@ -48,7 +48,7 @@ def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float6
     return result.reshape(values.shape)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _crossed_edges(field):
     """(e, 5) node and axis of each edge whose ends differ in sign; zero counts as positive."""
     n0, n1, n2, n3 = field.shape
@@ -83,7 +83,7 @@ def _crossed_edges(field):
     return edges[:count]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _cubic(field, place, weights, gradient):
     """Value of the cubic convolution interpolant (Keys 1981) at a place in cells; its gradient goes to `gradient`."""
     base = np.empty(4, dtype=np.int64)
@@ -135,7 +135,7 @@ def _cubic(field, place, weights, gradient):
     return value
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _crossings(field, edges, steps):
     """(e, 18) position, unit normal and shape operator (symmetric, ten numbers) of the zero set at crossed edges."""
     result = np.zeros((len(edges), 18))
@@ -204,7 +204,7 @@ def _crossings(field, edges, steps):
     return result
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _seed(nearest, squares, edges, points, steps):
     """Both ends of a crossed edge begin with its crossing."""
     for e in range(len(edges)):
@@ -220,7 +220,7 @@ def _seed(nearest, squares, edges, points, steps):
                 nearest[i, j, k, m] = e
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _nearest_tiles(nearest, squares, points, steps, tiles):
     """Take over the nearest crossing of lines already visited, and along each line both ways."""
     n0, n1, n2, n = nearest.shape
@@ -257,7 +257,7 @@ def _nearest_tiles(nearest, squares, points, steps, tiles):
                             p = own[m]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
     """Distance to the touching circle in the plane of node, crossing and normal.
 

@@ -16,9 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from .node_sources import STRETCH, NodeSources
 from .stencil import by_slabs
 from .sweeps import TINY, diffuse_by_sweeps
@@ -237,7 +237,7 @@ def collapse(
     return result
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _carry(vectors, inside, factors, power, coarse, counts):
     """Vectors at the nodes that both grids share, with their lengths raised to a power; how many in each stretch."""
     n0, n1, n2, n3 = vectors.shape[:4]
@@ -259,7 +259,7 @@ def _carry(vectors, inside, factors, power, coarse, counts):
                         counts[a, b, c, d // STRETCH] += 1
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
+@compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
 def _interpolate(coarse, factors, out, axis, start, stop):
     """Values of a coarser grid at all nodes, linear along every axis that was halved."""
     _, n0, n1, n2, n = out.shape

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ...compiled import compiled
 
 STRETCH = 8
 """Nodes of a line that are stored, swept, or left out, together."""
@@ -63,7 +64,7 @@ class NodeSources:
         return NodeSources(coarse.places, sums, shape, steps)
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def with_room(sums, used, more):
     """Rows enough for `more` beyond those that are used."""
     if used + more <= sums.shape[0]:
@@ -76,7 +77,7 @@ def with_room(sums, used, more):
     return grown
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _scatter(nodes, weights, values, places, sums, n):
     used = sums.shape[0]
     for s in range(nodes.shape[0]):
@@ -94,7 +95,7 @@ def _scatter(nodes, weights, values, places, sums, n):
     return sums[:used]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _restrict(places, sums, shape, factors, coarse_places, coarse):
     used = coarse.shape[0]
     for i in range(shape[0]):

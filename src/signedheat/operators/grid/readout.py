@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiled import compiled
 from .node_sources import STRETCH
 from .sweeps import TINY
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
+@compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
 def unit_vectors(vectors, inside, out, axis, start, stop):
     """The vectors scaled to length one, where they are not lost beneath the range of numbers."""
     dimension, n0, n1, n2, n = out.shape
@@ -34,7 +34,7 @@ def unit_vectors(vectors, inside, out, axis, start, stop):
                             out[d, i, j, k, m] = factor * line[m, d]
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def quotients(vectors, inside, out, axis, start, stop):
     """Second component over first."""
     _, n0, n1, n2, n = out.shape

@@ -11,9 +11,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from ...parallel import n_threads
 from .wavefront import SMALL, padded_shape
 
@@ -106,7 +106,7 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
             job.result()
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _divide(values0, values1, values2, values3, transformed, axis, start, stop):
     """Divide by sums of one-dimensional eigenvalues; where they are zero the quotient is."""
     n0, n1, n2, n = transformed.shape
@@ -121,7 +121,7 @@ def _divide(values0, values1, values2, values3, transformed, axis, start, stop):
                     line[0] = 0.0
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
+@compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
 def _divergence(components, scales, out, axis, start, stop):
     dimension = components.shape[0]
     n0, n1, n2, n = out.shape

@@ -8,9 +8,9 @@ other axes lines are updated in order, in every combination of directions.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from .node_sources import STRETCH, NodeSources
 from .wavefront import sweep_lines
 
@@ -78,7 +78,7 @@ def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[
     return table.astype(np.float32)
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
+@compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
 def _sweep_tiles(vectors, sums, places, active, shape, ratios, pivots, tiles):
     """Update the lines of tiles in order: four components side by side. Parts of lines are sliced, for vector code."""
     n0, n1, n2, n = shape

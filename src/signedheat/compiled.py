@@ -1,0 +1,71 @@
+"""Kernels: loops compiled by Numba when they are first called, so that importing them costs nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, update_wrapper
+from threading import RLock
+from typing import Any, overload
+
+_LOCK = RLock()
+
+prange = range
+"""Iterations that may run at the same time, in kernels compiled with ``parallel=True``."""
+
+
+class Kernel:
+    """A function that Numba compiles at its first call; kept on disk afterwards. Kernels may call kernels.
+
+    Examples
+    --------
+    >>> @compiled
+    ... def twice(x):
+    ...     return 2 * x
+    >>> twice(1.5)
+    3.0
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.function = function
+        self.options = options
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.dispatcher(*arguments)
+
+    @cached_property
+    def dispatcher(self) -> Callable[..., Any]:
+        """What Numba makes of the function; the function itself where ``NUMBA_DISABLE_JIT`` is set."""
+        with _LOCK:
+            compiler = _compiler()
+            if "prange" in self.function.__globals__:
+                self.function.__globals__["prange"] = _parallel_range()
+            return compiler(cache=True, **self.options)(self.function)  # type: ignore[no-any-return]
+
+
+@overload
+def compiled(function: Callable[..., Any]) -> Kernel: ...
+@overload
+def compiled(**options: Any) -> Callable[[Callable[..., Any]], Kernel]: ...
+def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """Make a function a kernel: ``@compiled``, or ``@compiled(nogil=True)`` with options of ``numba.njit``."""
+    if function is not None:
+        return Kernel(function, options)
+    return lambda function: Kernel(function, options)
+
+
+def _compiler() -> Any:
+    """``numba.njit``, which from now on takes kernels in compiled code for what they are."""
+    import numba
+    from numba.core import types
+    from numba.extending import typeof_impl
+
+    if Kernel not in typeof_impl.registry:
+        typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.dispatcher))
+    return numba.njit
+
+
+def _parallel_range() -> Any:
+    import numba
+
+    return numba.prange

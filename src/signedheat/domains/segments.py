@@ -1,0 +1,104 @@
+"""Curves and points cut into the segments that a set of triangles sees of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SourceError
+from ..geometry.curve_segments import Pieces, given_directions
+from ..geometry.geodesics.paths import join
+from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.surface_points import barycentric_in, distinct, locate, shared_faces
+from .curves import Curve, SurfacePoints
+
+
+@singledispatch
+def pieces(
+    source: Any, triangles: LaidOutTriangles, positions: NDArray[np.float64] | None = None, number: int = 0
+) -> Pieces:
+    """Cut a source into pieces.
+
+    Parameters
+    ----------
+    source : Curve, SurfacePoints or Pieces
+        Face ids refer to `triangles`. Points of a curve that share no face are joined by a shortest line.
+    triangles : LaidOutTriangles
+        The surface.
+    positions : (n_vertices, 3) or (m, 3, 3) float, optional
+        Vertices in space, or the corners of each face where faces lie in planes of their own, for curves whose normals
+        are given.
+    number : int
+        Which of the sources this is, for messages.
+
+    Raises
+    ------
+    SourceError
+        If the source does not fit the surface.
+    """
+    raise SourceError(
+        f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a Curve or SurfacePoints "
+        "(see the domain's path, polyline, level_set and points_at)"
+    )
+
+
+def in_pieces(
+    sources: Sequence[Any], triangles: LaidOutTriangles, positions: NDArray[np.float64] | None = None
+) -> list[list[Pieces]]:
+    """Each of several sources in pieces; a sequence of curves and points counts as one source."""
+    return [
+        [pieces(item, triangles, positions, number) for item in (source if isinstance(source, Sequence) else [source])]
+        for number, source in enumerate(sources)
+    ]
+
+
+@pieces.register
+def _(source: Pieces, triangles: LaidOutTriangles, positions: Any = None, number: int = 0) -> Pieces:
+    return source
+
+
+@pieces.register
+def _(source: SurfacePoints, triangles: LaidOutTriangles, positions: Any = None, number: int = 0) -> Pieces:
+    places = locate(triangles, source.faces, source.barycentric, f"source {number}: point")
+    none = np.empty(0, dtype=np.int64)
+    return Pieces(places[distinct(places)[0]], np.empty((0, 2), np.int64), none, none, np.empty(0, complex), False)
+
+
+@pieces.register
+def _(source: Curve, triangles: LaidOutTriangles, positions: Any = None, number: int = 0) -> Pieces:
+    name = f"curve {number}"
+    places = locate(triangles, source.faces, source.barycentric, f"{name}: point")
+    start = np.arange(source.n_segments)
+    places, start, end, segment = join(triangles, places, start, (start + 1) % source.n_points, name)
+    faces = shared_faces(triangles, places[start], places[end])
+    first, who = distinct(places)
+    ends = np.stack([who[start], who[end]], axis=1)
+    at_start = barycentric_in(triangles, faces, places[start])
+    at_end = barycentric_in(triangles, faces, places[end])
+    corners = triangles.corner_positions[faces]
+    steps = ((at_end - at_start) * corners).sum(axis=1)
+    keep = (ends[:, 0] != ends[:, 1]) & (np.abs(steps) > 0)
+    if not keep.any():
+        raise SourceError(f"{name} has no length: all its points coincide; use SurfacePoints for isolated points")
+
+    empty = (at_start == 0) & (at_end == 0)
+    sides = (empty.argmax(axis=1) + 1) % 3
+    along = empty.any(axis=1)
+    edges = np.where(along, triangles.edges.of_faces[faces, sides], -1)
+    faces, edges, sides, steps, along, ends, segment = (
+        a[keep] for a in (faces, edges, sides, steps, along, ends, segment)
+    )
+    vectors = 1j * steps
+    forward = np.where(triangles.edges.forward[faces, sides], 1, -1)
+    of_edge = triangles.edge_vectors[faces, sides]
+    ahead = np.sign((np.conj(of_edge) * steps).real) * forward
+    vectors = np.where(along, 1j * ahead * np.abs(steps), vectors)
+    if source.normals is not None and source.oriented:
+        if positions is None:
+            raise SourceError(f"{name} has normals in space, but this surface has no positions: leave the normals out")
+        vectors = np.abs(steps) * given_directions(triangles, positions, faces, edges, source.normals[segment], name)
+    return Pieces(places[first], ends, faces, edges, vectors, source.oriented)

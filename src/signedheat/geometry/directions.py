@@ -1,0 +1,45 @@
+"""Directions of vectors, however long or short they are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def unit(vectors: NDArray[Any]) -> NDArray[Any]:
+    """Vectors scaled to length one; complex numbers are plane vectors, rows of a real array vectors in space.
+
+    Divides by the largest component first, because X falls like exp(−r/√t) and its square underflows long before it.
+
+    Examples
+    --------
+    >>> unit(np.array([[3e-300, 4e-300], [0.0, 0.0]]))
+    array([[0.6, 0.8],
+           [0. , 0. ]])
+    >>> unit(np.array([3e-300 + 4e-300j]))
+    array([0.6+0.8j])
+    """
+    if np.iscomplexobj(vectors):
+        length = np.abs(vectors)  # NumPy's, too, neither overflows nor underflows on the way
+        return vectors / np.where(length > 0, length, 1)
+    result = np.empty_like(vectors)
+    for block in _blocks(vectors.shape):
+        part = vectors[block]
+        largest = np.abs(part).max(axis=-1, keepdims=True)
+        scaled = part / np.where(largest > 0, largest, 1)
+        length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
+        np.divide(scaled, np.where(length > 0, length, 1), out=result[block])
+    return result
+
+
+def _blocks(shape: tuple[int, ...], size: int = 2**16) -> list[Any]:
+    """Slices of the leading axes into blocks of about `size` vectors, which stay in the cache."""
+    if len(shape) == 1 or np.prod(shape[:-1]) <= size:
+        return [...]
+    inner = int(np.prod(shape[1:-1], dtype=np.int64))
+    if inner <= size:
+        rows = max(1, size // inner)
+        return [(slice(start, start + rows),) for start in range(0, shape[0], rows)]
+    return [(slice(i, i + 1), *(() if b is ... else b)) for i in range(shape[0]) for b in _blocks(shape[1:], size)]

@@ -1,0 +1,32 @@
+"""How long steps take, and how far they are."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+logger = logging.getLogger("signedheat")
+
+Progress = Callable[[float, str], None]
+"""Called with the fraction done, from 0 to 1, and the name of the step that begins."""
+
+
+class Stopwatch:
+    """Times named steps, logs them, and reports progress."""
+
+    def __init__(self, progress: Progress | None, steps: int) -> None:
+        self.seconds: dict[str, float] = {}
+        self._progress, self._steps = progress, steps
+
+    @contextmanager
+    def __call__(self, step: str) -> Iterator[None]:
+        if self._progress is not None:
+            self._progress(len(self.seconds) / self._steps, step)
+        begin = time.perf_counter()
+        yield
+        self.seconds[step] = time.perf_counter() - begin
+        logger.info("%s: %.3f s", step, self.seconds[step])
+        if self._progress is not None and len(self.seconds) == self._steps:
+            self._progress(1.0, "done")

@@ -1,0 +1,39 @@
+"""Functions that a higher floor provides, so that a lower one can call them and never import it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Slot(Generic[P, R]):
+    """A function that is called here and written on a higher floor, which puts it in when it is imported.
+
+    ``import signedheat`` imports every floor, so that no slot is ever found empty by a user.
+
+    Examples
+    --------
+    >>> save: Slot[[str], int] = Slot("save")
+    >>> @save.provide
+    ... def _(path: str) -> int:
+    ...     return len(path)
+    >>> save("ball.stl")
+    8
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._function: Callable[P, R] | None = None
+
+    def provide(self, function: Callable[P, R]) -> Callable[P, R]:
+        """Put a function in; usable as a decorator."""
+        self._function = function
+        return function
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        if self._function is None:
+            raise RuntimeError(f"nothing provides {self.name}: import signedheat first")
+        return self._function(*args, **kwargs)
