@@ -3,7 +3,7 @@
 import numpy as np
 
 import signedheat as sh
-from signedheat.geometry.intrinsic_mesh import LaidOutTriangles
+from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
 
 
 def split_quads(a, b, c, d, rng):
@@ -83,12 +83,12 @@ class FlatGluing:
 
     @property
     def surface(self):
-        return LaidOutTriangles.from_lengths(self.vertices(), self.lengths, self.n * self.m)
+        return IntrinsicMesh.from_lengths(self.vertices(), self.lengths, self.n * self.m)
 
     @property
     def cover(self):
         both = np.concatenate([self.vertices(0), self.vertices(1)])
-        return LaidOutTriangles.from_lengths(both, np.concatenate([self.lengths] * 2), 2 * self.n * self.m)
+        return IntrinsicMesh.from_lengths(both, np.concatenate([self.lengths] * 2), 2 * self.n * self.m)
 
     @property
     def below(self):

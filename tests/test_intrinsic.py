@@ -10,7 +10,7 @@ from surface_cases import band, book, flipped, sphere, square
 
 import signedheat as sh
 from signedheat.geometry.intrinsic.delaunay import flip_to_delaunay
-from signedheat.geometry.intrinsic_mesh import LaidOutTriangles
+from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
 
 
 def squashed(mesh, factor=6.0):
@@ -301,7 +301,7 @@ def test_fixed_edges_keep_their_numbers():
     after = flip_to_delaunay(triangles, fixed)
     before = np.sort(triangles.edges.vertices[fixed], axis=1)
     np.testing.assert_array_equal(np.sort(after.edges.vertices[fixed], axis=1), before)
-    assert isinstance(after, LaidOutTriangles) and after.n_edges == triangles.n_edges
+    assert isinstance(after, IntrinsicMesh) and after.n_edges == triangles.n_edges
 
 
 def test_vertices_that_all_but_coincide():

@@ -10,7 +10,7 @@ from signedheat.discretization import discretize
 from signedheat.extensions.jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 from signedheat.fields.piecewise_field import chains
 from signedheat.geometry.face_pairs import face_pairs
-from signedheat.geometry.intrinsic_mesh import LaidOutTriangles
+from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
 from signedheat.samples import sphere, torus
 
 
@@ -295,7 +295,7 @@ def test_nonmanifold_edge():
         a, b, c, d = 2 + 4 * k + np.arange(4)
         faces += [[0, a, b], [0, b, 1], [a, c, d], [a, d, b]]
     mesh = sh.TriangleMesh(vertices, faces)
-    pairs = face_pairs(LaidOutTriangles.from_lengths(mesh.faces, np.ones((12, 3)), 14, mesh.edges))
+    pairs = face_pairs(IntrinsicMesh.from_lengths(mesh.faces, np.ones((12, 3)), 14, mesh.edges))
     spine = np.flatnonzero(pairs.shares == 0.5)
     assert len(spine) == 3 and len(np.unique(pairs.faces[spine])) == 3
     phi = sh.piecewise_distance(mesh, mesh.path([2, 3]))

@@ -10,7 +10,7 @@ import numpy as np
 from ..domains.curves import Curve
 from ..domains.segments import pieces
 from ..geometry.geodesics.paths import gaps
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import EDGE, FACE, VERTEX, locate
 
 NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
@@ -20,11 +20,11 @@ def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
     """One row per source: where its points lie, how its segments run, length, open ends."""
     mesh = surface.triangulation
     lengths = mesh.edge_lengths[mesh.edges.of_faces]
-    triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
+    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     return [report(triangles, source, number) for number, source in enumerate(sources)]
 
 
-def report(triangles: LaidOutTriangles, source: Any, number: int) -> dict[str, Any]:
+def report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
     """One source in numbers."""
     places = locate(triangles, source.faces, source.barycentric, f"source {number}: point")
     kinds = np.bincount(places.kinds, minlength=3)

@@ -23,7 +23,7 @@ from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
 from ..geometry.intrinsic.refinement import refine_all
 from ..geometry.intrinsic.transfer import Embedding, carry_pieces
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.mollification import mollify
 from ..progress import Progress, Stopwatch
 from .segments import in_pieces, pieces
@@ -48,7 +48,7 @@ class IntrinsicTriangulation:
     ----------
     mesh : TriangleMesh
         What is triangulated.
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The triangles: vertices, edges and shapes. Two edges may join the same two vertices, or a vertex with itself.
     marked : (e,) bool
         Edges along which the kept curves run.
@@ -61,12 +61,12 @@ class IntrinsicTriangulation:
     """
 
     mesh: TriangleMesh
-    triangles: LaidOutTriangles
+    triangles: IntrinsicMesh
     marked: NDArray[np.bool_]
     goal: float
     complete: bool
     close: NDArray[np.bool_] = field(repr=False)
-    base: LaidOutTriangles = field(repr=False)
+    base: IntrinsicMesh = field(repr=False)
     embedding: Embedding = field(repr=False)
     history: History = field(repr=False)
 
@@ -259,9 +259,9 @@ def intrinsic_delaunay(
     return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, embedding, history)
 
 
-def laid_out(mesh: TriangleMesh) -> tuple[LaidOutTriangles, float]:
-    """A mesh as laid-out triangles, none of them quite flat; and the length that was added to all edges for that."""
+def laid_out(mesh: TriangleMesh) -> tuple[IntrinsicMesh, float]:
+    """A mesh as intrinsic mesh, none of them quite flat; and the length that was added to all edges for that."""
     lengths, added = mollify(mesh.edge_lengths[mesh.edges.of_faces], MARGIN)
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
-    return LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added
+    return IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SourceError
 from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.paths import join
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.meshes import Triangles
 from ..geometry.nearest import nearest_on_triangles
 from ..geometry.surface_points import locate
@@ -32,7 +32,7 @@ def projected_curve(
             f"and at most {max_distance:.6g} is allowed: check units and placement, or raise max_distance"
         )
     lengths = np.linalg.norm(np.roll(mesh.vertices[mesh.faces], -1, axis=1) - mesh.vertices[mesh.faces], axis=2)
-    triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
+    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     start = np.arange(len(points) if closed else len(points) - 1)
     places, starts, ends, _ = join(
         triangles, locate(triangles, faces, weights), start, (start + 1) % len(points), "polyline"

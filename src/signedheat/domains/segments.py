@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from ..errors import SourceError
 from ..geometry.curve_segments import Pieces, given_directions
 from ..geometry.geodesics.paths import join
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import barycentric_in, distinct, locate, shared_faces
 from .curves import Curve, SurfacePoints
 
 
 @singledispatch
 def pieces(
-    source: Any, triangles: LaidOutTriangles, positions: NDArray[np.float64] | None = None, number: int = 0
+    source: Any, triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None, number: int = 0
 ) -> Pieces:
     """Cut a source into pieces.
 
@@ -27,7 +27,7 @@ def pieces(
     ----------
     source : Curve, SurfacePoints or Pieces
         Face ids refer to `triangles`. Points of a curve that share no face are joined by a shortest line.
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The surface.
     positions : (n_vertices, 3) or (m, 3, 3) float, optional
         Vertices in space, or the corners of each face where faces lie in planes of their own, for curves whose normals
@@ -47,7 +47,7 @@ def pieces(
 
 
 def in_pieces(
-    sources: Sequence[Any], triangles: LaidOutTriangles, positions: NDArray[np.float64] | None = None
+    sources: Sequence[Any], triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None
 ) -> list[list[Pieces]]:
     """Each of several sources in pieces; a sequence of curves and points counts as one source."""
     return [
@@ -57,19 +57,19 @@ def in_pieces(
 
 
 @pieces.register
-def _(source: Pieces, triangles: LaidOutTriangles, positions: Any = None, number: int = 0) -> Pieces:
+def _(source: Pieces, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> Pieces:
     return source
 
 
 @pieces.register
-def _(source: SurfacePoints, triangles: LaidOutTriangles, positions: Any = None, number: int = 0) -> Pieces:
+def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> Pieces:
     places = locate(triangles, source.faces, source.barycentric, f"source {number}: point")
     none = np.empty(0, dtype=np.int64)
     return Pieces(places[distinct(places)[0]], np.empty((0, 2), np.int64), none, none, np.empty(0, complex), False)
 
 
 @pieces.register
-def _(source: Curve, triangles: LaidOutTriangles, positions: Any = None, number: int = 0) -> Pieces:
+def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> Pieces:
     name = f"curve {number}"
     places = locate(triangles, source.faces, source.barycentric, f"{name}: point")
     start = np.arange(source.n_segments)

@@ -24,7 +24,7 @@ from ..errors import SourceError, UnreachedWarning, warn_user
 from ..fields.piecewise_field import PiecewiseField
 from ..geometry.curve_segments import Pieces
 from ..geometry.face_pairs import FacePairs, face_pairs
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in
 from ..linear import factorize
 from ..method import diffuse, normalize
@@ -166,14 +166,14 @@ def holds(discretization: Any, sources: Sequence[Any]) -> bool:
     return fits
 
 
-def corner_slopes(triangles: LaidOutTriangles, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
+def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
     """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid."""
     centroid = triangles.corner_positions.mean(axis=1, keepdims=True)
     return (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
 
 
 def jump_problem(
-    triangles: LaidOutTriangles, pairs: FacePairs, slopes: NDArray[np.float64], guarded: NDArray[np.bool_]
+    triangles: IntrinsicMesh, pairs: FacePairs, slopes: NDArray[np.float64], guarded: NDArray[np.bool_]
 ) -> JumpProblem:
     """Eq. 16; jumps across guarded edges beyond those that the curl forces are dearer.
 
@@ -194,7 +194,7 @@ def jump_problem(
     )
 
 
-def guarded_edges(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> NDArray[np.bool_]:
+def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> NDArray[np.bool_]:
     """(e,) edges that touch the source, or a face that it crosses."""
     touched = np.zeros(triangles.n_vertices, dtype=bool)
     for part in parts:
@@ -206,7 +206,7 @@ def guarded_edges(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> NDArr
 
 
 def centered(
-    triangles: LaidOutTriangles, pairs: FacePairs, values: NDArray[np.float64], parts: Sequence[Pieces]
+    triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.float64], parts: Sequence[Pieces]
 ) -> NDArray[np.float64]:
     """Values shifted so that their median over the source is zero, on every connected part of the surface.
 
@@ -254,7 +254,7 @@ def integration_error(phi: PiecewiseField, directions: NDArray[np.complex128]) -
     return float(np.sqrt(np.average(np.abs(gradient - directions)[known] ** 2, weights=area[known])))
 
 
-def split_triangles(phi: PiecewiseField) -> tuple[LaidOutTriangles, NDArray[np.float64], NDArray[np.float64]]:
+def split_triangles(phi: PiecewiseField) -> tuple[IntrinsicMesh, NDArray[np.float64], NDArray[np.float64]]:
     """The triangles with vertices doubled along the cut; mean value and lumped mass of each of their vertices."""
     owner, vertices = phi.glued
     opened = replace(phi.triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=len(vertices))

@@ -14,7 +14,7 @@ from ..errors import GeometryError
 from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import Pieces, rows_of
 from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in, chained, star
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..operators.linear_elements import LinearElements
@@ -77,7 +77,7 @@ def _(
 
 
 def without_halos(
-    triangles: LaidOutTriangles, values: NDArray[np.float64], beside: NDArray[np.bool_], sided: NDArray[np.int64]
+    triangles: IntrinsicMesh, values: NDArray[np.float64], beside: NDArray[np.bool_], sided: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Values without the zero lines that belong to sources without sides: NaN along those.
 
@@ -103,7 +103,7 @@ def without_halos(
 
 
 def distance_to_pieces(
-    triangles: LaidOutTriangles, parts: list[Pieces], tolerance: float
+    triangles: IntrinsicMesh, parts: list[Pieces], tolerance: float
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to curves along edges and to points anywhere; and the windows that it took."""
     nodes = chained([part.nodes for part in parts])

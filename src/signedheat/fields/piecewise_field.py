@@ -14,7 +14,7 @@ from ..discretization import Diagnostics
 from ..domains.curves import SurfacePoints
 from ..domains.triangle_mesh import TriangleMesh
 from ..geometry.face_pairs import FacePairs, face_pairs
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import locate
 from .vertex_field import VertexField
 
@@ -73,7 +73,7 @@ class PiecewiseField:
         Its triangles: the domain itself, or the virtual refinement of its polygons.
     values : (m, 3) float
         φ at the corners of the triangles, in the units of the vertices; NaN where no source is connected.
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The triangles as the method saw them.
     diagnostics : Diagnostics
         What happened on the way; see `signedheat.piecewise_distance`.
@@ -82,7 +82,7 @@ class PiecewiseField:
     domain: Any
     surface: Any
     values: NDArray[np.float64]
-    triangles: LaidOutTriangles = field(repr=False)
+    triangles: IntrinsicMesh = field(repr=False)
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
 
     @property

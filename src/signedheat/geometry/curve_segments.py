@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from ..errors import SourceError
-from .intrinsic_mesh import LaidOutTriangles
+from .intrinsic_mesh import IntrinsicMesh
 from .surface_points import EDGE, VERTEX, Places, star
 
 
@@ -53,7 +53,7 @@ class Pieces:
 
 
 def given_directions(
-    triangles: LaidOutTriangles,
+    triangles: IntrinsicMesh,
     positions: NDArray[np.float64],
     faces: NDArray[np.int64],
     edges: NDArray[np.int64],
@@ -89,7 +89,7 @@ def given_directions(
 
 
 def in_layout(
-    triangles: LaidOutTriangles,
+    triangles: IntrinsicMesh,
     positions: NDArray[np.float64],
     faces: NDArray[np.int64],
     vectors: NDArray[np.float64],
@@ -106,7 +106,7 @@ def in_layout(
     return seen * edge / np.abs(edge)
 
 
-def rows_of(triangles: LaidOutTriangles, places: Places) -> csr_matrix:
+def rows_of(triangles: IntrinsicMesh, places: Places) -> csr_matrix:
     """(n, n_vertices) sparse: values at vertices → values at places."""
     weights = places.barycentric
     index = np.repeat(np.arange(len(places)), 3).reshape(-1, 3)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .intrinsic_mesh import LaidOutTriangles
+from .intrinsic_mesh import IntrinsicMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +45,12 @@ class FacePairs:
         return np.stack([at_tail[:, 0] - at_tail[:, 1], at_head[:, 0] - at_head[:, 1]], axis=1)
 
 
-def face_pairs(triangles: LaidOutTriangles) -> FacePairs:
+def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
     """Pair the faces at every edge; boundary edges have no pair.
 
     Examples
     --------
-    >>> two = LaidOutTriangles.from_lengths(np.array([[0, 1, 2], [2, 1, 3]]), np.ones((2, 3)), 4)
+    >>> two = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [2, 1, 3]]), np.ones((2, 3)), 4)
     >>> pairs = face_pairs(two)
     >>> pairs.faces.tolist(), pairs.sides.tolist(), pairs.edges.tolist()
     ([[0, 1]], [[1, 0]], [1])

@@ -1,4 +1,4 @@
-"""Laid-out triangles: all that the surface method knows of a surface.
+"""Intrinsic mesh: all that the surface method knows of a surface.
 
 Per face three vertex ids, three edge ids and the corners laid out in the plane as complex numbers. A triangle
 mesh, a virtually refined polygon mesh, a digital surface with corrected normals, an intrinsic triangulation and a
@@ -18,7 +18,7 @@ from .triangle_kernels import gather, join_faces
 
 
 @dataclass(frozen=True, eq=False)
-class LaidOutTriangles:
+class IntrinsicMesh:
     """Triangles known by their vertices, their edges and their shapes alone.
 
     Attributes
@@ -48,7 +48,7 @@ class LaidOutTriangles:
         lengths: NDArray[np.float64],
         n_vertices: int,
         edges: EdgeTable | None = None,
-    ) -> LaidOutTriangles:
+    ) -> IntrinsicMesh:
         """Lay out triangles of given edge lengths; ``lengths[:, k]`` runs from corner k to corner k + 1.
 
         Corner 0 is at the origin, corner 1 on the positive real axis, corner 2 above it. The height comes from
@@ -56,7 +56,7 @@ class LaidOutTriangles:
 
         Examples
         --------
-        >>> LaidOutTriangles.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3).corner_positions
+        >>> IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3).corner_positions
         array([[0.+0.j, 4.+0.j, 0.+3.j]])
         """
         base, right, left = lengths.T

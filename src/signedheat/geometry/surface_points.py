@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SourceError
-from .intrinsic_mesh import LaidOutTriangles
+from .intrinsic_mesh import IntrinsicMesh
 
 VERTEX, EDGE, FACE = 0, 1, 2
 
@@ -51,7 +51,7 @@ class Places:
 
 
 def locate(
-    triangles: LaidOutTriangles, faces: NDArray[np.int64], barycentric: NDArray[np.float64], name: str = "point"
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], barycentric: NDArray[np.float64], name: str = "point"
 ) -> Places:
     """Recognise points that lie on edges or at vertices.
 
@@ -85,7 +85,7 @@ def locate(
     return Places(faces, inside, kinds, elements, along)
 
 
-def places_at(triangles: LaidOutTriangles, vertices: NDArray[np.int64], name: str = "point") -> Places:
+def places_at(triangles: IntrinsicMesh, vertices: NDArray[np.int64], name: str = "point") -> Places:
     """Vertices as places, each through its first face."""
     corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices, name)
     kinds = np.full(len(vertices), VERTEX)
@@ -125,7 +125,7 @@ def corners_at(
     return first[vertices]
 
 
-def has(triangles: LaidOutTriangles, faces: NDArray[np.int64], places: Places) -> NDArray[np.bool_]:
+def has(triangles: IntrinsicMesh, faces: NDArray[np.int64], places: Places) -> NDArray[np.bool_]:
     """(n,) whether face k has place k."""
     return np.choose(
         places.kinds,
@@ -137,7 +137,7 @@ def has(triangles: LaidOutTriangles, faces: NDArray[np.int64], places: Places) -
     )
 
 
-def barycentric_in(triangles: LaidOutTriangles, faces: NDArray[np.int64], places: Places) -> NDArray[np.float64]:
+def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], places: Places) -> NDArray[np.float64]:
     """(n, 3) where place k lies in face k, which must have it."""
     weights = places.barycentric.copy()
     moved = np.flatnonzero(faces != places.faces)
@@ -157,7 +157,7 @@ def barycentric_in(triangles: LaidOutTriangles, faces: NDArray[np.int64], places
     return weights
 
 
-def shared_faces(triangles: LaidOutTriangles, start: Places, end: Places) -> NDArray[np.int64]:
+def shared_faces(triangles: IntrinsicMesh, start: Places, end: Places) -> NDArray[np.int64]:
     """(k,) a face that has both ends, or −1; the face through which an end was given goes first."""
     shared = np.where(has(triangles, end.faces, start), end.faces, -1)
     shared = np.where(has(triangles, start.faces, end), start.faces, shared)
@@ -171,7 +171,7 @@ def shared_faces(triangles: LaidOutTriangles, start: Places, end: Places) -> NDA
     return shared
 
 
-def star(triangles: LaidOutTriangles, places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def star(triangles: IntrinsicMesh, places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """All faces that have each place, as pairs: index of the place, and face."""
     inside = np.flatnonzero(places.kinds == FACE)
     which, faces = [inside], [places.elements[inside]]

@@ -18,7 +18,7 @@ from ..domains.curves import Curve, SurfacePoints
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, SourceError
 from ..geometry.geodesics.paths import gaps
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import locate
 from .curve_readers import (
     POINTS,
@@ -92,7 +92,7 @@ def read_curves(path: PathLike, domain: Any, strict: bool = False) -> list[Curve
 def refuse_gaps(sources: Sequence[Curve | SurfacePoints], mesh: TriangleMesh) -> None:
     """Raise a `SourceError` if consecutive points of a curve share no face."""
     lengths = mesh.edge_lengths[mesh.edges.of_faces]
-    triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
+    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     for number, source in enumerate(sources):
         if isinstance(source, Curve):
             places = locate(triangles, source.faces, source.barycentric, f"curve {number}: point")

@@ -6,19 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.triangle_kernels import add_fluxes
 from .assembly import assemble
 
 
-def cotan_matrix(triangles: LaidOutTriangles) -> sparse.csr_matrix:
+def cotan_matrix(triangles: IntrinsicMesh) -> sparse.csr_matrix:
     """Upper triangle of C, positive semidefinite, one unknown per vertex, its whole diagonal stored.
 
     ``φᵀ C φ = ∫ |∇φ|²``.
 
     Examples
     --------
-    >>> flat = LaidOutTriangles.from_lengths(np.array([[0, 1, 2]]), np.array([[1.0, 2**0.5, 1.0]]), 3)
+    >>> flat = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[1.0, 2**0.5, 1.0]]), 3)
     >>> cotan_matrix(flat).toarray().round(12)
     array([[ 1. , -0.5, -0.5],
            [ 0. ,  0.5,  0. ],
@@ -29,7 +29,7 @@ def cotan_matrix(triangles: LaidOutTriangles) -> sparse.csr_matrix:
     return assemble(triangles.corner_vertices, diagonal, -half, triangles.n_vertices)
 
 
-def divergence(triangles: LaidOutTriangles, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
+def divergence(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
     """b with ``C φ = b`` for the φ whose gradient is closest to a face field: ``b_i = ∫ ⟨∇λ_i, Y⟩``.
 
     The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.

@@ -1,4 +1,4 @@
-"""Vector heat on the edges of laid-out triangles: the Crouzeix–Raviart connection Laplacian and mass (Eqs. 8–9)."""
+"""Vector heat on the edges of intrinsic mesh: the Crouzeix–Raviart connection Laplacian and mass (Eqs. 8–9)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from .assembly import assemble
 
 
-def vector_heat_matrix(triangles: LaidOutTriangles, time: float) -> sparse.csr_matrix:
+def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matrix:
     """Upper triangle of ``M + t L``, one vector unknown per edge, in the frame of the edge.
 
     Complex Hermitian (e, e) where all frames agree with their faces; otherwise, since a reflection is not a complex
@@ -18,7 +18,7 @@ def vector_heat_matrix(triangles: LaidOutTriangles, time: float) -> sparse.csr_m
 
     Parameters
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         Without degenerate faces.
     time : float
         t, in squared units of length.
@@ -31,7 +31,7 @@ def vector_heat_matrix(triangles: LaidOutTriangles, time: float) -> sparse.csr_m
 
 
 def vector_heat_forces(
-    triangles: LaidOutTriangles, time: float, vectors: NDArray[np.complex128], faces: NDArray[np.int64]
+    triangles: IntrinsicMesh, time: float, vectors: NDArray[np.complex128], faces: NDArray[np.int64]
 ) -> NDArray[np.complex128]:
     """(M + t L) times the (e,) vectors, as far as some faces add to it: complete at edges all of whose faces do."""
     diagonal, factor = _local_entries(triangles, time, faces)
@@ -45,14 +45,14 @@ def vector_heat_forces(
     return sums
 
 
-def _local_entries(triangles: LaidOutTriangles, time: float, faces: NDArray[np.int64] | slice) -> tuple:
+def _local_entries(triangles: IntrinsicMesh, time: float, faces: NDArray[np.int64] | slice) -> tuple:
     """What each edge of a face has to itself, and what it shares with the edge after it, before turning."""
     cot = triangles.corner_cotangents[faces]
     following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1
     return triangles.face_areas[faces, None] / 3.0 + 2.0 * time * (cot + following), -2.0 * time * following
 
 
-def _real_form(triangles: LaidOutTriangles, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
+def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
     """Blocks ``B_feᵀ B_fg``, where the columns of B_fe are the axes of the edge's frame in the face."""
     edge, z = triangles.edges.of_faces, triangles.edge_directions
     rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()

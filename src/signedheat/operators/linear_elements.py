@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.intrinsic_mesh import LaidOutTriangles
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from .tetrahedral import Tetrahedra
 
 
@@ -48,7 +48,7 @@ class LinearElements:
         return cls(corners, sizes, sparse.csr_matrix(entries, shape=(m * d, n)))
 
     @classmethod
-    def on_triangles(cls, triangles: LaidOutTriangles) -> LinearElements:
+    def on_triangles(cls, triangles: IntrinsicMesh) -> LinearElements:
         """A surface; slopes are in the layout of each face."""
         hats = 1j * np.roll(triangles.edge_vectors, -1, axis=1) / (2.0 * triangles.face_areas)[:, None]
         hats = np.stack([hats.real, hats.imag], axis=2)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ..intrinsic_mesh import LaidOutTriangles
+from ..intrinsic_mesh import IntrinsicMesh
 from .initial_windows import Faces, Lamps, emit, light
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, hit, merge, outrun, put, ray, trim
 
@@ -27,13 +27,13 @@ _NO_ID, _NO_POINT = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.complex128
 
 
 def distance_to_zero_line(
-    triangles: LaidOutTriangles, values: NDArray[np.float64], tolerance: float = 1e-4
+    triangles: IntrinsicMesh, values: NDArray[np.float64], tolerance: float = 1e-4
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to the line on which values, linear in every face, are zero; and the windows it took.
 
     Parameters
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         Any surface, nonmanifold and nonorientable ones too.
     values : (n,) float
         At the vertices; faces with NaN have no line.
@@ -53,7 +53,7 @@ def distance_to_zero_line(
 
 
 def distance_to_edges_and_points(
-    triangles: LaidOutTriangles,
+    triangles: IntrinsicMesh,
     edges: NDArray[np.int64],
     vertices: NDArray[np.int64],
     faces: NDArray[np.int64],
@@ -66,7 +66,7 @@ def distance_to_edges_and_points(
 
     Examples
     --------
-    >>> triangles = LaidOutTriangles.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3)
+    >>> triangles = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3)
     >>> none = np.empty(0, dtype=np.int64)
     >>> distance_to_edges_and_points(triangles, none, np.array([1]), none, np.empty(0, complex))[0].tolist()
     [4.0, 0.0, 5.0]
@@ -78,7 +78,7 @@ def distance_to_edges_and_points(
     return _propagate(Faces.of(triangles), bends, lamps, tolerance)
 
 
-def cleared(triangles: LaidOutTriangles, values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
+def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
     """Values kept away from zero, so that the line crosses edges and no vertices.
 
     A vertex with zero gets the sign that its neighbours have less of: where both sides of a source have the same sign,
@@ -91,7 +91,7 @@ def cleared(triangles: LaidOutTriangles, values: NDArray[np.float64], least: flo
     return np.where(near, np.where(around > 0, -least, least), values)
 
 
-def bends_light(triangles: LaidOutTriangles) -> NDArray[np.bool_]:
+def bends_light(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
     """(n,) vertices that shortest lines can pass through: on a boundary, or with an angle of more than 2π."""
     angles = np.arctan2(1.0, triangles.corner_cotangents)
     total = np.bincount(triangles.corner_vertices.ravel(), angles.ravel(), triangles.n_vertices)

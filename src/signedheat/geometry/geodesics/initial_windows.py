@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ..intrinsic_mesh import LaidOutTriangles
+from ..intrinsic_mesh import IntrinsicMesh
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun, put
 
 
 class Faces(NamedTuple):
-    """Laid-out triangles, with the halfedges at each edge and the corners at each vertex in order of these."""
+    """Intrinsic mesh, with the halfedges at each edge and the corners at each vertex in order of these."""
 
     vertices: NDArray[np.int64]
     positions: NDArray[np.complex128]
@@ -28,7 +28,7 @@ class Faces(NamedTuple):
     first_corner: NDArray[np.int64]
 
     @classmethod
-    def of(cls, triangles: LaidOutTriangles) -> Faces:
+    def of(cls, triangles: IntrinsicMesh) -> Faces:
         """The same triangles, as the kernels want them."""
         table = triangles.edges
         lengths = np.empty(triangles.n_edges)

@@ -1,4 +1,4 @@
-"""Compiled kernels that find shortest lines across laid-out triangles.
+"""Compiled kernels that find shortest lines across intrinsic mesh.
 
 Side ``3 f + k`` of face f runs from corner k to corner k + 1. A *sleeve* is a sequence of faces, each left through a
 side and the next one entered through another side of the same edge.

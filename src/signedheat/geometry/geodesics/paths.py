@@ -8,13 +8,13 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ...errors import SourceError
-from ..intrinsic_mesh import LaidOutTriangles
+from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import Places, barycentric_in, chained, locate, places_at, shared_faces, star
 from .path_kernels import shortest_lines
 
 
 def join(
-    triangles: LaidOutTriangles, places: Places, start: NDArray[np.int64], end: NDArray[np.int64], name: str
+    triangles: IntrinsicMesh, places: Places, start: NDArray[np.int64], end: NDArray[np.int64], name: str
 ) -> tuple[Places, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Join starts to ends: all places, with the shortest lines between those that share no face cut into segments.
 
@@ -33,13 +33,13 @@ def join(
     return chained([places, middle]), starts, ends, pair
 
 
-def gaps(triangles: LaidOutTriangles, places: Places, closed: bool) -> NDArray[np.int64]:
+def gaps(triangles: IntrinsicMesh, places: Places, closed: bool) -> NDArray[np.int64]:
     """Which segments of a curve through places have ends that share no face."""
     start = np.arange(len(places) if closed else len(places) - 1)
     return np.flatnonzero(shared_faces(triangles, places[start], places[(start + 1) % len(places)]) < 0)
 
 
-def trace(triangles: LaidOutTriangles, start: Places, end: Places, name: str = "curve") -> tuple[Places, NDArray]:
+def trace(triangles: IntrinsicMesh, start: Places, end: Places, name: str = "curve") -> tuple[Places, NDArray]:
     """Places on the shortest lines between starts and ends, where they cross edges or pass vertices.
 
     A line is shortest among its neighbours: no vertex that it passes could be passed on the other side for less. The
@@ -48,7 +48,7 @@ def trace(triangles: LaidOutTriangles, start: Places, end: Places, name: str = "
 
     Parameters
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The surface.
     start, end : Places
         (k,) the points to join.
@@ -91,7 +91,7 @@ def trace(triangles: LaidOutTriangles, start: Places, end: Places, name: str = "
 
 
 def faces_at(
-    triangles: LaidOutTriangles, places: Places
+    triangles: IntrinsicMesh, places: Places
 ) -> tuple[NDArray[np.int64], NDArray[np.complex128], NDArray[np.int64]]:
     """All faces that have each place, where it lies in their layouts, and where the faces of each place begin."""
     which, faces = star(triangles, places)
@@ -102,7 +102,7 @@ def faces_at(
     return faces, points, np.searchsorted(which, np.arange(len(places) + 1))
 
 
-def through_vertices(triangles: LaidOutTriangles, start: Places, end: Places, name: str) -> Places:
+def through_vertices(triangles: IntrinsicMesh, start: Places, end: Places, name: str) -> Places:
     """The way between two places that no faces join across edges, through vertices at which fans of faces touch."""
     edges, n = triangles.edges, triangles.n_vertices
     arcs, lengths = [edges.vertices], [edge_lengths(triangles)]
@@ -131,14 +131,14 @@ def through_vertices(triangles: LaidOutTriangles, start: Places, end: Places, na
     return places[ends[:-1]]
 
 
-def edge_lengths(triangles: LaidOutTriangles) -> NDArray[np.float64]:
+def edge_lengths(triangles: IntrinsicMesh) -> NDArray[np.float64]:
     """(e,) lengths of the edges, each as one of its faces has it."""
     lengths = np.zeros(triangles.n_edges)
     lengths[triangles.edges.of_faces] = triangles.edge_lengths
     return lengths
 
 
-def parts_of_faces(triangles: LaidOutTriangles) -> NDArray[np.int64]:
+def parts_of_faces(triangles: IntrinsicMesh) -> NDArray[np.int64]:
     """(m,) which faces can be reached from one another across edges."""
     m, edge = triangles.n_faces, triangles.edges.of_faces.ravel()
     face = np.repeat(np.arange(m), 3)

@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 from ..constrained_triangulation import arrange, triangulate
 from ..curve_segments import Pieces
 from ..edges import EdgeTable
-from ..intrinsic_mesh import LaidOutTriangles
+from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import EDGE, FACE, VERTEX, Places, chained, distinct, places_at
 from .delaunay import flip_all, glue, lay_out
 
 
-def embed(
-    triangles: LaidOutTriangles, groups: Sequence[Sequence[Pieces]]
-) -> tuple[LaidOutTriangles, list[list[Pieces]]]:
+def embed(triangles: IntrinsicMesh, groups: Sequence[Sequence[Pieces]]) -> tuple[IntrinsicMesh, list[list[Pieces]]]:
     """Cut faces wherever an unoriented curve or an isolated point leaves edges and vertices (MATH.md §2).
 
     Whatever else lies in a face that is cut, or on an edge that is split, is embedded too; all other faces and pieces
@@ -29,14 +27,14 @@ def embed(
 
     Parameters
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The surface.
     groups : sequence of sequences of Pieces
         The sources, in pieces.
 
     Returns
     -------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The old vertices first, then new ones; the very same object if nothing had to be cut.
     groups : list of lists of Pieces
         The sources on these triangles.
@@ -91,7 +89,7 @@ class Union:
         )
 
 
-def reach(triangles: LaidOutTriangles, union: Union, unfit: Sequence[bool]) -> tuple[set[int], set[int]]:
+def reach(triangles: IntrinsicMesh, union: Union, unfit: Sequence[bool]) -> tuple[set[int], set[int]]:
     """Faces to cut and edges to split: those that unfit sources need, and what else must follow."""
     nodes, inside = union.nodes, union.edges < 0
     nodes_of, pieces_of = defaultdict(list), defaultdict(list)
@@ -131,7 +129,7 @@ def reach(triangles: LaidOutTriangles, union: Union, unfit: Sequence[bool]) -> t
 class Cut:
     """A set of triangles while some of its faces are cut."""
 
-    def __init__(self, triangles: LaidOutTriangles, union: Union, faces: set[int], edges: set[int]) -> None:
+    def __init__(self, triangles: IntrinsicMesh, union: Union, faces: set[int], edges: set[int]) -> None:
         self.triangles, self.union = triangles, union
         self.n_vertices, self.n_edges = triangles.n_vertices, triangles.n_edges
         self.faces: list[NewFace] = []
@@ -250,7 +248,7 @@ class Cut:
                 ends_here = self.node(vertices[u]), self.node(vertices[v])
                 self.pieces.append(NewPiece(*ends_here, -1, edge, np.conj(vector) if over else vector, union.owners[p]))
 
-    def assemble(self) -> tuple[LaidOutTriangles, Union, NDArray[np.bool_]]:
+    def assemble(self) -> tuple[IntrinsicMesh, Union, NDArray[np.bool_]]:
         """The triangles after all cuts, what lies on them, and which faces are new."""
         triangles, union = self.triangles, self.union
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
@@ -268,7 +266,7 @@ class Cut:
         used, first, flat = np.unique(of_faces, return_index=True, return_inverse=True)
         vertices = np.stack([corners.ravel()[first], np.roll(corners, -1, axis=1).ravel()[first]], axis=1)
         table = EdgeTable(vertices, flat.reshape(-1, 3), forward)
-        finer = LaidOutTriangles(corners, with_new(triangles.corner_positions, "positions"), table, self.n_vertices)
+        finer = IntrinsicMesh(corners, with_new(triangles.corner_positions, "positions"), table, self.n_vertices)
 
         new_face = np.full(triangles.n_faces, -1)
         is_new = order >= len(kept)
@@ -319,13 +317,13 @@ class NewPiece(NamedTuple):
     owner: int
 
 
-def first_sides(triangles: LaidOutTriangles) -> NDArray[np.int64]:
+def first_sides(triangles: IntrinsicMesh) -> NDArray[np.int64]:
     """(e,) the first side ``3 face + k`` of each edge."""
     return np.unique(triangles.edges.of_faces, return_index=True)[1]
 
 
 def places_of(
-    triangles: LaidOutTriangles,
+    triangles: IntrinsicMesh,
     kinds: NDArray[np.int64],
     elements: NDArray[np.int64],
     along: NDArray[np.float64],
@@ -343,7 +341,7 @@ def places_of(
     return Places(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
 
 
-def flipped(triangles: LaidOutTriangles, union: Union, is_new: NDArray[np.bool_]) -> tuple[LaidOutTriangles, Union]:
+def flipped(triangles: IntrinsicMesh, union: Union, is_new: NDArray[np.bool_]) -> tuple[IntrinsicMesh, Union]:
     """Flip edges of new faces to Delaunay, but for those that carry a piece or bound a face with one inside.
 
     Where faces do not agree on the lengths of their edges, none can be flipped.

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..edges import EdgeTable
-from ..intrinsic_mesh import LaidOutTriangles
+from ..intrinsic_mesh import IntrinsicMesh
 from .gluing_kernels import Gluing, settle
 
 
-def flip_to_delaunay(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = None) -> LaidOutTriangles:
+def flip_to_delaunay(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> IntrinsicMesh:
     """Flip edges until the two angles opposite to every edge sum to at most π.
 
     The surface stays what it is: its vertices, angle sums and area; only the edges change. Edges at a boundary,
@@ -19,14 +19,14 @@ def flip_to_delaunay(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_]
 
     Parameters
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         Neighbouring faces must agree about the length of their edge; flat and nearly flat triangles are welcome.
     fixed_edges : (e,) bool, optional
         Edges that must not be flipped, for instance those of a source.
 
     Returns
     -------
-    LaidOutTriangles
+    IntrinsicMesh
         As many vertices, edges and faces. Two edges may now join the same two vertices, or one vertex with itself.
 
     Examples
@@ -34,7 +34,7 @@ def flip_to_delaunay(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_]
     A rhombus cut along its long diagonal; the other diagonal is better.
 
     >>> sides = np.array([[1.9, 1.0, 1.0], [1.9, 1.0, 1.0]])
-    >>> rhombus = LaidOutTriangles.from_lengths(np.array([[0, 1, 2], [1, 0, 3]]), sides, 4)
+    >>> rhombus = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3]]), sides, 4)
     >>> flip_to_delaunay(rhombus).edges.vertices.tolist()
     [[3, 2], [1, 2], [2, 0], [0, 3], [3, 1]]
     """
@@ -43,7 +43,7 @@ def flip_to_delaunay(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_]
     return lay_out(gluing)
 
 
-def glue(triangles: LaidOutTriangles, fixed_edges: NDArray[np.bool_] | None = None) -> Gluing:
+def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> Gluing:
     """Start an intrinsic triangulation, with an empty history."""
     edges = triangles.edges
     edge, n_edges = edges.of_faces.ravel(), triangles.n_edges
@@ -87,7 +87,7 @@ def flip_all(gluing: Gluing) -> Gluing:
     return gluing
 
 
-def lay_out(gluing: Gluing) -> LaidOutTriangles:
+def lay_out(gluing: Gluing) -> IntrinsicMesh:
     """The triangulation as it is now. Edges keep their numbers."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     corners, edge = gluing.tail[: 3 * n_faces].reshape(-1, 3), gluing.edge[: 3 * n_faces]
@@ -100,7 +100,7 @@ def lay_out(gluing: Gluing) -> LaidOutTriangles:
         (forward == forward[first[edge]]).reshape(-1, 3),
     )
     lengths = gluing.length[edge].reshape(-1, 3) * gluing.unit
-    return LaidOutTriangles.from_lengths(corners.copy(), lengths, n_vertices, table)
+    return IntrinsicMesh.from_lengths(corners.copy(), lengths, n_vertices, table)
 
 
 def doubled(array: NDArray) -> NDArray:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..intrinsic_mesh import LaidOutTriangles
+from ..intrinsic_mesh import IntrinsicMesh
 from .delaunay import glue
 from .transfer_kernels import carry, walk_both_ways
 
@@ -41,14 +41,14 @@ class History:
 
     Attributes
     ----------
-    before, after : LaidOutTriangles
+    before, after : IntrinsicMesh
         Vertices of `before` keep their numbers; the new ones follow.
     steps, weights : (n, 4) int and float
         As `intrinsic_kernels.record` writes them.
     """
 
-    before: LaidOutTriangles
-    after: LaidOutTriangles
+    before: IntrinsicMesh
+    after: IntrinsicMesh
     steps: NDArray[np.int64]
     weights: NDArray[np.float64]
 
@@ -93,7 +93,7 @@ class History:
         return faces, barycentric, vectors
 
 
-def edge_middles(triangles: LaidOutTriangles) -> tuple[NDArray, NDArray, NDArray]:
+def edge_middles(triangles: IntrinsicMesh) -> tuple[NDArray, NDArray, NDArray]:
     """Faces and barycentric coordinates of the edges' middle points, and (e, 1, 3) vectors from tail to head."""
     side = np.unique(triangles.edges.of_faces, return_index=True)[1]
     faces, k, rows = side // 3, side % 3, np.arange(len(side))
@@ -105,7 +105,7 @@ def edge_middles(triangles: LaidOutTriangles) -> tuple[NDArray, NDArray, NDArray
 
 
 def straight(
-    triangles: LaidOutTriangles,
+    triangles: IntrinsicMesh,
     faces: NDArray[np.int64],
     barycentric: NDArray[np.float64],
     vectors: NDArray[np.float64],

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve_segments import Pieces
-from ..intrinsic_mesh import LaidOutTriangles
+from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import SNAP, barycentric_in, chained, distinct, locate
 from .conforming_refinement import Cut, Union, reach
 from .history import History, straight
@@ -21,7 +21,7 @@ class Embedding:
 
     Attributes
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         After the cuts; old vertices first.
     marked : (e,) bool
         Edges along which the curves run.
@@ -31,13 +31,13 @@ class Embedding:
         Barycentric coordinates of its corners there.
     """
 
-    triangles: LaidOutTriangles
+    triangles: IntrinsicMesh
     marked: NDArray[np.bool_]
     parents: NDArray[np.int64]
     corners: NDArray[np.float64]
 
     @classmethod
-    def of(cls, triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> Embedding:
+    def of(cls, triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> Embedding:
         """Cut faces wherever a piece leaves the edges, or a point the vertices."""
         finer, parents = triangles, np.arange(triangles.n_faces)
         corners = np.broadcast_to(np.eye(3), (triangles.n_faces, 3, 3))
@@ -80,7 +80,7 @@ class Embedding:
 
 
 def barycentric_of(
-    triangles: LaidOutTriangles, faces: NDArray[np.int64], points: NDArray[np.complex128]
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], points: NDArray[np.complex128]
 ) -> NDArray[np.float64]:
     """(n, k, 3) barycentric coordinates of points in face layouts, k to each face."""
     return np.stack([np.ones_like(points.real), *(np.zeros_like(points.real),) * 2], axis=-1) + differences_of(
@@ -89,7 +89,7 @@ def barycentric_of(
 
 
 def differences_of(
-    triangles: LaidOutTriangles, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
 ) -> NDArray[np.float64]:
     """(n, k, 3) vectors in face layouts as differences of barycentric coordinates, k to each face."""
     q = triangles.corner_positions[faces]
@@ -99,7 +99,7 @@ def differences_of(
     return np.stack([-second - third, second, third], axis=-1)
 
 
-def carry_pieces(source: Pieces, embedding: Embedding, history: History, before: LaidOutTriangles) -> Pieces:
+def carry_pieces(source: Pieces, embedding: Embedding, history: History, before: IntrinsicMesh) -> Pieces:
     """A source on the triangles `before` the embedding, as the triangles at the end of the history see it."""
     after = history.after
     none = np.zeros((len(source.nodes), 0, 3))
@@ -149,7 +149,7 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
     )
 
 
-def in_faces(triangles: LaidOutTriangles, source: Pieces) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def in_faces(triangles: IntrinsicMesh, source: Pieces) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Face, start, end (barycentric) and direction in the face's layout of every piece, along edges or not.
 
     A piece along an edge is seen from the edge's face with the largest area.

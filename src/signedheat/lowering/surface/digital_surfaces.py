@@ -6,7 +6,7 @@ import numpy as np
 
 from ...discretization import discretize
 from ...domains.digital_surface import DigitalSurface
-from ...geometry.intrinsic_mesh import LaidOutTriangles
+from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.surfels import flattened_sides, separated_edges
 from .discretization import SurfaceDiscretization
 
@@ -25,7 +25,7 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
     lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     mesh = domain.triangulation
     edges = separated_edges(mesh.edges, domain.surfels)
-    triangles = LaidOutTriangles.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
+    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
     spacing = max(0.5 * domain.radius, float(domain.spacing.mean()))
     own = np.arange(domain.n_vertices)
     return SurfaceDiscretization(domain, triangles, restriction=own, positions=corners, spacing=spacing)

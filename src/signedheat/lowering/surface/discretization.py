@@ -1,4 +1,4 @@
-"""Surfaces of every kind, as laid-out triangles."""
+"""Surfaces of every kind, as intrinsic mesh."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...domains.segments import in_pieces
 from ...domains.triangle_mesh import TriangleMesh
 from ...errors import GeometryError
 from ...geometry.intrinsic.conforming_refinement import embed
-from ...geometry.intrinsic_mesh import LaidOutTriangles
+from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from ...linear import elimination_order, factorize
 from ...operators.cotan import cotan_matrix, divergence
@@ -34,7 +34,7 @@ class SurfaceDiscretization:
     ----------
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         What fields are reported on.
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         What the method runs on.
     restriction : (n,) int, optional
         Vertex of the triangles that stands for each vertex of the domain, where they are not the same.
@@ -50,7 +50,7 @@ class SurfaceDiscretization:
     """
 
     domain: Any
-    triangles: LaidOutTriangles
+    triangles: IntrinsicMesh
     restriction: NDArray[np.int64] | None = None
     bring: Callable[[Any], Any] | None = None
     positions: NDArray[np.float64] | None = None
@@ -93,7 +93,7 @@ class SurfaceDiscretization:
         triangles, groups = facing(triangles, groups)
         return surface._turned_to(triangles), groups
 
-    def _turned_to(self, triangles: LaidOutTriangles) -> SurfaceDiscretization:
+    def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
         """The same triangles with other first faces at nonmanifold edges; step 3 does not see them."""
         if triangles is self.triangles:
             return self
@@ -104,7 +104,7 @@ class SurfaceDiscretization:
             turned.__dict__.update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
         return self._turned[key]
 
-    def _cut_into(self, triangles: LaidOutTriangles) -> SurfaceDiscretization:
+    def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
         """The same surface in more triangles, whose first vertices are those of this."""
         added = triangles.n_vertices - self.triangles.n_vertices
         return replace(
@@ -164,12 +164,12 @@ def _(domain: TriangleMesh) -> SurfaceDiscretization:
     lengths, added = mollify(domain.edge_lengths[domain.edges.of_faces], 1e-6)
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
-    triangles = LaidOutTriangles.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)
+    triangles = IntrinsicMesh.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)
     notes = {"added to edge lengths": added, "large angles": large_angles(triangles)}
     return SurfaceDiscretization(domain, triangles, notes={name: note for name, note in notes.items() if note})
 
 
-def large_angles(triangles: LaidOutTriangles) -> float:
+def large_angles(triangles: IntrinsicMesh) -> float:
     """Share of angles above 120°; 0 below 1 %. Where they are many, step 1 may turn directions far from the source."""
     share = float((triangles.corner_cotangents < -(3**-0.5)).mean())
     return share if share >= 0.01 else 0.0

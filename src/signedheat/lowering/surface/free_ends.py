@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...geometry.intrinsic_mesh import LaidOutTriangles
+from ...geometry.intrinsic_mesh import IntrinsicMesh
 
 
 def free_end_arcs(
-    triangles: LaidOutTriangles, edges: NDArray[np.int64], vertices: NDArray[np.int64], least: float
+    triangles: IntrinsicMesh, edges: NDArray[np.int64], vertices: NDArray[np.int64], least: float
 ) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
     """Vectors that point away from free ends, over the half plane of directions behind each.
 
@@ -18,7 +18,7 @@ def free_end_arcs(
 
     Parameters
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The surface.
     edges, vertices : (k,) int
         Last edge of each end, and the vertex at which it ends.

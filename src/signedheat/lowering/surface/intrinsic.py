@@ -11,7 +11,7 @@ import numpy as np
 from ...discretization import discretize
 from ...domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ...domains.triangle_mesh import TriangleMesh
-from ...geometry.intrinsic_mesh import LaidOutTriangles
+from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from .discretization import SurfaceDiscretization
 
@@ -48,7 +48,7 @@ def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDis
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
     if added:
         corners, edges = triangles.corner_vertices, triangles.edges
-        triangles = LaidOutTriangles.from_lengths(corners, lengths, triangles.n_vertices, edges)
+        triangles = IntrinsicMesh.from_lengths(corners, lengths, triangles.n_vertices, edges)
     options = {
         "domain": triangulation,
         "bring": triangulation.bring,
@@ -59,7 +59,7 @@ def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDis
     return SurfaceDiscretization(triangles=triangles, **options)
 
 
-def spacing(triangles: LaidOutTriangles) -> float:
+def spacing(triangles: IntrinsicMesh) -> float:
     """h: half the mean edge length, where the mean is over the area of the surface.
 
     The plain mean would follow the many small triangles that refinement puts where the mesh needs them, and then

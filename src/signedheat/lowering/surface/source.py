@@ -14,14 +14,14 @@ from scipy.sparse.csgraph import connected_components
 from ...domains.segments import in_pieces
 from ...errors import SourceError
 from ...geometry.curve_segments import Pieces, rows_of
-from ...geometry.intrinsic_mesh import LaidOutTriangles
+from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.surface_points import FACE, VERTEX, Places, chained, distinct, places_at, star
 from .free_ends import free_end_arcs
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSource:
-    """Curves and points, lowered to a set of laid-out triangles.
+    """Curves and points, lowered to a set of intrinsic mesh.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class SurfaceSource:
     pinned : (s,) bool
         Samples at which exact constraints hold: not those inside faces, where their component has others. Three of them
         inside one face, however close to a line, would flatten φ on it.
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         What they were lowered to; the first vertices are those of the domain's own triangles.
     parts : list of Pieces
         The sources on these triangles.
@@ -56,12 +56,12 @@ class SurfaceSource:
     owners: NDArray[np.int64]
     oriented: bool
     pinned: NDArray[np.bool_]
-    triangles: LaidOutTriangles
+    triangles: IntrinsicMesh
     parts: Sequence[Pieces]
 
 
 def surface_source(
-    triangles: LaidOutTriangles,
+    triangles: IntrinsicMesh,
     sources: Sequence[Any],
     diffusion: float,
     spacing: float,
@@ -71,7 +71,7 @@ def surface_source(
 
     Parameters
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The surface; face ids of the sources refer to it.
     sources : sequence of Curve, SurfacePoints, Pieces or sequences of them
         What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges
@@ -91,7 +91,7 @@ def surface_source(
     Examples
     --------
     >>> from signedheat import Curve
-    >>> triangles = LaidOutTriangles.from_lengths(np.array([[0, 1, 2]]), np.ones((1, 3)), 3)
+    >>> triangles = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.ones((1, 3)), 3)
     >>> across = Curve([0, 0], [[0.5, 0.5, 0.0], [0.5, 0.0, 0.5]])
     >>> surface_source(triangles, [across], 1.0, 0.5).weights
     array([0.25, 0.25])
@@ -133,7 +133,7 @@ def surface_source(
     )
 
 
-def oriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> csr_array:
+def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> csr_array:
     """Eq. 11 without the value of ψ_e: i(b − a), on the edge that it runs along or in thirds on those of its face.
 
     One third is the mean of ψ_e over a face; it gives both kinds of pieces of one curve the same weight. (The
@@ -147,7 +147,7 @@ def oriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces]) -> cs
     return sums
 
 
-def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces], spacing: float) -> csr_array:
+def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[Pieces], spacing: float) -> csr_array:
     """App. A.2: each side of a curve along edges points away from it, and round its free ends.
 
     A face beside edge ij gets i(p_j − p_i), ij in its own order, on its other two edges; on ij itself the sides cancel.
@@ -175,7 +175,7 @@ def unoriented_vectors(triangles: LaidOutTriangles, parts: Sequence[Pieces], spa
     return sums + from_faces(triangles, faces, arcs)
 
 
-def vertex_point_vectors(triangles: LaidOutTriangles, vertices: NDArray[np.int64]) -> csr_array:
+def vertex_point_vectors(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) -> csr_array:
     """App. A.1, Eq. 19: round vertex i, the corner of angle α gets i d (1 − e^{iα}) / Θ.
 
     d is the direction of the first edge that leaves the corner, counter-clockwise, and Θ the total angle at the vertex.
@@ -192,7 +192,7 @@ def vertex_point_vectors(triangles: LaidOutTriangles, vertices: NDArray[np.int64
     return from_faces(triangles, faces, round_corner)
 
 
-def inner_point_vectors(triangles: LaidOutTriangles, places: Places) -> csr_array:
+def inner_point_vectors(triangles: IntrinsicMesh, places: Places) -> csr_array:
     """Points on edges and inside faces: −∇δ tested with the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
     Diffused, this is minus the gradient of the heat kernel, which points away from p in all directions alike, whatever
@@ -213,14 +213,14 @@ def inner_point_vectors(triangles: LaidOutTriangles, places: Places) -> csr_arra
 
 
 def in_frames(
-    triangles: LaidOutTriangles, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
 ) -> NDArray[np.complex128]:
     """(k, 3) vectors in the layout of some faces, as the frames of their edges see them."""
     turned = np.conj(triangles.edge_directions[faces]) * vectors[:, None]
     return np.where(triangles.reflected[faces], np.conj(turned), turned)
 
 
-def from_faces(triangles: LaidOutTriangles, faces: NDArray[np.int64], vectors: NDArray[np.complex128]) -> csr_array:
+def from_faces(triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]) -> csr_array:
     """(1, e) sums of face vectors over the three edges of each face."""
     return scatter(triangles.n_edges, triangles.edges.of_faces[faces], in_frames(triangles, faces, vectors))
 

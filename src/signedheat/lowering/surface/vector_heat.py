@@ -1,4 +1,4 @@
-"""Step 1 on laid-out triangles: one factorisation, and right-hand sides carried as far as they have to go."""
+"""Step 1 on intrinsic mesh: one factorisation, and right-hand sides carried as far as they have to go."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ...geometry.intrinsic_mesh import LaidOutTriangles
+from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.triangle_kernels import extremes
 from ...linear import Factor, factorize
 from ...operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
@@ -29,7 +29,7 @@ class VectorHeat:
 
     Parameters
     ----------
-    triangles : LaidOutTriangles
+    triangles : IntrinsicMesh
         The surface.
     time : float
         t.
@@ -37,7 +37,7 @@ class VectorHeat:
         Fill-reducing order of the edges.
     """
 
-    triangles: LaidOutTriangles
+    triangles: IntrinsicMesh
     time: float
     order: NDArray[np.int64]
 
