@@ -156,7 +156,7 @@ def nodes(mesh, curve) -> list:
     for face, weights in zip(curve.faces, curve.barycentric, strict=True):
         first, second = np.sort(np.argsort(weights)[1:])
         corner = first if second == first + 1 else second
-        edge = mesh.edges.of_faces[face, corner]
+        edge = mesh.edges.face_edges[face, corner]
         head = (corner + 1) % 3 if mesh.edges.forward[face, corner] else corner
         result.append((int(edge), [float(weights[head])]))
     return result

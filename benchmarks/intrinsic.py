@@ -59,7 +59,7 @@ class Case:
     def split(self) -> Case:
         """Every face split in four; old vertices go first."""
         mesh, edges = self.mesh, self.mesh.edges
-        corner, middle = mesh.faces, mesh.n_vertices + edges.of_faces
+        corner, middle = mesh.faces, mesh.n_vertices + edges.face_edges
         parts = [np.stack([corner[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)]
         halves = [
             None if f is None else np.concatenate([f, f[edges.vertices].mean(axis=1)])

@@ -85,7 +85,7 @@ def write_input(file: Path, level: int) -> int:
         arrays[f"faces{k}"], arrays[f"barycentric{k}"] = curve.faces, curve.barycentric
         opposite = curve.barycentric.argmin(axis=1)
         corner = (opposite + 1) % 3
-        edge = mesh.edges.of_faces[curve.faces, corner]
+        edge = mesh.edges.face_edges[curve.faces, corner]
         rows = np.arange(len(edge))
         tail_first = mesh.edges.vertices[edge, 0] == mesh.faces[curve.faces, corner]
         arrays[f"edge{k}"] = edge

@@ -130,7 +130,7 @@ def test_voxels_that_touch_along_an_edge_are_connected(offset):
     assert (triangles.edges.face_counts == 2).all()
     assert triangles.is_consistently_oriented
     tail = np.where(triangles.edges.forward, triangles.corner_vertices, np.roll(triangles.corner_vertices, -1, axis=1))
-    assert (tail == triangles.edges.vertices[triangles.edges.of_faces, 0]).all()
+    assert (tail == triangles.edges.vertices[triangles.edges.face_edges, 0]).all()
 
     axis = int(np.argmax(offset))  # a belt round the first box: distance goes on over the second
     phi = sh.SignedHeatSolver(surface).distance(surface.level_set(surface.vertices[:, axis], 3.0)).values

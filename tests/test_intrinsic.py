@@ -36,7 +36,7 @@ def angle_sums(triangles):
 def opposite_cotangents(triangles):
     """(e,) sum of the cotangents of the angles opposite to every edge: negative where Delaunay is violated."""
     opposite = np.roll(triangles.corner_cotangents, -2, axis=1)
-    return np.bincount(triangles.edges.of_faces.ravel(), opposite.ravel(), triangles.n_edges)
+    return np.bincount(triangles.edges.face_edges.ravel(), opposite.ravel(), triangles.n_edges)
 
 
 @pytest.fixture(params=SURFACES)
@@ -58,8 +58,8 @@ def test_the_surface_stays_and_the_triangles_are_delaunay(surface, refine):
     lengths = np.zeros(after.n_edges)
     for face_lengths in after.edge_lengths.T, np.roll(after.edge_lengths, 1, axis=1).T:
         assert np.isfinite(face_lengths).all()
-    lengths[after.edges.of_faces] = after.edge_lengths
-    np.testing.assert_allclose(lengths[after.edges.of_faces], after.edge_lengths, rtol=1e-12)
+    lengths[after.edges.face_edges] = after.edge_lengths
+    np.testing.assert_allclose(lengths[after.edges.face_edges], after.edge_lengths, rtol=1e-12)
     assert np.bincount(after.edges.face_counts, minlength=4)[3] % 6 == 0  # the spine of the book is still there
 
 
@@ -78,7 +78,7 @@ def test_euler_characteristic_and_gluing(surface):
         return len(np.unique(t.corner_vertices)) - t.n_edges + t.n_faces
 
     assert euler(better.triangles) == euler(better.base)
-    ends = better.triangles.edges.vertices[better.triangles.edges.of_faces]
+    ends = better.triangles.edges.vertices[better.triangles.edges.face_edges]
     forward = better.triangles.edges.forward[..., None]
     corners = np.stack([better.faces, np.roll(better.faces, -1, axis=1)], axis=-1)
     np.testing.assert_array_equal(np.where(forward, ends, ends[..., ::-1]), corners)
@@ -157,7 +157,7 @@ def test_kept_curves_run_along_edges_and_boundaries_stay():
     curve = circle_on(mesh)
     better = sh.intrinsic_delaunay(mesh, keep=[curve], refine=True)
     lengths = np.zeros(better.triangles.n_edges)
-    lengths[better.triangles.edges.of_faces] = better.triangles.edge_lengths
+    lengths[better.triangles.edges.face_edges] = better.triangles.edge_lengths
     polygon = 150 * 2 * 0.55 * np.sin(np.pi / 150)
     assert lengths[better.marked].sum() == pytest.approx(polygon, rel=1e-9)
     assert lengths[better.triangles.edges.face_counts == 1].sum() == pytest.approx(8.0, rel=1e-12)
@@ -172,7 +172,7 @@ def test_only_the_kept_curve_is_marked_on_a_closed_surface():
     better = sh.intrinsic_delaunay(mesh, keep=north, refine=True)
     assert better.n_vertices > 1.3 * mesh.n_vertices
     lengths = np.zeros(better.triangles.n_edges)
-    lengths[better.triangles.edges.of_faces] = better.triangles.edge_lengths
+    lengths[better.triangles.edges.face_edges] = better.triangles.edge_lengths
     assert lengths[better.marked].sum() == pytest.approx(better.bring(north).lengths.sum(), rel=1e-9)
 
 
@@ -236,7 +236,7 @@ def test_edges_run_straight_on_the_mesh(surface):
     better = sh.intrinsic_delaunay(surface, refine=True)
     owners, starts, ends = better.edge_lines()
     lengths = np.zeros(better.triangles.n_edges)
-    lengths[better.triangles.edges.of_faces] = better.triangles.edge_lengths
+    lengths[better.triangles.edges.face_edges] = better.triangles.edge_lengths
     traced = np.bincount(owners, np.linalg.norm(ends - starts, axis=1))
     np.testing.assert_allclose(traced, lengths, atol=1e-9)
     first = np.searchsorted(owners, np.arange(len(lengths)))

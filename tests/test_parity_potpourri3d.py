@@ -10,7 +10,7 @@ from surface_cases import sphere, square
 from surfaces import surface_of_revolution
 
 import signedheat as sh
-from signedheat.geometry.edges import face_edges
+from signedheat.geometry.edges import edge_table
 from signedheat.linear import factorize, whole
 from signedheat.lowering.surface.source import oriented_vectors
 from signedheat.method import diffuse, normalize
@@ -63,7 +63,7 @@ def level_curves(name):
 @every_mesh
 def test_edges_have_the_same_numbers(name):
     mesh = MESHES[name][0]
-    assert np.array_equal(pp3d.edges(mesh.vertices, mesh.faces), face_edges(mesh.faces).vertices)
+    assert np.array_equal(pp3d.edges(mesh.vertices, mesh.faces), edge_table(mesh.faces).vertices)
 
 
 @every_mesh

@@ -100,7 +100,7 @@ def test_nonorientable_surfaces_equal_their_double_cover(closed):
     for triangles, laps in ((base, 1), (cover, 2)):
         surface = SurfaceDiscretization(None, triangles)
         vectors = np.zeros(triangles.n_edges, dtype=complex)
-        np.add.at(vectors, triangles.edges.of_faces, triangles.in_edge_frames(np.tile(in_faces, laps)[:, None]))
+        np.add.at(vectors, triangles.edges.face_edges, triangles.in_edge_frames(np.tile(in_faces, laps)[:, None]))
         samples = np.eye(base.n_vertices)[:1] if laps == 1 else np.eye(cover.n_vertices)[gluing.below == 0]
         source = SimpleNamespace(
             vectors=sparse.csr_array(vectors[None]),
@@ -178,8 +178,8 @@ def level_sets(mesh, rng):
 def zigzag(mesh, rng):
     """Nine crossings of one edge, back and forth between its faces."""
     edge = rng.integers(len(mesh.edges.vertices))
-    face, side = np.argwhere(mesh.edges.of_faces == edge)[0]
-    other = np.flatnonzero((mesh.edges.of_faces == edge).any(axis=1))[1]
+    face, side = np.argwhere(mesh.edges.face_edges == edge)[0]
+    other = np.flatnonzero((mesh.edges.face_edges == edge).any(axis=1))[1]
     crossings = np.zeros((9, 3))
     crossings[:, (side + 1) % 3] = np.linspace(0.1, 0.9, 9)
     crossings[:, side] = 1 - crossings[:, (side + 1) % 3]

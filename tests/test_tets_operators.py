@@ -112,7 +112,7 @@ def test_faces_of_the_mesh_are_recognised():
     mesh = boxes((3, 3, 3), 1.0, jitter=0.1)
     faces = mesh.faces.vertices
     pieces = clip_triangles(mesh, Planes.of(mesh), mesh.vertices[faces])
-    assert (mesh.faces.of_tets[pieces.tets, pieces.in_face] == pieces.parents).all()
+    assert (mesh.faces.tet_faces[pieces.tets, pieces.in_face] == pieces.parents).all()
     sums = np.bincount(pieces.parents, pieces.areas)
     exact = sh.TriangleMesh(mesh.vertices, faces).face_areas
     assert sums == pytest.approx(exact, rel=1e-12)
@@ -142,19 +142,19 @@ def heat_system(mesh: sh.TetMesh, spacings: float = 1.0) -> tuple[sparse.csr_mat
 
     discretization = discretize(mesh)
     source = discretization.lower([sphere(2, 0.4)], spacings)
-    return discretization._heat_matrix(source.time), source.vectors, mesh.faces.of_tets
+    return discretization._heat_matrix(source.time), source.vectors, mesh.faces.tet_faces
 
 
 def test_conjugate_gradients_keep_the_far_field():
     mesh = boxes((14, 14, 14), 0.25, jitter=0.1)
     mesh = sh.TetMesh(mesh.vertices - 0.6, mesh.tets)  # the source in a corner: far away X is 1e-14 of its maximum
-    matrix, loads, of_tets = heat_system(mesh)
+    matrix, loads, tet_faces = heat_system(mesh)
     order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
     iterated = IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=1e-3)
     direct = factorize(matrix).solve(loads)
     sizes = np.abs(direct).max(axis=1)
     assert sizes.min() < 1e-12 * sizes.max()
-    a, b = (x[of_tets].mean(axis=1) for x in (iterated, direct))
+    a, b = (x[tet_faces].mean(axis=1) for x in (iterated, direct))
     cosine = np.einsum("mi,mi->m", a, b) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)
     assert np.degrees(np.arccos(np.clip(cosine.min(), -1, 1))) < 0.1
 

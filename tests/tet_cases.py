@@ -66,8 +66,8 @@ def plain_recipe(mesh: sh.TetMesh, shape: sh.TriangleMesh) -> np.ndarray:
     p = vertices[corners]
     normals = np.cross(p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0]) / 2
     volumes = mesh.tet_volumes
-    triples, of_tets = np.unique(np.sort(corners.reshape(-1, 3)), axis=0, return_inverse=True)
-    of_tets = of_tets.reshape(-1, 4)
+    triples, tet_faces = np.unique(np.sort(corners.reshape(-1, 3)), axis=0, return_inverse=True)
+    tet_faces = tet_faces.reshape(-1, 4)
     centers = vertices[triples].mean(axis=1)
     products = np.einsum("mai,mbi->mab", normals, normals)
 
@@ -76,16 +76,16 @@ def plain_recipe(mesh: sh.TetMesh, shape: sh.TriangleMesh) -> np.ndarray:
         return sparse.csr_matrix((entries, (np.repeat(ids, 4), np.tile(ids, 4).ravel())), shape=(n, n))
 
     pairs = [(a, b) for a in range(4) for b in range(a)]
-    h = np.mean([np.linalg.norm(centers[of_tets[:, a]] - centers[of_tets[:, b]], axis=1) for a, b in pairs])
+    h = np.mean([np.linalg.norm(centers[tet_faces[:, a]] - centers[tet_faces[:, b]], axis=1) for a, b in pairs])
     facing = {tuple(sorted(face)): face for face in shape.faces.tolist()}
     on = np.array([tuple(triple) in facing for triple in triples.tolist()])
     faces = np.array([facing[tuple(triple)] for triple in triples[on].tolist()])
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     sources = np.zeros((len(triples), 3))
     sources[on] = np.cross(b - a, c - a) / 2
-    mass = sparse.diags_array(np.bincount(of_tets.ravel(), np.repeat(volumes / 4, 4)))
-    heat = sparse.csr_matrix(mass + h**2 * assembled(of_tets, len(triples), 1 / volumes))
-    y = factorize(heat).solve(sources)[of_tets].mean(axis=1)
+    mass = sparse.diags_array(np.bincount(tet_faces.ravel(), np.repeat(volumes / 4, 4)))
+    heat = sparse.csr_matrix(mass + h**2 * assembled(tet_faces, len(triples), 1 / volumes))
+    y = factorize(heat).solve(sources)[tet_faces].mean(axis=1)
     y /= np.abs(y).max(axis=1, keepdims=True)
     y /= np.linalg.norm(y, axis=1, keepdims=True)
     right = -np.bincount(tets.ravel(), np.einsum("mai,mi->ma", normals, y).ravel() / 3, len(vertices))

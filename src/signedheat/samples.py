@@ -34,7 +34,7 @@ def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0
     faces = np.where(outward[:, None], triples, triples[:, ::-1])[longest < 2.1]
     for _ in range(subdivisions):
         edges = TriangleMesh(points, faces).edges
-        middle = len(points) + edges.of_faces
+        middle = len(points) + edges.face_edges
         points = np.concatenate([points, points[edges.vertices].mean(axis=1)])
         corner, ab, bc, ca = faces, *middle.T
         faces = np.concatenate(

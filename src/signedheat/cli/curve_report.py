@@ -19,7 +19,7 @@ NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
     """One row per source: where its points lie, how its segments run, length, open ends."""
     mesh = surface.triangulation
-    lengths = mesh.edge_lengths[mesh.edges.of_faces]
+    lengths = mesh.edge_lengths[mesh.edges.face_edges]
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     return [report(triangles, source, number) for number, source in enumerate(sources)]
 

@@ -261,7 +261,7 @@ def intrinsic_delaunay(
 
 def laid_out(mesh: TriangleMesh) -> tuple[IntrinsicMesh, float]:
     """A mesh as intrinsic mesh, none of them quite flat; and the length that was added to all edges for that."""
-    lengths, added = mollify(mesh.edge_lengths[mesh.edges.of_faces], MARGIN)
+    lengths, added = mollify(mesh.edge_lengths[mesh.edges.face_edges], MARGIN)
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
     return IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added

@@ -28,7 +28,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     odd = np.where(count[crossed] == 1, above[faces[crossed]].argmax(axis=1), above[faces[crossed]].argmin(axis=1))
     sides = np.stack([odd, (odd + 2) % 3], axis=1)
     sides[count[crossed] == 2] = sides[count[crossed] == 2, ::-1]
-    on_edges = edges.of_faces[crossed[:, None], sides]
+    on_edges = edges.face_edges[crossed[:, None], sides]
 
     tail, head = (values[edges.vertices[:, k]] for k in (0, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -55,7 +55,7 @@ def on_sides(
 ) -> NDArray[np.float64]:
     """(k, 3) barycentric coordinates of points on sides of faces, from fractions of edges."""
     row = np.arange(len(faces))
-    fraction = along[mesh.edges.of_faces[faces, sides]]
+    fraction = along[mesh.edges.face_edges[faces, sides]]
     fraction = np.where(mesh.edges.forward[faces, sides], fraction, 1 - fraction)
     weights = np.zeros((len(faces), 3))
     weights[row, sides] = 1 - fraction
@@ -75,14 +75,14 @@ def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.in
 
 def region_boundary(mesh: Triangles, mask: NDArray[np.bool_]) -> list[Curve]:
     """Edges between faces in a region and faces outside, with the region to the left."""
-    inside = np.bincount(mesh.edges.of_faces.ravel(), np.repeat(mask, 3), len(mesh.edges.vertices))
+    inside = np.bincount(mesh.edges.face_edges.ravel(), np.repeat(mask, 3), len(mesh.edges.vertices))
     between = (inside > 0) & (inside < mesh.edges.face_counts)
-    return along_sides(mesh, between[mesh.edges.of_faces] & mask[:, None])
+    return along_sides(mesh, between[mesh.edges.face_edges] & mask[:, None])
 
 
 def boundary_curves(mesh: Triangles) -> list[Curve]:
     """Edges of a single face, with the surface to the left."""
-    return along_sides(mesh, (mesh.edges.face_counts == 1)[mesh.edges.of_faces])
+    return along_sides(mesh, (mesh.edges.face_counts == 1)[mesh.edges.face_edges])
 
 
 def along_sides(mesh: Triangles, chosen: NDArray[np.bool_]) -> list[Curve]:
@@ -114,5 +114,5 @@ def inward(mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64]) 
 def is_consistent(mesh: Triangles) -> bool:
     """Whether no two faces run along an edge in the same direction."""
     edges = mesh.edges
-    ahead = np.bincount(edges.of_faces.ravel(), edges.forward.ravel(), len(edges.vertices))
+    ahead = np.bincount(edges.face_edges.ravel(), edges.forward.ravel(), len(edges.vertices))
     return bool((ahead <= 1).all() and (edges.face_counts - ahead <= 1).all())

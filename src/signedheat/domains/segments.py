@@ -88,7 +88,7 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: in
     empty = (at_start == 0) & (at_end == 0)
     sides = (empty.argmax(axis=1) + 1) % 3
     along = empty.any(axis=1)
-    edges = np.where(along, triangles.edges.of_faces[faces, sides], -1)
+    edges = np.where(along, triangles.edges.face_edges[faces, sides], -1)
     faces, edges, sides, steps, along, ends, segment = (
         a[keep] for a in (faces, edges, sides, steps, along, ends, segment)
     )

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.box_tree import BoxTree
-from ..geometry.tet_faces import tet_faces
+from ..geometry.tet_faces import face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
 from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
@@ -87,7 +87,7 @@ class TetMesh:
     @cached_property
     def faces(self) -> Any:
         """The triangles between and around the tets: an `operators.tetrahedral.FaceTable`."""
-        return tet_faces(self.tets)
+        return face_table(self.tets)
 
     @property
     def tet_volumes(self) -> NDArray[np.float64]:
@@ -109,9 +109,9 @@ class TetMesh:
         """(m,) part of the mesh that each tet belongs to; tets of one part are connected through faces."""
         from scipy import sparse
 
-        m, of_tets = self.n_tets, self.faces.of_tets.ravel()
+        m, tet_faces = self.n_tets, self.faces.tet_faces.ravel()
         size = m + len(self.faces.vertices)
-        ends = np.repeat(np.arange(m), 4), of_tets + m
+        ends = np.repeat(np.arange(m), 4), tet_faces + m
         graph = sparse.coo_matrix((np.ones(4 * m, dtype=np.int8), ends), shape=(size, size))
         return sparse.csgraph.connected_components(graph, directed=False)[1][:m].astype(np.int64)
 

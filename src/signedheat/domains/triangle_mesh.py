@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..geometry.edges import EdgeTable, face_edges
+from ..geometry.edges import EdgeTable, edge_table
 from .exchange import Exchangeable
 from .surface import Surface
 from .validation import element_ids, finite_rows
@@ -64,7 +64,7 @@ class TriangleMesh(Exchangeable, Surface):
     @cached_property
     def edges(self) -> EdgeTable:
         """The edges, numbered by first appearance in the faces (corner 0–1, 1–2, 2–0, face after face)."""
-        return face_edges(self.faces)
+        return edge_table(self.faces)
 
     @cached_property
     def face_area_vectors(self) -> NDArray[np.float64]:

@@ -89,7 +89,7 @@ def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], 
 
     polygons, owners = [], []
     table = triangles.edges
-    rows = (a.tolist() for a in (triangles.corner_vertices, table.of_faces, table.forward))
+    rows = (a.tolist() for a in (triangles.corner_vertices, table.face_edges, table.forward))
     for face, (corners, edges, forward) in enumerate(zip(*rows, strict=True)):
         outline = []
         for corner, edge, ahead in zip(corners, edges, forward, strict=True):

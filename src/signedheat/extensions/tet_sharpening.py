@@ -53,7 +53,9 @@ def _(
     triangles = positions[corners]
     nearest, _ = nearest_on_triangles(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)), points)
     nearest[np.isnan(values)] = -1
-    walls = Walls(unknowns, tet_neighbors(mesh.faces), mesh.faces.of_tets, planes.normals, planes.offsets, planes.signs)
+    walls = Walls(
+        unknowns, tet_neighbors(mesh.faces), mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs
+    )
     distance, nearest, feet, hidden = bent_distance(
         walls,
         points,

@@ -89,7 +89,7 @@ def without_halos(
     m, e = len(crossed), triangles.n_edges
     through = np.roll(signs, -1, axis=1)[crossed] * signs[crossed] < 0
     face, side = np.nonzero(through)
-    ends = face, m + triangles.edges.of_faces[crossed[face], side]
+    ends = face, m + triangles.edges.face_edges[crossed[face], side]
     graph = sparse.coo_matrix((np.ones(len(face), dtype=np.int8), ends), shape=(m + e, m + e))
     line = sparse.csgraph.connected_components(graph, directed=False)[1][:m]
     corners = triangles.corner_vertices[crossed]

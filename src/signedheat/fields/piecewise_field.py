@@ -149,7 +149,7 @@ class PiecewiseField:
         largest = np.zeros((len(first), 2))
         np.maximum.at(largest, which, height)
         lengths = np.empty(self.triangles.n_edges)
-        lengths[self.triangles.edges.of_faces] = self.triangles.edge_lengths
+        lengths[self.triangles.edges.face_edges] = self.triangles.edge_lengths
         lines = []
         for chain, forward in chains(self.triangles.edges.vertices[edges]):
             ends = self.triangles.edges.vertices[edges[chain]]

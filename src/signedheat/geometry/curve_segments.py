@@ -72,7 +72,7 @@ def given_directions(
     on_edges = Places(faces[along], np.zeros((len(along), 3)), np.full(len(along), EDGE), edges[along], edges[along])
     if len(along):
         which, around = star(triangles, on_edges)
-        side = (triangles.edges.of_faces[around] == edges[along][which, None]).argmax(axis=1)
+        side = (triangles.edges.face_edges[around] == edges[along][which, None]).argmax(axis=1)
         seen = in_layout(triangles, positions, around, normals[along[which]])
         turned = np.conj(triangles.edge_directions[around, side]) * seen
         turned = np.where(triangles.reflected[around, side], np.conj(turned), turned)

@@ -18,20 +18,20 @@ class EdgeTable:
     ----------
     vertices : (e, 2) int
         Tail and head: the direction in which the FIRST face of the edge runs along it.
-    of_faces : (m, 3) int
+    face_edges : (m, 3) int
         Edge from corner k to corner k + 1 of each face.
     forward : (m, 3) bool
         Whether the face runs along that edge from tail to head.
     """
 
     vertices: NDArray[np.int64]
-    of_faces: NDArray[np.int64]
+    face_edges: NDArray[np.int64]
     forward: NDArray[np.bool_]
 
     @property
     def face_counts(self) -> NDArray[np.int64]:
         """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
-        return np.bincount(self.of_faces.ravel(), minlength=len(self.vertices))
+        return np.bincount(self.face_edges.ravel(), minlength=len(self.vertices))
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> NDArray[np.int64]:
         """Order that suits unknowns at edges, from a fill-reducing order of the vertices.
@@ -46,17 +46,17 @@ class EdgeTable:
         return np.argsort((np.minimum(a, b) + 1) * len(rank) - np.maximum(a, b), kind="stable")
 
 
-def face_edges(faces: NDArray[np.int64]) -> EdgeTable:
+def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face).
 
     Grows with the number of faces; a vertex that all faces share does no harm.
 
     Examples
     --------
-    >>> table = face_edges(np.array([[0, 1, 2], [2, 1, 3]]))
+    >>> table = edge_table(np.array([[0, 1, 2], [2, 1, 3]]))
     >>> table.vertices.tolist()
     [[0, 1], [1, 2], [2, 0], [1, 3], [3, 2]]
-    >>> table.of_faces.tolist()
+    >>> table.face_edges.tolist()
     [[0, 1, 2], [1, 3, 4]]
     """
     faces = np.ascontiguousarray(faces, dtype=np.int64)

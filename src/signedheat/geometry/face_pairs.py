@@ -55,7 +55,7 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
     >>> pairs.faces.tolist(), pairs.sides.tolist(), pairs.edges.tolist()
     ([[0, 1]], [[1, 0]], [1])
     """
-    edge = triangles.edges.of_faces.ravel()
+    edge = triangles.edges.face_edges.ravel()
     order = np.argsort(edge, kind="stable")
     count = np.bincount(edge, minlength=triangles.n_edges)
     last = np.cumsum(count)

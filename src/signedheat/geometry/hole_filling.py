@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .edges import face_edges
+from .edges import edge_table
 
 MOST_SIDES = 12
 
@@ -33,8 +33,8 @@ def hole_fillings(
     >>> hole_fillings(points, np.tile([0.0, 0, 1], (6, 1)), ring).tolist()
     [[5, 3, 4]]
     """
-    edges = face_edges(faces)
-    face, side = np.nonzero(edges.face_counts[edges.of_faces] == 1)
+    edges = edge_table(faces)
+    face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
     following = next_around_gap(points, normals, tails, heads)
     linked = np.flatnonzero(following >= 0)

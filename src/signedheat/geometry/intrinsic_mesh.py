@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import EdgeTable, face_edges
+from .edges import EdgeTable, edge_table
 from .triangle_kernels import gather, join_faces
 
 
@@ -67,7 +67,7 @@ class IntrinsicMesh:
         positions = np.zeros((len(lengths), 3), dtype=np.complex128)
         positions[:, 1] = base
         positions[:, 2] = apex_x + 1j * (twice_area / base)
-        return cls(corner_vertices, positions, face_edges(corner_vertices) if edges is None else edges, n_vertices)
+        return cls(corner_vertices, positions, edge_table(corner_vertices) if edges is None else edges, n_vertices)
 
     @property
     def n_faces(self) -> int:
@@ -93,8 +93,8 @@ class IntrinsicMesh:
     def agree_on_lengths(self) -> bool:
         """Whether all faces of every edge give it the same length; flattened voxel faces do not."""
         of_edges = np.empty(self.n_edges)
-        of_edges[self.edges.of_faces] = self.edge_lengths
-        return bool(np.allclose(of_edges[self.edges.of_faces], self.edge_lengths, rtol=1e-6, atol=0))
+        of_edges[self.edges.face_edges] = self.edge_lengths
+        return bool(np.allclose(of_edges[self.edges.face_edges], self.edge_lengths, rtol=1e-6, atol=0))
 
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
@@ -131,7 +131,7 @@ class IntrinsicMesh:
         if self.leading_sides is not None:
             return self.leading_sides
         first = np.full(self.n_edges, -1, dtype=np.int64)
-        flat = self.edges.of_faces.ravel()
+        flat = self.edges.face_edges.ravel()
         first[flat[::-1]] = np.arange(len(flat))[::-1]
         return first[first >= 0]
 
@@ -143,7 +143,7 @@ class IntrinsicMesh:
     @cached_property
     def face_parts(self) -> NDArray[np.int64]:
         """(m,) part of the surface that each face lies in, named by its first face; parts may share vertices."""
-        return join_faces(self.edges.of_faces, self.n_edges)
+        return join_faces(self.edges.face_edges, self.n_edges)
 
     def in_edge_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """(m, 3) or (m, 1) face-layout vectors as seen in the frame of each of the face's edges."""
@@ -152,10 +152,10 @@ class IntrinsicMesh:
 
     def in_face_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """(m, 3) the vectors of an (e,) edge array as seen in the layout of each face."""
-        of_face = vectors[self.edges.of_faces]
+        of_face = vectors[self.edges.face_edges]
         return self.edge_directions * np.where(self.reflected, np.conj(of_face), of_face)
 
     def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """(m,) sum of the vectors of an (e,) edge array at the three edges of each face, in its layout."""
         vectors = np.ascontiguousarray(vectors)
-        return gather(self.edges.of_faces, self.edge_directions, self.reflected, vectors)
+        return gather(self.edges.face_edges, self.edge_directions, self.reflected, vectors)

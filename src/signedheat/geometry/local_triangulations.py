@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .edges import face_edges
+from .edges import edge_table
 from .hole_filling import hole_fillings
 from .local_triangulation_kernels import accept_apart, signs_from_parents, voronoi_fans
 
@@ -173,7 +173,7 @@ def aligned(
     seen from its centroid, is positive.
     """
     n = len(points)
-    tail, head = face_edges(faces).vertices.T
+    tail, head = edge_table(faces).vertices.T
     bend = 1.0 - np.abs((normals[tail] * normals[head]).sum(axis=1))
     graph = sparse.csr_matrix((np.maximum(bend, 0) + 1e-6, (tail, head)), shape=(n, n))
     parts = sparse.csgraph.connected_components(graph, directed=False)[1]

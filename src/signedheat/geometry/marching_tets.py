@@ -8,7 +8,7 @@ from scipy import sparse
 
 from ..errors import OutsideError
 from .meshes import Tets
-from .tet_faces import tet_faces
+from .tet_faces import face_table
 
 CLEARANCE = 1e-3
 """Crossings keep this fraction of an edge from its ends, so that no two vertices of a surface coincide."""
@@ -60,7 +60,7 @@ def closed_level_set(
             "larger mesh"
         )
     keys, _ = _triangles(tets, used, mesh.n_vertices, _CUTS)
-    faces = tet_faces(tets)
+    faces = face_table(tets)
     walls = faces.vertices[faces.tet_counts == 1]
     if below[walls].any() and not below[walls].all():
         keys = np.concatenate([keys, _triangles(walls, below[walls], mesh.n_vertices, _LIDS)[0]])

@@ -79,7 +79,7 @@ def locate(
     on_edge = np.flatnonzero(kinds == EDGE)
     side = (np.argmin(inside[on_edge], axis=1) + 1) % 3  # the edge across from the corner that counts for nothing
     of_face = faces[on_edge], side
-    elements[on_edge] = triangles.edges.of_faces[of_face]
+    elements[on_edge] = triangles.edges.face_edges[of_face]
     forward = triangles.edges.forward[of_face]
     along[on_edge] = np.where(forward, inside[on_edge, (side + 1) % 3], inside[on_edge, side])
     return Places(faces, inside, kinds, elements, along)
@@ -131,7 +131,7 @@ def has(triangles: IntrinsicMesh, faces: NDArray[np.int64], places: Places) -> N
         places.kinds,
         [
             (triangles.corner_vertices[faces] == places.elements[:, None]).any(axis=1),
-            (triangles.edges.of_faces[faces] == places.elements[:, None]).any(axis=1),
+            (triangles.edges.face_edges[faces] == places.elements[:, None]).any(axis=1),
             faces == places.elements,
         ],
     )
@@ -150,7 +150,7 @@ def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], places: P
 
     on_edge = kinds == EDGE
     rows, face = moved[on_edge], other[on_edge]
-    side = (triangles.edges.of_faces[face] == elements[on_edge, None]).argmax(axis=1)
+    side = (triangles.edges.face_edges[face] == elements[on_edge, None]).argmax(axis=1)
     head = np.where(triangles.edges.forward[face, side], along[on_edge], 1 - along[on_edge])
     weights[rows, side] = 1 - head
     weights[rows, (side + 1) % 3] = head
@@ -177,7 +177,7 @@ def star(triangles: IntrinsicMesh, places: Places) -> tuple[NDArray[np.int64], N
     which, faces = [inside], [places.elements[inside]]
     for kind, table, count in (
         (VERTEX, triangles.corner_vertices, triangles.n_vertices),
-        (EDGE, triangles.edges.of_faces, triangles.n_edges),
+        (EDGE, triangles.edges.face_edges, triangles.n_edges),
     ):
         members = np.flatnonzero(places.kinds == kind)
         if not len(members):

@@ -131,21 +131,21 @@ def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
     surfels : Surfels
         The surfels.
     """
-    triangles = np.flatnonzero(edges.face_counts[edges.of_faces[:, 0]] > 2)
+    triangles = np.flatnonzero(edges.face_counts[edges.face_edges[:, 0]] > 2)
     surfel = triangles // 4
     step = np.zeros((len(surfel), 3), dtype=np.int64)
     step[np.arange(len(surfel)), surfels.axes[surfel]] = surfels.signs[surfel]
     outside = surfels.voxels[surfel] + step
-    key = np.column_stack([edges.of_faces[triangles, 0], outside])
+    key = np.column_stack([edges.face_edges[triangles, 0], outside])
     _, first, pair = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    kept = np.isin(first, np.unique(edges.of_faces[triangles, 0], return_index=True)[1])
+    kept = np.isin(first, np.unique(edges.face_edges[triangles, 0], return_index=True)[1])
     n_edges = len(edges.vertices)
     ids = np.where(kept, key[first, 0], n_edges + np.cumsum(~kept) - 1)
 
     leading = triangles[first[~kept]]  # the first triangle of each new edge gives it its direction
-    direction = edges.vertices[edges.of_faces[leading, 0]]
+    direction = edges.vertices[edges.face_edges[leading, 0]]
     direction = np.where(edges.forward[leading, 0, None], direction, direction[:, ::-1])
-    of_faces, forward = edges.of_faces.copy(), edges.forward.copy()
+    of_faces, forward = edges.face_edges.copy(), edges.forward.copy()
     of_faces[triangles, 0] = ids[pair.ravel()]
     renamed = triangles[~kept[pair.ravel()]]
     forward[renamed, 0] ^= ~edges.forward[leading, 0][of_faces[renamed, 0] - n_edges]

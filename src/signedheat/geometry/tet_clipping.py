@@ -91,9 +91,9 @@ class Planes:
         normals = np.cross(b - a, c - a)
         twice_area = np.linalg.norm(normals, axis=1)
         normals /= np.where(twice_area > 0, twice_area, 1)[:, None]
-        signs = np.sign(np.einsum("mki,mki->mk", normals[faces.of_tets], geometry.area_vectors))
+        signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], geometry.area_vectors))
         solid = geometry.thickness > FLAT
-        counts = np.bincount(faces.of_tets[solid].ravel(), minlength=len(normals))
+        counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
         return cls(
             normals=normals,
             offsets=np.einsum("fi,fi->f", normals, (a + b + c) / 3),
@@ -122,7 +122,7 @@ def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -
         tree.bounds,
         tree.items,
         planes.center,
-        mesh.faces.of_tets,
+        mesh.faces.tet_faces,
         planes.normals,
         planes.offsets,
         planes.tolerances,
@@ -150,7 +150,7 @@ def locate(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> NDArray[n
         tree.bounds,
         tree.items,
         planes.center,
-        mesh.faces.of_tets,
+        mesh.faces.tet_faces,
         planes.normals,
         planes.offsets,
         planes.tolerances,
@@ -168,7 +168,7 @@ def barycentric(mesh: Tets, tets: NDArray[np.int64], points: NDArray[np.float64]
 
 
 @compiled
-def _locate(points, bounds, items, center, of_tets, normals, offsets, tolerances, signs, solid):
+def _locate(points, bounds, items, center, tet_faces, normals, offsets, tolerances, signs, solid):
     found = np.full(len(points), -1, dtype=np.int64)
     stack = np.empty(128, dtype=np.int64)
     leaves = len(bounds) // 2
@@ -202,7 +202,7 @@ def _locate(points, bounds, items, center, of_tets, normals, offsets, tolerances
                     continue
                 inside = np.inf
                 for c in range(4):
-                    f = of_tets[t, c]
+                    f = tet_faces[t, c]
                     height = offsets[f] - (
                         normals[f, 0] * points[p, 0] + normals[f, 1] * points[p, 1] + normals[f, 2] * points[p, 2]
                     )
@@ -214,7 +214,7 @@ def _locate(points, bounds, items, center, of_tets, normals, offsets, tolerances
 
 
 @compiled
-def _clip(triangles, bounds, items, center, of_tets, normals, offsets, tolerances, signs, shares, solid):
+def _clip(triangles, bounds, items, center, tet_faces, normals, offsets, tolerances, signs, shares, solid):
     size = 64 + 4 * len(triangles)
     tets = np.empty(size, dtype=np.int64)
     parents = np.empty(size, dtype=np.int64)
@@ -262,14 +262,14 @@ def _clip(triangles, bounds, items, center, of_tets, normals, offsets, tolerance
                 t = items[k]
                 if t < 0 or not solid[t]:
                     continue
-                if _beyond(a, b, c, of_tets[t], normals, offsets, tolerances, signs[t]):
+                if _beyond(a, b, c, tet_faces[t], normals, offsets, tolerances, signs[t]):
                     continue
                 for i in range(3):
                     polygon[0, i], polygon[1, i], polygon[2, i] = a[i], b[i], c[i]
                 n = 3
                 on = -1
                 for corner in range(4):
-                    f = of_tets[t, corner]
+                    f = tet_faces[t, corner]
                     sign = signs[t, corner]
                     n, flat = _cut(polygon, n, other, heights, normals[f], offsets[f], tolerances[f], sign)
                     if flat:
@@ -290,7 +290,7 @@ def _clip(triangles, bounds, items, center, of_tets, normals, offsets, tolerance
                 if area <= 0.0:
                     continue
                 if on >= 0:
-                    share = shares[of_tets[t, on]]
+                    share = shares[tet_faces[t, on]]
                     area *= share
                     area_vectors[count] *= share
                 tets[count] = t

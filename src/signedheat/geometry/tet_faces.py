@@ -22,26 +22,26 @@ class FaceTable:
     ----------
     vertices : (f, 3) int
         Counter-clockwise as seen from outside the FIRST tet that has the face.
-    of_tets : (m, 4) int
+    tet_faces : (m, 4) int
         Face opposite each corner of each tet.
     """
 
     vertices: NDArray[np.int64]
-    of_tets: NDArray[np.int64]
+    tet_faces: NDArray[np.int64]
 
     @cached_property
     def tet_counts(self) -> NDArray[np.int64]:
         """(f,) number of tets at each face: 1 on the boundary, more than 2 where nonmanifold."""
-        return np.bincount(self.of_tets.ravel(), minlength=len(self.vertices))
+        return np.bincount(self.tet_faces.ravel(), minlength=len(self.vertices))
 
 
-def tet_faces(tets: NDArray[np.int64]) -> FaceTable:
+def face_table(tets: NDArray[np.int64]) -> FaceTable:
     """Find the faces of tets, numbered by first appearance, in time linear in their number.
 
     Examples
     --------
-    >>> table = tet_faces(np.array([[0, 1, 2, 3], [4, 1, 3, 2]]))
-    >>> table.of_tets.tolist()
+    >>> table = face_table(np.array([[0, 1, 2, 3], [4, 1, 3, 2]]))
+    >>> table.tet_faces.tolist()
     [[0, 1, 2, 3], [0, 4, 5, 6]]
     >>> table.tet_counts.tolist()
     [2, 1, 1, 1, 1, 1, 1]

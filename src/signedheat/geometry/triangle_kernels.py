@@ -11,7 +11,7 @@ def find_edges(faces, degrees):
     first = np.full(len(degrees), -1)
     following = np.empty(faces.size, dtype=np.int64)
     vertices = np.empty((faces.size, 2), dtype=np.int64)
-    of_faces = np.empty(faces.shape, dtype=np.int64)
+    face_edges = np.empty(faces.shape, dtype=np.int64)
     forward = np.empty(faces.shape, dtype=np.bool_)
     count = 0
     for f in range(len(faces)):
@@ -29,9 +29,9 @@ def find_edges(faces, degrees):
                 following[edge] = first[keeper]
                 first[keeper] = edge
                 count += 1
-            of_faces[f, k] = edge
+            face_edges[f, k] = edge
             forward[f, k] = vertices[edge, 0] == tail
-    return vertices[:count].copy(), of_faces, forward
+    return vertices[:count].copy(), face_edges, forward
 
 
 @compiled
@@ -94,13 +94,13 @@ def _merge(starts, columns, values):
 
 
 @compiled
-def gather(of_faces, directions, reflected, vectors):
+def gather(face_edges, directions, reflected, vectors):
     """Sum of the three edge vectors of each face, in its layout."""
-    sums = np.empty(len(of_faces), dtype=np.complex128)
-    for f in range(len(of_faces)):
+    sums = np.empty(len(face_edges), dtype=np.complex128)
+    for f in range(len(face_edges)):
         total = 0j
         for k in range(3):
-            vector = vectors[of_faces[f, k]]
+            vector = vectors[face_edges[f, k]]
             total += directions[f, k] * (np.conj(vector) if reflected[f, k] else vector)
         sums[f] = total
     return sums
@@ -118,18 +118,18 @@ def add_fluxes(corners, positions, directions, n):
 
 
 @compiled
-def join_faces(of_faces, n_edges):
+def join_faces(face_edges, n_edges):
     """Which connected part each face lies in, where faces are joined along edges only: its first face."""
-    leader = np.arange(len(of_faces))
+    leader = np.arange(len(face_edges))
     last = np.full(n_edges, -1)
-    for f in range(len(of_faces)):
+    for f in range(len(face_edges)):
         for k in range(3):
-            other = last[of_faces[f, k]]
-            last[of_faces[f, k]] = f
+            other = last[face_edges[f, k]]
+            last[face_edges[f, k]] = f
             if other >= 0:
                 a, b = _root(leader, other), _root(leader, f)
                 leader[max(a, b)] = min(a, b)
-    for f in range(len(of_faces)):
+    for f in range(len(face_edges)):
         leader[f] = _root(leader, f)
     return leader
 

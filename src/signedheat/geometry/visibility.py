@@ -14,11 +14,11 @@ def tet_neighbors(faces: FaceTable) -> NDArray[np.int64]:
 
     Examples
     --------
-    >>> from signedheat.geometry.tet_faces import tet_faces
-    >>> tet_neighbors(tet_faces(np.array([[0, 1, 2, 3], [4, 1, 3, 2]]))).tolist()
+    >>> from signedheat.geometry.tet_faces import face_table
+    >>> tet_neighbors(face_table(np.array([[0, 1, 2, 3], [4, 1, 3, 2]]))).tolist()
     [[1, -1, -1, -1], [0, -1, -1, -1]]
     """
-    flat = faces.of_tets.ravel()
+    flat = faces.tet_faces.ravel()
     order = np.argsort(flat, kind="stable")
     same = flat[order[1:]] == flat[order[:-1]]
     beyond = np.full(len(flat), -1, dtype=np.int64)
@@ -31,7 +31,7 @@ def visible(
     starts: NDArray[np.float64],
     targets: NDArray[np.float64],
     neighbors: NDArray[np.int64],
-    of_tets: NDArray[np.int64],
+    tet_faces: NDArray[np.int64],
     normals: NDArray[np.float64],
     offsets: NDArray[np.float64],
     signs: NDArray[np.float64],
@@ -44,14 +44,14 @@ def visible(
         Where the lines begin, one in each tet, and where they end.
     neighbors : (m, 4) int
         From `tet_neighbors`.
-    of_tets, normals, offsets, signs
+    tet_faces, normals, offsets, signs
         The planes of the faces, as `sources.clipping.Planes` has them.
     """
-    return _visible(starts, targets, neighbors, of_tets, normals, offsets, signs)
+    return _visible(starts, targets, neighbors, tet_faces, normals, offsets, signs)
 
 
 @compiled
-def _visible(starts, targets, neighbors, of_tets, normals, offsets, signs):
+def _visible(starts, targets, neighbors, tet_faces, normals, offsets, signs):
     seen = np.ones(len(starts), dtype=np.bool_)
     for t in range(len(starts)):
         x, y, z = starts[t]
@@ -60,7 +60,7 @@ def _visible(starts, targets, neighbors, of_tets, normals, offsets, signs):
         for _ in range(len(starts)):
             leave, at = -1, np.inf
             for k in range(4):
-                f = of_tets[tet, k]
+                f = tet_faces[tet, k]
                 if f == entered:
                     continue
                 slope = signs[tet, k] * (normals[f, 0] * u + normals[f, 1] * v + normals[f, 2] * w)
@@ -71,7 +71,7 @@ def _visible(starts, targets, neighbors, of_tets, normals, offsets, signs):
                         leave, at = k, part
             if leave < 0 or at >= 1.0 - 1e-6:
                 break
-            entered = of_tets[tet, leave]
+            entered = tet_faces[tet, leave]
             tet = neighbors[tet, leave]
             if tet < 0:
                 seen[t] = False

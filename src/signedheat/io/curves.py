@@ -91,7 +91,7 @@ def read_curves(path: PathLike, domain: Any, strict: bool = False) -> list[Curve
 
 def refuse_gaps(sources: Sequence[Curve | SurfacePoints], mesh: TriangleMesh) -> None:
     """Raise a `SourceError` if consecutive points of a curve share no face."""
-    lengths = mesh.edge_lengths[mesh.edges.of_faces]
+    lengths = mesh.edge_lengths[mesh.edges.face_edges]
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     for number, source in enumerate(sources):
         if isinstance(source, Curve):

@@ -23,7 +23,7 @@ def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matr
     time : float
         t, in squared units of length.
     """
-    edge, z = triangles.edges.of_faces, triangles.edge_directions
+    edge, z = triangles.edges.face_edges, triangles.edge_directions
     diagonal, factor = _local_entries(triangles, time, slice(None))
     if triangles.is_consistently_oriented:
         return assemble(edge, diagonal, factor * np.conj(z) * np.roll(z, -1, axis=1), triangles.n_edges)
@@ -36,7 +36,7 @@ def vector_heat_forces(
     """(M + t L) times the (e,) vectors, as far as some faces add to it: complete at edges all of whose faces do."""
     diagonal, factor = _local_entries(triangles, time, faces)
     z, reflected = triangles.edge_directions[faces], triangles.reflected[faces]
-    edge = triangles.edges.of_faces[faces]
+    edge = triangles.edges.face_edges[faces]
     x = z * np.where(reflected, np.conj(vectors[edge]), vectors[edge])
     forces = diagonal * x + factor * np.roll(x, -1, axis=1) + np.roll(factor * x, 1, axis=1)
     turned = np.conj(z) * forces
@@ -54,7 +54,7 @@ def _local_entries(triangles: IntrinsicMesh, time: float, faces: NDArray[np.int6
 
 def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
     """Blocks ``B_feᵀ B_fg``, where the columns of B_fe are the axes of the edge's frame in the face."""
-    edge, z = triangles.edges.of_faces, triangles.edge_directions
+    edge, z = triangles.edges.face_edges, triangles.edge_directions
     rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
     second = np.where(triangles.reflected, -1j, 1j) * z
     frame = np.stack([_components(z), _components(second)], axis=-1)

@@ -92,14 +92,14 @@ class Tetrahedra:
     def face_mass(self, faces: FaceTable) -> NDArray[np.float64]:
         """(f,) M of Eq. 12, lumped: a quarter of the volume at each face."""
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
-        return np.bincount(faces.of_tets.ravel(), weights=quarter, minlength=len(faces.vertices))
+        return np.bincount(faces.tet_faces.ravel(), weights=quarter, minlength=len(faces.vertices))
 
     def face_laplacian(self, faces: FaceTable) -> sparse.csr_matrix:
         """(f, f) Crouzeix–Raviart Laplacian: L_ab = Σ_T N_a·N_b / |T|, which is −(3/2) |e| cot θ between two faces.
 
         The faces of flat tets are tied to each other besides: directions then pass through them unharmed.
         """
-        return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.of_tets, len(faces.vertices))
+        return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
 
     def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
         """(n, n) cotan Laplacian: C_ij = Σ_T N_i·N_j / (9|T|), which is −(1/6) |e| cot θ between two vertices.

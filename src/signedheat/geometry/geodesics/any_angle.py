@@ -23,7 +23,7 @@ class Walls(NamedTuple):
 
     tets: NDArray[np.int64]
     neighbors: NDArray[np.int64]
-    of_tets: NDArray[np.int64]
+    tet_faces: NDArray[np.int64]
     normals: NDArray[np.float64]
     offsets: NDArray[np.float64]
     signs: NDArray[np.float64]
@@ -32,7 +32,7 @@ class Walls(NamedTuple):
 @compiled(nogil=True)
 def _beyond(walls, tet, k, x, y, z):
     """How far a point lies outside the face opposite corner k of a tet."""
-    f = walls.of_tets[tet, k]
+    f = walls.tet_faces[tet, k]
     height = walls.normals[f, 0] * x + walls.normals[f, 1] * y + walls.normals[f, 2] * z - walls.offsets[f]
     return walls.signs[tet, k] * height
 

@@ -32,14 +32,14 @@ class Faces(NamedTuple):
         """The same triangles, as the kernels want them."""
         table = triangles.edges
         lengths = np.empty(triangles.n_edges)
-        lengths[table.of_faces] = triangles.edge_lengths
-        at_edge, at_vertex = table.of_faces.ravel(), triangles.corner_vertices.ravel()
+        lengths[table.face_edges] = triangles.edge_lengths
+        at_edge, at_vertex = table.face_edges.ravel(), triangles.corner_vertices.ravel()
         edge_counts = np.bincount(at_edge, minlength=triangles.n_edges)
         vertex_counts = np.bincount(at_vertex, minlength=triangles.n_vertices)
         return cls(
             triangles.corner_vertices,
             triangles.corner_positions,
-            table.of_faces,
+            table.face_edges,
             table.forward,
             table.vertices,
             lengths,

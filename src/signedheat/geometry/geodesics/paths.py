@@ -70,7 +70,7 @@ def trace(triangles: IntrinsicMesh, start: Places, end: Places, name: str = "cur
     starts, ends = faces_at(triangles, start), faces_at(triangles, end)
     edges = triangles.edges
     sides, fractions, counts = shortest_lines(
-        triangles.corner_positions, edges.of_faces.ravel(), edges.forward.ravel(), triangles.n_edges, *starts, *ends
+        triangles.corner_positions, edges.face_edges.ravel(), edges.forward.ravel(), triangles.n_edges, *starts, *ends
     )
     weights = np.zeros((len(sides), 3))
     row = np.arange(len(sides))
@@ -134,13 +134,13 @@ def through_vertices(triangles: IntrinsicMesh, start: Places, end: Places, name:
 def edge_lengths(triangles: IntrinsicMesh) -> NDArray[np.float64]:
     """(e,) lengths of the edges, each as one of its faces has it."""
     lengths = np.zeros(triangles.n_edges)
-    lengths[triangles.edges.of_faces] = triangles.edge_lengths
+    lengths[triangles.edges.face_edges] = triangles.edge_lengths
     return lengths
 
 
 def parts_of_faces(triangles: IntrinsicMesh) -> NDArray[np.int64]:
     """(m,) which faces can be reached from one another across edges."""
-    m, edge = triangles.n_faces, triangles.edges.of_faces.ravel()
+    m, edge = triangles.n_faces, triangles.edges.face_edges.ravel()
     face = np.repeat(np.arange(m), 3)
     graph = csr_matrix((np.ones(len(edge)), (face, m + edge)), shape=(m + triangles.n_edges,) * 2)
     return connected_components(graph, directed=False)[1][:m]

@@ -101,8 +101,8 @@ def reach(triangles: IntrinsicMesh, union: Union, unfit: Sequence[bool]) -> tupl
     marked = np.zeros(triangles.n_edges, dtype=bool)
     marked[on_edges] = True
     faces_of = defaultdict(list)
-    for f, k in zip(*(a.tolist() for a in np.nonzero(marked[triangles.edges.of_faces])), strict=True):
-        faces_of[int(triangles.edges.of_faces[f, k])].append(f)
+    for f, k in zip(*(a.tolist() for a in np.nonzero(marked[triangles.edges.face_edges])), strict=True):
+        faces_of[int(triangles.edges.face_edges[f, k])].append(f)
 
     wanted = np.unique(np.concatenate([s for s, bad in zip(union.samples, unfit, strict=True) if bad]))
     bad_pieces = inside & np.asarray(unfit)[union.owners]
@@ -200,7 +200,7 @@ class Cut:
         edge_of: dict[tuple[int, int], tuple[int, bool]] = {}
         frames: dict[int, tuple[int, int, bool]] = {}
         for k in range(3):
-            edge, forward = int(triangles.edges.of_faces[face, k]), bool(triangles.edges.forward[face, k])
+            edge, forward = int(triangles.edges.face_edges[face, k]), bool(triangles.edges.forward[face, k])
             members = self.on_edge.get(edge, [])[:: 1 if forward else -1]
             subs = self.sub_edges.get(edge, [edge])[:: 1 if forward else -1]
             (x, y), (u, v) = points[k], points[(k + 1) % 3]
@@ -260,10 +260,10 @@ class Cut:
         def with_new(old: NDArray, name: str) -> NDArray:
             return np.concatenate([old[kept], [getattr(f, name) for f in self.faces]])[order]
 
-        of_faces = with_new(triangles.edges.of_faces, "edges")
+        face_edges = with_new(triangles.edges.face_edges, "edges")
         forward = with_new(triangles.edges.forward, "ahead")
         corners = with_new(triangles.corner_vertices, "corners")
-        used, first, flat = np.unique(of_faces, return_index=True, return_inverse=True)
+        used, first, flat = np.unique(face_edges, return_index=True, return_inverse=True)
         vertices = np.stack([corners.ravel()[first], np.roll(corners, -1, axis=1).ravel()[first]], axis=1)
         table = EdgeTable(vertices, flat.reshape(-1, 3), forward)
         finer = IntrinsicMesh(corners, with_new(triangles.corner_positions, "positions"), table, self.n_vertices)
@@ -319,7 +319,7 @@ class NewPiece(NamedTuple):
 
 def first_sides(triangles: IntrinsicMesh) -> NDArray[np.int64]:
     """(e,) the first side ``3 face + k`` of each edge."""
-    return np.unique(triangles.edges.of_faces, return_index=True)[1]
+    return np.unique(triangles.edges.face_edges, return_index=True)[1]
 
 
 def places_of(
@@ -350,10 +350,10 @@ def flipped(triangles: IntrinsicMesh, union: Union, is_new: NDArray[np.bool_]) -
         return triangles, union
     on_edge = union.edges >= 0
     fixed = np.ones(triangles.n_edges, dtype=bool)
-    fixed[triangles.edges.of_faces[is_new]] = False
+    fixed[triangles.edges.face_edges[is_new]] = False
     fixed[union.edges[on_edge]] = True
-    fixed[triangles.edges.of_faces[union.faces[~on_edge]]] = True
-    fixed[triangles.edges.of_faces[union.nodes.elements[union.nodes.kinds == FACE]]] = True
+    fixed[triangles.edges.face_edges[union.faces[~on_edge]]] = True
+    fixed[triangles.edges.face_edges[union.nodes.elements[union.nodes.kinds == FACE]]] = True
     fixed[union.nodes.elements[union.nodes.kinds == EDGE]] = True
     gluing = flip_all(glue(triangles, fixed))
     better = lay_out(gluing)

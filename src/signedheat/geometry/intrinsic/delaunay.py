@@ -46,7 +46,7 @@ def flip_to_delaunay(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | 
 def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> Gluing:
     """Start an intrinsic triangulation, with an empty history."""
     edges = triangles.edges
-    edge, n_edges = edges.of_faces.ravel(), triangles.n_edges
+    edge, n_edges = edges.face_edges.ravel(), triangles.n_edges
     order = np.argsort(edge, kind="stable")
     first = np.searchsorted(edge[order], np.arange(n_edges))
     last = np.searchsorted(edge[order], np.arange(n_edges), side="right") - 1

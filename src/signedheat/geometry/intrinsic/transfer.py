@@ -143,7 +143,7 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
         places[chosen],
         who[np.stack([who_start, who_end], axis=1)],
         faces,
-        np.where(on_edge, after.edges.of_faces[faces, side], -1),
+        np.where(on_edge, after.edges.face_edges[faces, side], -1),
         np.where(on_edge, turned, grown),
         source.oriented,
     )
@@ -156,7 +156,7 @@ def in_faces(triangles: IntrinsicMesh, source: Pieces) -> tuple[NDArray, NDArray
     """
     faces = source.faces.copy()
     on_edge = np.flatnonzero(source.edges >= 0)
-    flat = triangles.edges.of_faces.ravel()
+    flat = triangles.edges.face_edges.ravel()
     order = np.lexsort([triangles.face_areas[np.arange(len(flat)) // 3], flat])
     fattest = np.empty(triangles.n_edges, dtype=np.int64)
     fattest[flat[order]] = order

@@ -62,7 +62,7 @@ class SurfaceDiscretization:
     def __post_init__(self) -> None:
         if self.spacing is None:
             lengths = np.empty(self.triangles.n_edges)
-            lengths[self.triangles.edges.of_faces] = self.triangles.edge_lengths
+            lengths[self.triangles.edges.face_edges] = self.triangles.edge_lengths
             object.__setattr__(self, "spacing", 0.5 * float(lengths.mean()))
 
     @cached_property
@@ -153,7 +153,7 @@ class SurfaceDiscretization:
             return np.ones(self.triangles.n_vertices, dtype=bool)
         held, lit = np.zeros(self.triangles.n_edges, dtype=bool), np.zeros(self.triangles.n_faces, dtype=bool)
         held[vectors.indices[vectors.data != 0]] = True
-        lit[parts[held[self.triangles.edges.of_faces].any(axis=1)]] = True
+        lit[parts[held[self.triangles.edges.face_edges].any(axis=1)]] = True
         reached = np.zeros(self.triangles.n_vertices, dtype=bool)
         reached[self.triangles.corner_vertices[lit[parts]]] = True
         return reached
@@ -161,7 +161,7 @@ class SurfaceDiscretization:
 
 @discretize.register
 def _(domain: TriangleMesh) -> SurfaceDiscretization:
-    lengths, added = mollify(domain.edge_lengths[domain.edges.of_faces], 1e-6)
+    lengths, added = mollify(domain.edge_lengths[domain.edges.face_edges], 1e-6)
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
     triangles = IntrinsicMesh.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)

@@ -48,7 +48,7 @@ def free_end_arcs(
         arriving = -triangles.edge_vectors[face, (corner + 2) % 3]
         angle = np.angle(arriving * np.conj(leaving))
         spokes, ends = np.unique(
-            np.stack([triangles.edges.of_faces[face, corner], triangles.edges.of_faces[face, (corner + 2) % 3]]),
+            np.stack([triangles.edges.face_edges[face, corner], triangles.edges.face_edges[face, (corner + 2) % 3]]),
             return_inverse=True,
         )
         right, left = ends.reshape(2, -1)

@@ -53,12 +53,12 @@ def facing(
     distance = from_sources(triangles, parts)
     holds = np.zeros(triangles.n_faces, dtype=bool)
     holds[np.concatenate([part.faces[part.edges < 0] for part in parts])] = True
-    side = np.flatnonzero(table.face_counts[table.of_faces].ravel() > 2)
-    edge = table.of_faces.ravel()[side]
+    side = np.flatnonzero(table.face_counts[table.face_edges].ravel() > 2)
+    edge = table.face_edges.ravel()[side]
     opposite = np.roll(triangles.corner_vertices, -2, axis=1).ravel()[side]
     ends = distance[table.vertices[edge]].mean(axis=1)
     first = np.full(triangles.n_edges, -1)
-    first[table.of_faces.ravel()[triangles.first_sides]] = triangles.first_sides
+    first[table.face_edges.ravel()[triangles.first_sides]] = triangles.first_sides
     away = np.where(holds[side // 3], -1.0, distance[opposite])
     order = np.lexsort([side != first[edge], away, edge])  # of equal ones, the first stays first
     nearest = order[np.append(True, np.diff(edge[order]) > 0)]
@@ -81,7 +81,7 @@ def mirrored(part: Pieces, changed: NDArray[np.bool_]) -> Pieces:
 def from_sources(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> NDArray[np.float64]:
     """(n_vertices,) about how far every vertex is from the sources: along edges."""
     lengths = np.zeros(triangles.n_edges)
-    lengths[triangles.edges.of_faces] = triangles.edge_lengths
+    lengths[triangles.edges.face_edges] = triangles.edge_lengths
     n = triangles.n_vertices
     tail, head = triangles.edges.vertices.T
     onto = [corner_distances(triangles, part) for part in parts]

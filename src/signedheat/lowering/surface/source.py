@@ -158,11 +158,11 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[Pieces], spacin
     edges = np.unique(np.concatenate([p.edges for p in curves]))
     marked = np.zeros(triangles.n_edges, dtype=bool)
     marked[edges] = True
-    faces, sides = np.nonzero(marked[triangles.edges.of_faces])
+    faces, sides = np.nonzero(marked[triangles.edges.face_edges])
     inward = 1j * triangles.edge_vectors[faces, sides]
     on_edges = in_frames(triangles, faces, inward)
     on_edges[np.arange(len(faces)), sides] = 0
-    sums = scatter(triangles.n_edges, triangles.edges.of_faces[faces], on_edges)
+    sums = scatter(triangles.n_edges, triangles.edges.face_edges[faces], on_edges)
 
     touched = np.bincount(triangles.edges.vertices[edges].ravel(), minlength=triangles.n_vertices)
     for part in parts:  # an end that lies on another source is not free
@@ -209,7 +209,7 @@ def inner_point_vectors(triangles: IntrinsicMesh, places: Places) -> csr_array:
     outward = -1j * triangles.edge_vectors[faces] * (share / areas)[:, None]
     turned = np.conj(triangles.edge_directions[faces]) * outward
     turned = np.where(triangles.reflected[faces], np.conj(turned), turned)
-    return scatter(triangles.n_edges, triangles.edges.of_faces[faces], turned)
+    return scatter(triangles.n_edges, triangles.edges.face_edges[faces], turned)
 
 
 def in_frames(
@@ -222,7 +222,7 @@ def in_frames(
 
 def from_faces(triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]) -> csr_array:
     """(1, e) sums of face vectors over the three edges of each face."""
-    return scatter(triangles.n_edges, triangles.edges.of_faces[faces], in_frames(triangles, faces, vectors))
+    return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames(triangles, faces, vectors))
 
 
 def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> csr_array:

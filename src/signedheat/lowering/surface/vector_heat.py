@@ -51,7 +51,7 @@ class VectorHeat:
     @cached_property
     def _smallest_mass(self) -> float:
         """|X| is at most |X₀| divided by it."""
-        mass = np.bincount(self.triangles.edges.of_faces.ravel(), np.repeat(self.triangles.face_areas / 3.0, 3))
+        mass = np.bincount(self.triangles.edges.face_edges.ravel(), np.repeat(self.triangles.face_areas / 3.0, 3))
         return float(mass.min())
 
     def solve(self, sources: Sequence[csr_array]) -> list[list[NDArray[np.complex128]]]:
@@ -86,7 +86,7 @@ class VectorHeat:
         self, vectors: NDArray[np.complex128], faint: NDArray[np.bool_], start: NDArray[np.complex128]
     ) -> NDArray[np.complex128]:
         """(M + tL) applied to X on the faint edges and zero elsewhere."""
-        edges = self.triangles.edges.of_faces
+        edges = self.triangles.edges.face_edges
         of_face = faint[edges]
         near_border = np.zeros(len(faint), dtype=bool)
         near_border[edges[of_face.any(axis=1) & ~of_face.all(axis=1)]] = True

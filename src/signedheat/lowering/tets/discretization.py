@@ -118,10 +118,10 @@ class TetDiscretization:
 
         They are those of the last stage that knows all four faces of a tet.
         """
-        of_tets = self.mesh.faces.of_tets
+        tet_faces = self.mesh.faces.tet_faces
         means, gradients, factors = None, None, np.full(self.mesh.n_tets, -np.inf)
         for vectors, factor in stages:
-            of_faces = vectors[of_tets]
+            of_faces = vectors[tet_faces]
             known = ~np.isnan(of_faces[..., 0]).any(axis=1)
             if means is None:
                 means, gradients = np.zeros((self.mesh.n_tets, vectors.shape[1])), np.zeros((self.mesh.n_tets, 3))
@@ -149,7 +149,7 @@ class TetDiscretization:
         nearest = source.centers[cKDTree(source.centers).query(centers)[1]]
         neighbors = tet_neighbors(self.mesh.faces)
         ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
-        straight = visible(*ends, neighbors, self.mesh.faces.of_tets, planes.normals, planes.offsets, planes.signs)
+        straight = visible(*ends, neighbors, self.mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs)
         vectors, strengths = means[:, :3], means[:, 3]
         with np.errstate(divide="ignore"):
             heights = np.log(np.maximum(strengths, 0)) + factors

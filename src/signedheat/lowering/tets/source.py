@@ -157,7 +157,7 @@ def _loads(mesh: TetMesh, pieces: Pieces, width: float) -> NDArray[np.float64]:
     mean = [np.maximum(sign * excess, 1e-300)[:, None] for sign, excess in zip((1, -1), sent[::-1], strict=True)]
     shares *= mean[0] / ahead + mean[1] * ahead
     shares /= (shares * (ahead + 1 / ahead)).sum(axis=1, keepdims=True) / 2
-    faces, n = mesh.faces.of_tets[pieces.tets].ravel(), len(mesh.faces.vertices)
+    faces, n = mesh.faces.tet_faces[pieces.tets].ravel(), len(mesh.faces.vertices)
     columns = [*pieces.area_vectors.T, pieces.areas]
     return np.stack([np.bincount(faces, (shares * column[:, None]).ravel(), n) for column in columns], axis=1)
 
@@ -209,7 +209,7 @@ def _on_whole_faces(mesh: TetMesh, pieces: Pieces, components: NDArray[np.int64]
     covered = np.zeros(len(on), dtype=bool)
     if on.any():
         n_faces = len(mesh.faces.vertices)
-        face = mesh.faces.of_tets[pieces.tets[on], pieces.in_face[on]]
+        face = mesh.faces.tet_faces[pieces.tets[on], pieces.in_face[on]]
         _, which = np.unique(components[on] * n_faces + face, return_inverse=True)
         area = np.linalg.norm(mesh.geometry.area_vectors[pieces.tets[on], pieces.in_face[on]], axis=1)
         covered[on] = np.bincount(which, weights=pieces.areas[on])[which] >= WHOLE * area
