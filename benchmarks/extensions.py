@@ -98,7 +98,7 @@ def anisotropic(n: int, ratio: float) -> sh.TriangleMesh:
     return sh.TriangleMesh(points, np.concatenate([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)]))
 
 
-def star(waves: float, n: int = 1500) -> np.ndarray:
+def incident_faces(waves: float, n: int = 1500) -> np.ndarray:
     """Corners of a five-pointed wave around a circle."""
     t = np.linspace(0, 2 * np.pi, n, endpoint=False)
     return 0.5 * (1 + waves * np.cos(5 * t))[:, None] * np.stack([np.cos(t), np.sin(t)], axis=1)
@@ -153,7 +153,7 @@ def planar() -> None:
     for n in (2500, 5000, 10_000, 20_000):
         for curve, waves in (("star", 0.3), ("circle", 0.0)):
             for diffusion in (1, 100) if n == 20_000 else (1,):
-                compare(curve, disk(n), star(waves), diffusion)
+                compare(curve, disk(n), incident_faces(waves), diffusion)
 
 
 def awkward() -> None:
@@ -169,7 +169,9 @@ def awkward() -> None:
     for name, make in meshes.items():
         for curve, waves in (("star", 0.3), ("circle", 0.0)):
             for diffusion in (1, 100):
-                compare(f"{name[:-2] if ':' in name else name} {curve}"[:18], make(5000), star(waves), diffusion)
+                compare(
+                    f"{name[:-2] if ':' in name else name} {curve}"[:18], make(5000), incident_faces(waves), diffusion
+                )
 
 
 def in_tets() -> None:

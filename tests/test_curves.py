@@ -11,7 +11,7 @@ from surface_cases import band, book, flipped, laid_out, positions, sphere, squa
 import signedheat as sh
 from signedheat.domains.projection import closest_points
 from signedheat.domains.segments import pieces
-from signedheat.geometry.surface_points import EDGE, FACE, VERTEX, distinct, locate
+from signedheat.geometry.surface_points import EDGE, FACE, VERTEX, locate_points, unique_points
 
 
 def through_every_face(mesh, faces, weights):
@@ -33,15 +33,15 @@ def test_points_on_edges_and_vertices_are_recognised_through_any_face():
     for weight, kind in (([0.3, 0.7, 0.0], EDGE), ([0.0, 1.0, 0.0], VERTEX), ([0.2, 0.3, 0.5], FACE)):
         given = list(through_every_face(mesh, [face], [np.array(weight)]))
         assert len(given) == {EDGE: 2, VERTEX: 6, FACE: 1}[kind]
-        places = locate(triangles, np.array([g[0] for g in given]), np.array([g[1] for g in given]))
+        places = locate_points(triangles, np.array([g[0] for g in given]), np.array([g[1] for g in given]))
         assert (places.kinds == kind).all()
         assert len(np.unique(places.elements)) == 1 and np.ptp(places.along) < 1e-15
-        assert len(distinct(places)[0]) == 1
+        assert len(unique_points(places)[0]) == 1
 
 
 def test_rounding_does_not_move_points_off_edges():
     triangles = laid_out(square(6))
-    places = locate(triangles, np.array([3]), np.array([[0.4 - 3e-10, 0.6, 3e-10]]))
+    places = locate_points(triangles, np.array([3]), np.array([[0.4 - 3e-10, 0.6, 3e-10]]))
     assert places.kinds[0] == EDGE and places.barycentric[0, 2] == 0.0
 
 

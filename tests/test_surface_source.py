@@ -10,7 +10,7 @@ from surface_cases import band, book, flipped, laid_out, positions, sphere, squa
 import signedheat as sh
 from signedheat.domains.segments import in_pieces, pieces
 from signedheat.geometry.intrinsic.conforming_refinement import embed
-from signedheat.geometry.surface_points import locate
+from signedheat.geometry.surface_points import locate_points
 from signedheat.lowering.surface.source import surface_source
 
 
@@ -49,7 +49,7 @@ def test_oriented_edge_curves_match_the_published_code():
 def test_oriented_curves_across_faces_match_the_published_code():
     mesh = bumpy()
     (curve,) = mesh.level_set(mesh.vertices[:, 2] + 0.1 * mesh.vertices[:, 0], 0.2)
-    places = locate(laid_out(mesh), curve.faces, curve.barycentric)
+    places = locate_points(laid_out(mesh), curve.faces, curve.barycentric)
     nodes = [(int(e), [float(s)]) for e, s in zip(places.elements, places.along, strict=True)]
     peer_solver = pp3d.MeshSignedHeatSolver(np.array(mesh.vertices), np.array(mesh.faces))
     ref = peer_solver.compute_distance([[*nodes, nodes[0]]], level_set_constraint="None")

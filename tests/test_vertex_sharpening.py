@@ -27,7 +27,7 @@ def disk(n: int, stretch: float = 1.0, jitter: float = 0.0) -> sh.TriangleMesh:
     return sh.TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces)
 
 
-def star(n: int = 1500) -> np.ndarray:
+def incident_faces(n: int = 1500) -> np.ndarray:
     t = np.linspace(0, 2 * np.pi, n, endpoint=False)
     radius = 0.5 * (1 + 0.3 * np.cos(5 * t))
     return np.stack([radius * np.cos(t), radius * np.sin(t)], axis=1)
@@ -142,7 +142,7 @@ def test_work_is_linear():
 def test_star_in_the_disk(diffusion, stretch, jitter):
     """Never worse than before; on any triangles and after any diffusion below 0.2 % at 5 thousand faces."""
     mesh = disk(2500, stretch, jitter)
-    exact = polygon_distance(mesh.vertices[:, :2], star())
+    exact = polygon_distance(mesh.vertices[:, :2], incident_faces())
     plain = sh.SignedHeatSolver(mesh, diffusion).distance(mesh.level_set(exact, 0.0))
     sharp = sh.sharpen(plain)
     before, after = error(plain.values, exact), error(sharp.values, exact)
@@ -182,7 +182,7 @@ def test_never_much_worse_than_before_on_awkward_triangles(kind, curve, diffusio
     """
     mesh = AWKWARD[kind]()
     t = np.linspace(0, 2 * np.pi, 1500, endpoint=False)
-    corners = star() if curve == "star" else 0.5 * np.stack([np.cos(t), np.sin(t)], axis=1)
+    corners = incident_faces() if curve == "star" else 0.5 * np.stack([np.cos(t), np.sin(t)], axis=1)
     exact = polygon_distance(mesh.vertices[:, :2], corners)
     plain = sh.SignedHeatSolver(mesh, diffusion).distance(mesh.level_set(exact, 0.0))
     assert error(sh.sharpen(plain).values, exact) <= 1.1 * error(plain.values, exact)
@@ -190,7 +190,7 @@ def test_never_much_worse_than_before_on_awkward_triangles(kind, curve, diffusio
 
 def test_convex_method_mends_a_long_diffusion():
     mesh = disk(2500)
-    exact = polygon_distance(mesh.vertices[:, :2], star())
+    exact = polygon_distance(mesh.vertices[:, :2], incident_faces())
     plain = sh.SignedHeatSolver(mesh, 100.0).distance(mesh.level_set(exact, 0.0))
     sharp = sh.sharpen(plain, method=sh.Convex())
     notes = sharp.diagnostics.notes

@@ -11,7 +11,7 @@ from ..domains.curves import Curve
 from ..domains.segments import pieces
 from ..geometry.geodesics.paths import gaps
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.surface_points import EDGE, FACE, VERTEX, locate
+from ..geometry.surface_points import EDGE, FACE, VERTEX, locate_points
 
 NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 
@@ -26,7 +26,7 @@ def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
 
 def report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
     """One source in numbers."""
-    places = locate(triangles, source.faces, source.barycentric, f"source {number}: point")
+    places = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     kinds = np.bincount(places.kinds, minlength=3)
     row: dict[str, Any] = {
         "kind": "points",

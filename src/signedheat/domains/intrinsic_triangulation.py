@@ -141,7 +141,7 @@ class IntrinsicTriangulation:
         positions[lost] = self.mesh.vertices[lost]
         return positions
 
-    def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def locate_points(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Points of the mesh (faces, barycentric coordinates) in the triangulation's own faces.
 
         Raises

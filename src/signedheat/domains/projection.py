@@ -11,7 +11,7 @@ from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.meshes import Triangles
 from ..geometry.nearest import nearest_on_triangles
-from ..geometry.surface_points import locate
+from ..geometry.surface_points import locate_points
 from .curves import Curve, finite
 
 
@@ -34,11 +34,11 @@ def projected_curve(
     lengths = np.linalg.norm(np.roll(mesh.vertices[mesh.faces], -1, axis=1) - mesh.vertices[mesh.faces], axis=2)
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     start = np.arange(len(points) if closed else len(points) - 1)
-    places, starts, ends, _ = join(
-        triangles, locate(triangles, faces, weights), start, (start + 1) % len(points), "polyline"
+    located, starts, ends, _ = join(
+        triangles, locate_points(triangles, faces, weights), start, (start + 1) % len(points), "polyline"
     )
     order = starts if closed else np.append(starts, ends[-1])
-    return Curve(places.faces[order], places.barycentric[order], closed=closed, oriented=oriented)
+    return Curve(located.faces[order], located.barycentric[order], closed=closed, oriented=oriented)
 
 
 def closest_points(

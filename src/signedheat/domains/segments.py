@@ -13,7 +13,7 @@ from ..errors import SourceError
 from ..geometry.curve_segments import Pieces, given_directions
 from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.surface_points import barycentric_in, distinct, locate, shared_faces
+from ..geometry.surface_points import barycentric_in, locate_points, shared_faces, unique_points
 from .curves import Curve, SurfacePoints
 
 
@@ -63,22 +63,24 @@ def _(source: Pieces, triangles: IntrinsicMesh, positions: Any = None, number: i
 
 @pieces.register
 def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> Pieces:
-    places = locate(triangles, source.faces, source.barycentric, f"source {number}: point")
+    located = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     none = np.empty(0, dtype=np.int64)
-    return Pieces(places[distinct(places)[0]], np.empty((0, 2), np.int64), none, none, np.empty(0, complex), False)
+    return Pieces(
+        located[unique_points(located)[0]], np.empty((0, 2), np.int64), none, none, np.empty(0, complex), False
+    )
 
 
 @pieces.register
 def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> Pieces:
     name = f"curve {number}"
-    places = locate(triangles, source.faces, source.barycentric, f"{name}: point")
+    located = locate_points(triangles, source.faces, source.barycentric, f"{name}: point")
     start = np.arange(source.n_segments)
-    places, start, end, segment = join(triangles, places, start, (start + 1) % source.n_points, name)
-    faces = shared_faces(triangles, places[start], places[end])
-    first, who = distinct(places)
+    located, start, end, segment = join(triangles, located, start, (start + 1) % source.n_points, name)
+    faces = shared_faces(triangles, located[start], located[end])
+    first, who = unique_points(located)
     ends = np.stack([who[start], who[end]], axis=1)
-    at_start = barycentric_in(triangles, faces, places[start])
-    at_end = barycentric_in(triangles, faces, places[end])
+    at_start = barycentric_in(triangles, faces, located[start])
+    at_end = barycentric_in(triangles, faces, located[end])
     corners = triangles.corner_positions[faces]
     steps = ((at_end - at_start) * corners).sum(axis=1)
     keep = (ends[:, 0] != ends[:, 1]) & (np.abs(steps) > 0)
@@ -101,4 +103,4 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: in
         if positions is None:
             raise SourceError(f"{name} has normals in space, but this surface has no positions: leave the normals out")
         vectors = np.abs(steps) * given_directions(triangles, positions, faces, edges, source.normals[segment], name)
-    return Pieces(places[first], ends, faces, edges, vectors, source.oriented)
+    return Pieces(located[first], ends, faces, edges, vectors, source.oriented)

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
 from ..errors import GeometryError
-from ..geometry.surface_points import EDGE, VERTEX, Places, locate
+from ..geometry.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
 
 
 def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMesh, csr_matrix]:
@@ -64,15 +64,15 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     return PolygonMesh(np.concatenate([triangulation.vertices, positions(triangulation, where)]), polygons), matrix
 
 
-def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], NDArray[np.int64], Places]:
+def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], NDArray[np.int64], LocatedPoints]:
     """The polygons, the triangle that each lies in, and where on the triangulation's edges the mesh's edges cross them.
 
     Corners of polygons are vertices of the triangulation, or n_vertices and more for crossings, in order.
     """
     triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
-    starts = locate(triangles, lines.faces, lines.starts)
-    ends = locate(triangles, lines.faces, lines.ends)
+    starts = locate_points(triangles, lines.faces, lines.starts)
+    ends = locate_points(triangles, lines.faces, lines.ends)
     last = np.append(np.diff(lines.owners) > 0, True)
     crossing = (ends.kinds == EDGE) & ~last
     node = np.where(ends.kinds == VERTEX, ends.elements, n + np.cumsum(crossing) - 1)

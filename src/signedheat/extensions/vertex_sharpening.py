@@ -15,7 +15,7 @@ from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import Pieces, rows_of
 from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.surface_points import VERTEX, barycentric_in, chained, star
+from ..geometry.surface_points import VERTEX, barycentric_in, concatenated, incident_faces
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..operators.linear_elements import LinearElements
 from .sharpening import Method, Progress, sharpen, sharpened
@@ -106,10 +106,10 @@ def distance_to_pieces(
     triangles: IntrinsicMesh, parts: list[Pieces], tolerance: float
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to curves along edges and to points anywhere; and the windows that it took."""
-    nodes = chained([part.nodes for part in parts])
+    nodes = concatenated([part.nodes for part in parts])
     at_vertex = nodes.kinds == VERTEX
     inside = nodes[~at_vertex]
-    which, faces = star(triangles, inside)
+    which, faces = incident_faces(triangles, inside)
     weights = barycentric_in(triangles, faces, inside[which])
     return distance_to_edges_and_points(
         triangles,

@@ -15,7 +15,7 @@ from ..domains.curves import SurfacePoints
 from ..domains.triangle_mesh import TriangleMesh
 from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.surface_points import locate
+from ..geometry.surface_points import locate_points
 from .vertex_field import VertexField
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ class PiecewiseField:
         SourceError
             If a point names a face that does not exist.
         """
-        places = locate(self.triangles, points.faces, points.barycentric)
+        places = locate_points(self.triangles, points.faces, points.barycentric)
         return (self.values[places.faces] * places.barycentric).sum(axis=1)
 
     @cached_property

@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 
 from ..errors import SourceError
 from .intrinsic_mesh import IntrinsicMesh
-from .surface_points import EDGE, VERTEX, Places, star
+from .surface_points import EDGE, VERTEX, LocatedPoints, incident_faces
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +20,7 @@ class Pieces:
 
     Attributes
     ----------
-    nodes : Places
+    nodes : LocatedPoints
         (s,) distinct points of the source, in order of first appearance.
     ends : (k, 2) int
         The nodes that each piece joins; none for isolated points.
@@ -34,7 +34,7 @@ class Pieces:
         Whether the two sides differ.
     """
 
-    nodes: Places
+    nodes: LocatedPoints
     ends: NDArray[np.int64]
     faces: NDArray[np.int64]
     edges: NDArray[np.int64]
@@ -69,9 +69,11 @@ def given_directions(
     directions[inside] = in_layout(triangles, positions, faces[inside], normals[inside])
 
     along = np.flatnonzero(edges >= 0)
-    on_edges = Places(faces[along], np.zeros((len(along), 3)), np.full(len(along), EDGE), edges[along], edges[along])
+    on_edges = LocatedPoints(
+        faces[along], np.zeros((len(along), 3)), np.full(len(along), EDGE), edges[along], edges[along]
+    )
     if len(along):
-        which, around = star(triangles, on_edges)
+        which, around = incident_faces(triangles, on_edges)
         side = (triangles.edges.face_edges[around] == edges[along][which, None]).argmax(axis=1)
         seen = in_layout(triangles, positions, around, normals[along[which]])
         turned = np.conj(triangles.edge_directions[around, side]) * seen
@@ -106,10 +108,10 @@ def in_layout(
     return seen * edge / np.abs(edge)
 
 
-def rows_of(triangles: IntrinsicMesh, places: Places) -> csr_matrix:
-    """(n, n_vertices) sparse: values at vertices → values at places."""
-    weights = places.barycentric
-    index = np.repeat(np.arange(len(places)), 3).reshape(-1, 3)
+def rows_of(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
+    """(n, n_vertices) sparse: values at vertices → values at located."""
+    weights = located.barycentric
+    index = np.repeat(np.arange(len(located)), 3).reshape(-1, 3)
     used = weights > 0
-    columns = triangles.corner_vertices[places.faces]
-    return csr_matrix((weights[used], (index[used], columns[used])), shape=(len(places), triangles.n_vertices))
+    columns = triangles.corner_vertices[located.faces]
+    return csr_matrix((weights[used], (index[used], columns[used])), shape=(len(located), triangles.n_vertices))

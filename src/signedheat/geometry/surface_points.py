@@ -18,7 +18,7 @@ SNAP = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class LocatedPoints:
     """Points of a surface, each with the smallest element that holds it.
 
     Attributes
@@ -44,15 +44,15 @@ class Places:
     def __len__(self) -> int:
         return len(self.faces)
 
-    def __getitem__(self, index: NDArray[np.int64]) -> Places:
-        return Places(
+    def __getitem__(self, index: NDArray[np.int64]) -> LocatedPoints:
+        return LocatedPoints(
             self.faces[index], self.barycentric[index], self.kinds[index], self.elements[index], self.along[index]
         )
 
 
-def locate(
+def locate_points(
     triangles: IntrinsicMesh, faces: NDArray[np.int64], barycentric: NDArray[np.float64], name: str = "point"
-) -> Places:
+) -> LocatedPoints:
     """Recognise points that lie on edges or at vertices.
 
     Raises
@@ -82,14 +82,14 @@ def locate(
     elements[on_edge] = triangles.edges.face_edges[of_face]
     forward = triangles.edges.forward[of_face]
     along[on_edge] = np.where(forward, inside[on_edge, (side + 1) % 3], inside[on_edge, side])
-    return Places(faces, inside, kinds, elements, along)
+    return LocatedPoints(faces, inside, kinds, elements, along)
 
 
-def places_at(triangles: IntrinsicMesh, vertices: NDArray[np.int64], name: str = "point") -> Places:
-    """Vertices as places, each through its first face."""
+def points_at_vertices(triangles: IntrinsicMesh, vertices: NDArray[np.int64], name: str = "point") -> LocatedPoints:
+    """Vertices as located, each through its first face."""
     corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices, name)
     kinds = np.full(len(vertices), VERTEX)
-    return Places(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
+    return LocatedPoints(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
 
 
 def corners_at(
@@ -125,23 +125,23 @@ def corners_at(
     return first[vertices]
 
 
-def has(triangles: IntrinsicMesh, faces: NDArray[np.int64], places: Places) -> NDArray[np.bool_]:
+def contain(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: LocatedPoints) -> NDArray[np.bool_]:
     """(n,) whether face k has place k."""
     return np.choose(
-        places.kinds,
+        located.kinds,
         [
-            (triangles.corner_vertices[faces] == places.elements[:, None]).any(axis=1),
-            (triangles.edges.face_edges[faces] == places.elements[:, None]).any(axis=1),
-            faces == places.elements,
+            (triangles.corner_vertices[faces] == located.elements[:, None]).any(axis=1),
+            (triangles.edges.face_edges[faces] == located.elements[:, None]).any(axis=1),
+            faces == located.elements,
         ],
     )
 
 
-def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], places: Places) -> NDArray[np.float64]:
+def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: LocatedPoints) -> NDArray[np.float64]:
     """(n, 3) where place k lies in face k, which must have it."""
-    weights = places.barycentric.copy()
-    moved = np.flatnonzero(faces != places.faces)
-    kinds, elements, along, other = (a[moved] for a in (places.kinds, places.elements, places.along, faces))
+    weights = located.barycentric.copy()
+    moved = np.flatnonzero(faces != located.faces)
+    kinds, elements, along, other = (a[moved] for a in (located.kinds, located.elements, located.along, faces))
     weights[moved] = 0.0
 
     at_vertex = kinds == VERTEX
@@ -157,33 +157,33 @@ def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], places: P
     return weights
 
 
-def shared_faces(triangles: IntrinsicMesh, start: Places, end: Places) -> NDArray[np.int64]:
+def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints) -> NDArray[np.int64]:
     """(k,) a face that has both ends, or −1; the face through which an end was given goes first."""
-    shared = np.where(has(triangles, end.faces, start), end.faces, -1)
-    shared = np.where(has(triangles, start.faces, end), start.faces, shared)
+    shared = np.where(contain(triangles, end.faces, start), end.faces, -1)
+    shared = np.where(contain(triangles, start.faces, end), start.faces, shared)
     left = np.flatnonzero((shared < 0) & (start.kinds != FACE))
     if len(left):
-        which, faces = star(triangles, start[left])
-        fits = has(triangles, faces, end[left[which]])
+        which, faces = incident_faces(triangles, start[left])
+        fits = contain(triangles, faces, end[left[which]])
         found = np.full(len(left), triangles.n_faces)
         np.minimum.at(found, which[fits], faces[fits])
         shared[left] = np.where(found < triangles.n_faces, found, -1)
     return shared
 
 
-def star(triangles: IntrinsicMesh, places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """All faces that have each place, as pairs: index of the place, and face."""
-    inside = np.flatnonzero(places.kinds == FACE)
-    which, faces = [inside], [places.elements[inside]]
+    inside = np.flatnonzero(located.kinds == FACE)
+    which, faces = [inside], [located.elements[inside]]
     for kind, table, count in (
         (VERTEX, triangles.corner_vertices, triangles.n_vertices),
         (EDGE, triangles.edges.face_edges, triangles.n_edges),
     ):
-        members = np.flatnonzero(places.kinds == kind)
+        members = np.flatnonzero(located.kinds == kind)
         if not len(members):
             continue
-        members = members[np.argsort(places.elements[members], kind="stable")]
-        number = np.bincount(places.elements[members], minlength=count)
+        members = members[np.argsort(located.elements[members], kind="stable")]
+        number = np.bincount(located.elements[members], minlength=count)
         begin = np.cumsum(number) - number
         face, corner = np.nonzero((number > 0)[table])
         element = table[face, corner]
@@ -194,24 +194,24 @@ def star(triangles: IntrinsicMesh, places: Places) -> tuple[NDArray[np.int64], N
     return np.concatenate(which), np.concatenate(faces)
 
 
-def distinct(places: Places) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def unique_points(located: LocatedPoints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Points that coincide counted once, in order of first appearance: index of the first of each, and who is who."""
-    inner = np.where((places.kinds == FACE)[:, None], places.barycentric, 0.0)
-    columns = [places.kinds, places.elements, places.along, inner[:, 0], inner[:, 1]]
+    inner = np.where((located.kinds == FACE)[:, None], located.barycentric, 0.0)
+    columns = [located.kinds, located.elements, located.along, inner[:, 0], inner[:, 1]]
     order = np.lexsort(columns[::-1])
-    new = np.zeros(len(places), dtype=bool)
+    new = np.zeros(len(located), dtype=bool)
     new[:1] = True
     for column in columns:
         new[1:] |= np.abs(np.diff(column[order])) > SNAP
-    group = np.empty(len(places), dtype=np.int64)
+    group = np.empty(len(located), dtype=np.int64)
     group[order] = np.cumsum(new) - 1
-    first = np.full(int(new.sum()), len(places), dtype=np.int64)
-    np.minimum.at(first, group, np.arange(len(places)))
+    first = np.full(int(new.sum()), len(located), dtype=np.int64)
+    np.minimum.at(first, group, np.arange(len(located)))
     rank = np.empty_like(first)
     rank[np.argsort(first)] = np.arange(len(first))
     return np.sort(first), rank[group]
 
 
-def chained(parts: Sequence[Places]) -> Places:
-    """Places one after another."""
-    return Places(*(np.concatenate([getattr(p, f) for p in parts]) for f in Places.__dataclass_fields__))
+def concatenated(parts: Sequence[LocatedPoints]) -> LocatedPoints:
+    """LocatedPoints one after another."""
+    return LocatedPoints(*(np.concatenate([getattr(p, f) for p in parts]) for f in LocatedPoints.__dataclass_fields__))

@@ -19,7 +19,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, SourceError
 from ..geometry.geodesics.paths import gaps
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.surface_points import locate
+from ..geometry.surface_points import locate_points
 from .curve_readers import (
     POINTS,
     SIGNED,
@@ -95,7 +95,7 @@ def refuse_gaps(sources: Sequence[Curve | SurfacePoints], mesh: TriangleMesh) ->
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
     for number, source in enumerate(sources):
         if isinstance(source, Curve):
-            places = locate(triangles, source.faces, source.barycentric, f"curve {number}: point")
+            places = locate_points(triangles, source.faces, source.barycentric, f"curve {number}: point")
             apart = gaps(triangles, places, source.closed)
             if len(apart):
                 raise SourceError(

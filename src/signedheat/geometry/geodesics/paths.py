@@ -9,38 +9,48 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ...errors import SourceError
 from ..intrinsic_mesh import IntrinsicMesh
-from ..surface_points import Places, barycentric_in, chained, locate, places_at, shared_faces, star
+from ..surface_points import (
+    LocatedPoints,
+    barycentric_in,
+    concatenated,
+    incident_faces,
+    locate_points,
+    points_at_vertices,
+    shared_faces,
+)
 from .path_kernels import shortest_lines
 
 
 def join(
-    triangles: IntrinsicMesh, places: Places, start: NDArray[np.int64], end: NDArray[np.int64], name: str
-) -> tuple[Places, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Join starts to ends: all places, with the shortest lines between those that share no face cut into segments.
+    triangles: IntrinsicMesh, located: LocatedPoints, start: NDArray[np.int64], end: NDArray[np.int64], name: str
+) -> tuple[LocatedPoints, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Join starts to ends: all located, with the shortest lines between those that share no face cut into segments.
 
-    Returns the places, old ones first; starts and ends of segments, in order; and which pair each belongs to.
+    Returns the located, old ones first; starts and ends of segments, in order; and which pair each belongs to.
     """
-    apart = np.flatnonzero(shared_faces(triangles, places[start], places[end]) < 0)
+    apart = np.flatnonzero(shared_faces(triangles, located[start], located[end]) < 0)
     added = np.zeros(len(start), dtype=np.int64)
-    middle = places[apart[:0]]
+    middle = located[apart[:0]]
     if len(apart):
-        middle, added[apart] = trace(triangles, places[start[apart]], places[end[apart]], name)
+        middle, added[apart] = trace(triangles, located[start[apart]], located[end[apart]], name)
     pair = np.repeat(np.arange(len(start)), added + 1)
     step = np.arange(len(pair)) - np.repeat(np.cumsum(added + 1) - added - 1, added + 1)
-    after = len(places) + np.repeat(np.cumsum(added) - added, added + 1) + step
+    after = len(located) + np.repeat(np.cumsum(added) - added, added + 1) + step
     starts = np.where(step == 0, start[pair], after - 1)
     ends = np.where(step == added[pair], end[pair], after)
-    return chained([places, middle]), starts, ends, pair
+    return concatenated([located, middle]), starts, ends, pair
 
 
-def gaps(triangles: IntrinsicMesh, places: Places, closed: bool) -> NDArray[np.int64]:
-    """Which segments of a curve through places have ends that share no face."""
-    start = np.arange(len(places) if closed else len(places) - 1)
-    return np.flatnonzero(shared_faces(triangles, places[start], places[(start + 1) % len(places)]) < 0)
+def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDArray[np.int64]:
+    """Which segments of a curve through located have ends that share no face."""
+    start = np.arange(len(located) if closed else len(located) - 1)
+    return np.flatnonzero(shared_faces(triangles, located[start], located[(start + 1) % len(located)]) < 0)
 
 
-def trace(triangles: IntrinsicMesh, start: Places, end: Places, name: str = "curve") -> tuple[Places, NDArray]:
-    """Places on the shortest lines between starts and ends, where they cross edges or pass vertices.
+def trace(
+    triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
+) -> tuple[LocatedPoints, NDArray]:
+    """LocatedPoints on the shortest lines between starts and ends, where they cross edges or pass vertices.
 
     A line is shortest among its neighbours: no vertex that it passes could be passed on the other side for less. The
     first guess is the shortest way through midpoints of edges; the faces on it are unfolded, a string is pulled tight
@@ -50,14 +60,14 @@ def trace(triangles: IntrinsicMesh, start: Places, end: Places, name: str = "cur
     ----------
     triangles : IntrinsicMesh
         The surface.
-    start, end : Places
+    start, end : LocatedPoints
         (k,) the points to join.
     name : str
         What the points belong to, for messages.
 
     Returns
     -------
-    places : Places
+    located : LocatedPoints
         All points between, line after line.
     counts : (k,) int
         How many there are on each line.
@@ -76,33 +86,33 @@ def trace(triangles: IntrinsicMesh, start: Places, end: Places, name: str = "cur
     row = np.arange(len(sides))
     weights[row, sides % 3] = 1 - fractions
     weights[row, (sides % 3 + 1) % 3] = fractions
-    places = locate(triangles, sides // 3, weights, name)
+    located = locate_points(triangles, sides // 3, weights, name)
     blocked = np.flatnonzero(counts < 0)
     if not len(blocked):
-        return places, counts
+        return located, counts
     parts, begin = [], np.cumsum(np.maximum(counts, 0)) - np.maximum(counts, 0)
     for k in range(len(counts)):
         if counts[k] >= 0:
-            parts.append(places[np.arange(begin[k], begin[k] + counts[k])])
+            parts.append(located[np.arange(begin[k], begin[k] + counts[k])])
             continue
         parts.append(through_vertices(triangles, start[[k]], end[[k]], name))
         counts[k] = len(parts[-1])
-    return chained(parts), counts
+    return concatenated(parts), counts
 
 
 def faces_at(
-    triangles: IntrinsicMesh, places: Places
+    triangles: IntrinsicMesh, located: LocatedPoints
 ) -> tuple[NDArray[np.int64], NDArray[np.complex128], NDArray[np.int64]]:
     """All faces that have each place, where it lies in their layouts, and where the faces of each place begin."""
-    which, faces = star(triangles, places)
+    which, faces = incident_faces(triangles, located)
     order = np.lexsort([faces, which])
     which, faces = which[order], faces[order]
-    weights = barycentric_in(triangles, faces, places[which])
+    weights = barycentric_in(triangles, faces, located[which])
     points = (weights * triangles.corner_positions[faces]).sum(axis=1)
-    return faces, points, np.searchsorted(which, np.arange(len(places) + 1))
+    return faces, points, np.searchsorted(which, np.arange(len(located) + 1))
 
 
-def through_vertices(triangles: IntrinsicMesh, start: Places, end: Places, name: str) -> Places:
+def through_vertices(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str) -> LocatedPoints:
     """The way between two places that no faces join across edges, through vertices at which fans of faces touch."""
     edges, n = triangles.edges, triangles.n_vertices
     arcs, lengths = [edges.vertices], [edge_lengths(triangles)]
@@ -122,13 +132,13 @@ def through_vertices(triangles: IntrinsicMesh, start: Places, end: Places, name:
             f"{name}: no way along the surface joins the point in face {start.faces[0]} to the point in face "
             f"{end.faces[0]}: they lie on different connected components; make them two curves"
         )
-    chain = chained([start, places_at(triangles, np.array(path[-2:0:-1])), end])
+    chain = concatenated([start, points_at_vertices(triangles, np.array(path[-2:0:-1])), end])
     step = np.arange(len(chain) - 1)
     part = parts_of_faces(triangles)[shared_faces(triangles, chain[step], chain[step + 1])]
     turning = np.concatenate([[0], 1 + np.flatnonzero(np.diff(part)), [len(chain) - 1]])
     step = np.arange(len(turning) - 1)
-    places, _, ends, _ = join(triangles, chain[turning], step, step + 1, name)
-    return places[ends[:-1]]
+    located, _, ends, _ = join(triangles, chain[turning], step, step + 1, name)
+    return located[ends[:-1]]
 
 
 def edge_lengths(triangles: IntrinsicMesh) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from ..constrained_triangulation import arrange, triangulate
 from ..curve_segments import Pieces
 from ..edges import EdgeTable
 from ..intrinsic_mesh import IntrinsicMesh
-from ..surface_points import EDGE, FACE, VERTEX, Places, chained, distinct, places_at
+from ..surface_points import EDGE, FACE, VERTEX, LocatedPoints, concatenated, points_at_vertices, unique_points
 from .delaunay import flip_all, glue, lay_out
 
 
@@ -53,7 +53,7 @@ def embed(triangles: IntrinsicMesh, groups: Sequence[Sequence[Pieces]]) -> tuple
 class Union:
     """The pieces of several sources, with points that coincide counted once."""
 
-    nodes: Places
+    nodes: LocatedPoints
     ends: NDArray[np.int64]
     faces: NDArray[np.int64]
     edges: NDArray[np.int64]
@@ -64,11 +64,11 @@ class Union:
     @classmethod
     def of(cls, parts: Sequence[Pieces]) -> Union:
         """Join sources; `samples` says which nodes each of them has."""
-        places = chained([p.nodes for p in parts])
-        first, who = distinct(places)
+        located = concatenated([p.nodes for p in parts])
+        first, who = unique_points(located)
         offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
         return cls(
-            places[first],
+            located[first],
             np.concatenate([who[p.ends + o] for p, o in zip(parts, offsets, strict=False)]),
             np.concatenate([p.faces for p in parts]),
             np.concatenate([p.edges for p in parts]),
@@ -282,7 +282,7 @@ class Cut:
         elements[kinds == EDGE] = new_edge[elements[kinds == EDGE]]
         elements[kinds == FACE] = new_face[elements[kinds == FACE]]
         weights = np.concatenate([union.nodes.barycentric, np.zeros((len(fill), 3))])
-        nodes = places_of(finer, kinds, elements, np.concatenate([union.nodes.along, fill]), weights)
+        nodes = points_on_elements(finer, kinds, elements, np.concatenate([union.nodes.along, fill]), weights)
 
         ends = np.array([(p.start, p.end) for p in self.pieces], dtype=np.int64).reshape(-1, 2)
         edges = np.array([p.edge for p in self.pieces], dtype=np.int64)
@@ -322,23 +322,23 @@ def first_sides(triangles: IntrinsicMesh) -> NDArray[np.int64]:
     return np.unique(triangles.edges.face_edges, return_index=True)[1]
 
 
-def places_of(
+def points_on_elements(
     triangles: IntrinsicMesh,
     kinds: NDArray[np.int64],
     elements: NDArray[np.int64],
     along: NDArray[np.float64],
     barycentric: NDArray[np.float64],
-) -> Places:
-    """Places told by their elements; `along` says where on edges and `barycentric` where in faces."""
+) -> LocatedPoints:
+    """LocatedPoints told by their elements; `along` says where on edges and `barycentric` where in faces."""
     faces, weights = elements.copy(), barycentric.copy()
     at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
-    vertices = places_at(triangles, elements[at_vertex])
+    vertices = points_at_vertices(triangles, elements[at_vertex])
     faces[at_vertex], weights[at_vertex] = vertices.faces, vertices.barycentric
     side = first_sides(triangles)[elements[on_edge]]
     faces[on_edge], weights[on_edge] = side // 3, 0.0
     weights[on_edge, side % 3] = 1 - along[on_edge]
     weights[on_edge, (side % 3 + 1) % 3] = along[on_edge]
-    return Places(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
+    return LocatedPoints(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
 
 
 def flipped(triangles: IntrinsicMesh, union: Union, is_new: NDArray[np.bool_]) -> tuple[IntrinsicMesh, Union]:
@@ -372,5 +372,5 @@ def flipped(triangles: IntrinsicMesh, union: Union, is_new: NDArray[np.bool_]) -
     nodes = union.nodes
     along = np.where((nodes.kinds == EDGE) & ~ahead[np.where(nodes.kinds == EDGE, nodes.elements, 0)], 1, 0)
     along = np.where(along, 1 - nodes.along, nodes.along)
-    places = places_of(better, nodes.kinds, nodes.elements, along, nodes.barycentric)
-    return better, replace(union, nodes=places, faces=faces, vectors=vectors)
+    located = points_on_elements(better, nodes.kinds, nodes.elements, along, nodes.barycentric)
+    return better, replace(union, nodes=located, faces=faces, vectors=vectors)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..curve_segments import Pieces
 from ..intrinsic_mesh import IntrinsicMesh
-from ..surface_points import SNAP, barycentric_in, chained, distinct, locate
+from ..surface_points import SNAP, barycentric_in, concatenated, locate_points, unique_points
 from .conforming_refinement import Cut, Union, reach
 from .history import History, straight
 
@@ -104,7 +104,7 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
     after = history.after
     none = np.zeros((len(source.nodes), 0, 3))
     spots = history.forward(*_snapped(*embedding.down(source.nodes.faces, source.nodes.barycentric, none)))
-    nodes = locate(after, spots[0], spots[1])
+    nodes = locate_points(after, spots[0], spots[1])
     if len(source.ends) == 0:
         return Pieces(nodes, source.ends, source.faces, source.edges, source.vectors, source.oriented)
 
@@ -120,13 +120,13 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
     fraction = np.einsum("rk,rk->r", lines.ends - lines.starts, along) / np.einsum("rk,rk->r", along, along)
     keep = np.abs(fraction) > SNAP
     owners, faces = lines.owners[keep], lines.faces[keep]
-    starts, ends = locate(after, faces, lines.starts[keep]), locate(after, faces, lines.ends[keep])
+    starts, ends = locate_points(after, faces, lines.starts[keep]), locate_points(after, faces, lines.ends[keep])
     last = np.append(np.diff(owners) > 0, True)
     first = np.append(True, last[:-1])
-    places = chained([nodes, ends[np.flatnonzero(~last)]])
+    located = concatenated([nodes, ends[np.flatnonzero(~last)]])
     who_end = np.where(last, source.ends[owners, 1], len(nodes) + np.cumsum(~last) - 1)
     who_start = np.where(first, source.ends[owners, 0], np.roll(who_end, 1))
-    chosen, who = distinct(places)
+    chosen, who = unique_points(located)
 
     # the angle between piece and growth is known; what was carried only tells on which side, however thin the faces
     corners = after.corner_positions[faces]
@@ -140,7 +140,7 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
     turned = np.conj(after.edge_directions[faces, side]) * grown
     turned = np.where(after.reflected[faces, side], np.conj(turned), turned)
     return Pieces(
-        places[chosen],
+        located[chosen],
         who[np.stack([who_start, who_end], axis=1)],
         faces,
         np.where(on_edge, after.edges.face_edges[faces, side], -1),

@@ -15,7 +15,15 @@ from ...domains.segments import in_pieces
 from ...errors import SourceError
 from ...geometry.curve_segments import Pieces, rows_of
 from ...geometry.intrinsic_mesh import IntrinsicMesh
-from ...geometry.surface_points import FACE, VERTEX, Places, chained, distinct, places_at, star
+from ...geometry.surface_points import (
+    FACE,
+    VERTEX,
+    LocatedPoints,
+    concatenated,
+    incident_faces,
+    points_at_vertices,
+    unique_points,
+)
 from .free_ends import free_end_arcs
 
 
@@ -106,7 +114,7 @@ def surface_source(
     vectors = vectors + unoriented_vectors(triangles, parts, spacing)
     points = [p.nodes for p in parts if len(p.ends) == 0]
     if points:
-        nodes = chained(points)
+        nodes = concatenated(points)
         at_vertex = nodes.kinds == VERTEX
         vectors = vectors + spacing * vertex_point_vectors(triangles, nodes.elements[at_vertex])
         vectors = vectors + np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
@@ -192,7 +200,7 @@ def vertex_point_vectors(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) 
     return from_faces(triangles, faces, round_corner)
 
 
-def inner_point_vectors(triangles: IntrinsicMesh, places: Places) -> csr_array:
+def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_array:
     """Points on edges and inside faces: −∇δ tested with the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
     Diffused, this is minus the gradient of the heat kernel, which points away from p in all directions alike, whatever
@@ -200,12 +208,12 @@ def inner_point_vectors(triangles: IntrinsicMesh, places: Places) -> csr_array:
     averaged over those around each vertex and interpolated at p. A point at a vertex of equilateral triangles weighs
     √3 h times what Eq. 19 gives it.
     """
-    corner = np.argwhere(places.barycentric > 0)
-    vertices = triangles.corner_vertices[places.faces[corner[:, 0]], corner[:, 1]]
-    which, faces = star(triangles, places_at(triangles, vertices))
+    corner = np.argwhere(located.barycentric > 0)
+    vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
+    which, faces = incident_faces(triangles, points_at_vertices(triangles, vertices))
     areas = triangles.face_areas[faces]
     share = areas / np.bincount(which, areas, len(vertices))[which]
-    share = share * places.barycentric[corner[:, 0], corner[:, 1]][which]
+    share = share * located.barycentric[corner[:, 0], corner[:, 1]][which]
     outward = -1j * triangles.edge_vectors[faces] * (share / areas)[:, None]
     turned = np.conj(triangles.edge_directions[faces]) * outward
     turned = np.where(triangles.reflected[faces], np.conj(turned), turned)
@@ -240,7 +248,7 @@ def line_elements(part: Pieces, spacing: float) -> NDArray[np.float64]:
 
 def connected(parts: Sequence[Pieces]) -> NDArray[np.int64]:
     """(s,) connected component of every node, over all sources, in order of first appearance."""
-    first, who = distinct(chained([p.nodes for p in parts]))
+    first, who = unique_points(concatenated([p.nodes for p in parts]))
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
     ends = who[np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])]
     graph = csr_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(first), len(first)))
