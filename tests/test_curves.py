@@ -10,7 +10,7 @@ from surface_cases import band, book, flipped, laid_out, positions, sphere, squa
 
 import signedheat as sh
 from signedheat.domains.projection import closest_points
-from signedheat.domains.segments import pieces
+from signedheat.domains.segments import segments_of
 from signedheat.geometry.surface_points import EDGE, FACE, VERTEX, locate_points, unique_points
 
 
@@ -61,7 +61,7 @@ def test_straight_lines_are_traced_exactly_on_the_plane():
     ends = np.array([[-0.83, -0.71, 0], [0.77, 0.64, 0], [-0.9, 0.5, 0], [0.9, 0.5, 0]])
     curve = mesh.polyline(ends)
     assert curve.n_points > 60
-    assert pieces(curve, triangles).lengths.sum() == pytest.approx(
+    assert segments_of(curve, triangles).lengths.sum() == pytest.approx(
         np.linalg.norm(np.diff(ends, axis=0), axis=1).sum(), rel=1e-13
     )
     points = positions(mesh, curve)
@@ -79,7 +79,7 @@ def test_traced_lines_are_shortest_on_a_sphere():
     points = positions(mesh, curve)
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     arcs = np.arccos(np.clip((points[1:] * points[:-1]).sum(axis=1), -1, 1)).sum()
-    assert pieces(curve, laid_out(mesh)).lengths.sum() == pytest.approx(arcs, rel=2e-3)
+    assert segments_of(curve, laid_out(mesh)).lengths.sum() == pytest.approx(arcs, rel=2e-3)
 
 
 def test_traced_lines_match_exact_polyhedral_geodesics():

@@ -8,7 +8,7 @@ import pytest
 from surface_cases import band, book, flipped, laid_out, positions, sphere, square
 
 import signedheat as sh
-from signedheat.domains.segments import in_pieces, pieces
+from signedheat.domains.segments import segments_of, segments_of_each
 from signedheat.geometry.intrinsic.conforming_refinement import embed
 from signedheat.geometry.surface_points import locate_points
 from signedheat.lowering.surface.source import surface_source
@@ -90,7 +90,7 @@ def test_pieces_inside_a_face_and_along_its_edge_have_the_same_weight():
     frames /= np.abs(frames)
     for shift in (0.0, 1e-7, 0.03):
         curve = mesh.polyline([[-0.9, 0.5 + shift, 0], [0.9, 0.5 + shift, 0]])
-        assert (pieces(curve, triangles).edges >= 0).all() == (shift == 0)
+        assert (segments_of(curve, triangles).edges >= 0).all() == (shift == 0)
         total = (surface_source(triangles, [curve], 1.0, 1.0).vectors @ frames).sum()
         assert total == pytest.approx(1.8j, rel=1e-9)
 
@@ -199,14 +199,14 @@ def test_embedding_keeps_the_surface_and_the_curves():
         mesh.polyline([[-0.8, -0.7, 0], [0.7, 0.8, 0]]),
         [mesh.polyline([[-0.5, 0.6, 0], [0.55, -0.6, 0]], oriented=False), sh.SurfacePoints([5], [[0.2, 0.2, 0.6]])],
     ]
-    groups = in_pieces(sources, triangles)
+    groups = segments_of_each(sources, triangles)
     finer, moved = embed(triangles, groups)
     assert finer.face_areas.sum() == pytest.approx(4.0) and finer.face_areas.min() > 0
     assert finer.n_vertices - finer.n_edges + finer.n_faces == 1  # Euler characteristic of a disk
     assert finer.is_consistently_oriented
     for before, after in zip(groups, moved, strict=True):
         for old, new in zip(before, after, strict=True):
-            assert new.fits and new.lengths.sum() == pytest.approx(old.lengths.sum(), rel=1e-12)
+            assert new.is_conforming and new.lengths.sum() == pytest.approx(old.lengths.sum(), rel=1e-12)
             in_edges = np.abs(finer.edge_vectors[new.faces]).min(axis=1) if len(new.ends) else np.ones(1)
             assert (in_edges > 0).all()
             assert new.oriented == old.oriented
@@ -217,7 +217,7 @@ def test_embedding_keeps_the_surface_and_the_curves():
 def test_embedding_of_nothing_changes_nothing():
     mesh = square(6)
     triangles = laid_out(mesh)
-    groups = in_pieces([mesh.path([7, 8], oriented=False), mesh.polyline([[0, 0, 0], [0.4, 0.3, 0]])], triangles)
+    groups = segments_of_each([mesh.path([7, 8], oriented=False), mesh.polyline([[0, 0, 0], [0.4, 0.3, 0]])], triangles)
     assert embed(triangles, groups)[0] is triangles
 
 

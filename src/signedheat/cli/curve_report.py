@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..domains.curves import Curve
-from ..domains.segments import pieces
+from ..domains.segments import segments_of
 from ..geometry.geodesics.paths import gaps
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import EDGE, FACE, VERTEX, locate_points
@@ -38,7 +38,7 @@ def report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]
     if not isinstance(source, Curve):
         return row
     apart = gaps(triangles, places, source.closed)
-    parts = pieces(source, triangles, number=number)
+    parts = segments_of(source, triangles, number=number)
     degree = np.bincount(parts.ends.ravel(), minlength=len(parts.nodes))
     ends = [
         f"{NAMES[kind]} {element}"

@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
-from ..geometry.curve_segments import Pieces
+from ..geometry.curve_segments import CurveSegments
 from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
 from ..geometry.intrinsic.refinement import refine_all
-from ..geometry.intrinsic.transfer import Embedding, carry_pieces
+from ..geometry.intrinsic.transfer import Embedding, transfer_segments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.mollification import mollify
 from ..progress import Progress, Stopwatch
-from .segments import in_pieces, pieces
+from .segments import segments_of, segments_of_each
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
@@ -168,8 +168,12 @@ class IntrinsicTriangulation:
         """A source on the mesh, as these triangles see it."""
         if isinstance(source, Sequence):
             return [self.bring(part) for part in source]
-        seen = pieces(source, self.base, self.mesh.vertices)
-        return seen if isinstance(source, Pieces) else carry_pieces(seen, self.embedding, self.history, self.base)
+        seen = segments_of(source, self.base, self.mesh.vertices)
+        return (
+            seen
+            if isinstance(source, CurveSegments)
+            else transfer_segments(seen, self.embedding, self.history, self.base)
+        )
 
     def __repr__(self) -> str:
         return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"
@@ -241,7 +245,7 @@ def intrinsic_delaunay(
     with stopwatch("embed curves"):
         base, _ = laid_out(mesh)
         listed = list(keep) if isinstance(keep, Sequence) else [keep]
-        embedding = Embedding.of(base, list(chain.from_iterable(in_pieces(listed, base, mesh.vertices))))
+        embedding = Embedding.of(base, list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices))))
         marked, complete = embedding.marked, True
     with stopwatch("flip"):
         gluing = flip_all(glue(embedding.triangles, marked))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SourceError
-from ..geometry.curve_segments import Pieces, given_directions
+from ..geometry.curve_segments import CurveSegments, given_directions
 from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import barycentric_in, locate_points, shared_faces, unique_points
@@ -18,14 +18,14 @@ from .curves import Curve, SurfacePoints
 
 
 @singledispatch
-def pieces(
+def segments_of(
     source: Any, triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None, number: int = 0
-) -> Pieces:
+) -> CurveSegments:
     """Cut a source into pieces.
 
     Parameters
     ----------
-    source : Curve, SurfacePoints or Pieces
+    source : Curve, SurfacePoints or CurveSegments
         Face ids refer to `triangles`. Points of a curve that share no face are joined by a shortest line.
     triangles : IntrinsicMesh
         The surface.
@@ -46,32 +46,35 @@ def pieces(
     )
 
 
-def in_pieces(
+def segments_of_each(
     sources: Sequence[Any], triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None
-) -> list[list[Pieces]]:
+) -> list[list[CurveSegments]]:
     """Each of several sources in pieces; a sequence of curves and points counts as one source."""
     return [
-        [pieces(item, triangles, positions, number) for item in (source if isinstance(source, Sequence) else [source])]
+        [
+            segments_of(item, triangles, positions, number)
+            for item in (source if isinstance(source, Sequence) else [source])
+        ]
         for number, source in enumerate(sources)
     ]
 
 
-@pieces.register
-def _(source: Pieces, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> Pieces:
+@segments_of.register
+def _(source: CurveSegments, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
     return source
 
 
-@pieces.register
-def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> Pieces:
+@segments_of.register
+def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
     located = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     none = np.empty(0, dtype=np.int64)
-    return Pieces(
+    return CurveSegments(
         located[unique_points(located)[0]], np.empty((0, 2), np.int64), none, none, np.empty(0, complex), False
     )
 
 
-@pieces.register
-def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> Pieces:
+@segments_of.register
+def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
     name = f"curve {number}"
     located = locate_points(triangles, source.faces, source.barycentric, f"{name}: point")
     start = np.arange(source.n_segments)
@@ -103,4 +106,4 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: in
         if positions is None:
             raise SourceError(f"{name} has normals in space, but this surface has no positions: leave the normals out")
         vectors = np.abs(steps) * given_directions(triangles, positions, faces, edges, source.normals[segment], name)
-    return Pieces(located[first], ends, faces, edges, vectors, source.oriented)
+    return CurveSegments(located[first], ends, faces, edges, vectors, source.oriented)

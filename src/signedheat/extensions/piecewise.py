@@ -22,7 +22,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
 from ..errors import SourceError, UnreachedWarning, warn_user
 from ..fields.piecewise_field import PiecewiseField
-from ..geometry.curve_segments import Pieces
+from ..geometry.curve_segments import CurveSegments
 from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in
@@ -194,7 +194,7 @@ def jump_problem(
     )
 
 
-def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> NDArray[np.bool_]:
+def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.bool_]:
     """(e,) edges that touch the source, or a face that it crosses."""
     touched = np.zeros(triangles.n_vertices, dtype=bool)
     for part in parts:
@@ -206,7 +206,7 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> NDArray[
 
 
 def centered(
-    triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.float64], parts: Sequence[Pieces]
+    triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.float64], parts: Sequence[CurveSegments]
 ) -> NDArray[np.float64]:
     """Values shifted so that their median over the source is zero, on every connected part of the surface.
 

@@ -12,7 +12,7 @@ from scipy import sparse
 from ..discretization import discretize
 from ..errors import GeometryError
 from ..fields.vertex_field import VertexField
-from ..geometry.curve_segments import Pieces, rows_of
+from ..geometry.curve_segments import CurveSegments, interpolation_at
 from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in, concatenated, incident_faces
@@ -66,10 +66,12 @@ def _(
         distance, windows = distance_to_zero_line(surface.triangles, values, tolerance)
         return distance, {"windows": windows}
     # They run along edges of triangles of their own, whose first vertices are those of the surface.
-    near, windows = distance_to_pieces(source.triangles, unsided, tolerance)
+    near, windows = distance_to_segments(source.triangles, unsided, tolerance)
     near = near[: len(values)]
     if source.oriented:
-        sided = np.concatenate([rows_of(source.triangles, part.nodes).indices for part in parts if part.oriented])
+        sided = np.concatenate(
+            [interpolation_at(source.triangles, part.nodes).indices for part in parts if part.oriented]
+        )
         lines = without_halos(surface.triangles, values, near < HALO * surface.spacing, sided[sided < len(values)])
         distance, more = distance_to_zero_line(surface.triangles, lines, tolerance)
         near, windows = np.minimum(near, distance), windows + more
@@ -102,8 +104,8 @@ def without_halos(
     return result
 
 
-def distance_to_pieces(
-    triangles: IntrinsicMesh, parts: list[Pieces], tolerance: float
+def distance_to_segments(
+    triangles: IntrinsicMesh, parts: list[CurveSegments], tolerance: float
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to curves along edges and to points anywhere; and the windows that it took."""
     nodes = concatenated([part.nodes for part in parts])

@@ -15,7 +15,7 @@ from .surface_points import EDGE, VERTEX, LocatedPoints, incident_faces
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class CurveSegments:
     """One source in pieces.
 
     Attributes
@@ -47,7 +47,7 @@ class Pieces:
         return np.abs(self.vectors)
 
     @property
-    def fits(self) -> bool:
+    def is_conforming(self) -> bool:
         """Whether the triangles can hold it: all but unoriented curves that leave the edges."""
         return self.oriented or bool((self.nodes.kinds[self.ends] == VERTEX).all() and (self.edges >= 0).all())
 
@@ -108,7 +108,7 @@ def in_layout(
     return seen * edge / np.abs(edge)
 
 
-def rows_of(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
+def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
     """(n, n_vertices) sparse: values at vertices → values at located."""
     weights = located.barycentric
     index = np.repeat(np.arange(len(located)), 3).reshape(-1, 3)

@@ -12,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..constrained_triangulation import arrange, triangulate
-from ..curve_segments import Pieces
+from ..curve_segments import CurveSegments
 from ..edges import EdgeTable
 from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import EDGE, FACE, VERTEX, LocatedPoints, concatenated, points_at_vertices, unique_points
 from .delaunay import flip_all, glue, lay_out
 
 
-def embed(triangles: IntrinsicMesh, groups: Sequence[Sequence[Pieces]]) -> tuple[IntrinsicMesh, list[list[Pieces]]]:
+def embed(
+    triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
+) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
     """Cut faces wherever an unoriented curve or an isolated point leaves edges and vertices (MATH.md §2).
 
     Whatever else lies in a face that is cut, or on an edge that is split, is embedded too; all other faces and pieces
@@ -29,21 +31,21 @@ def embed(triangles: IntrinsicMesh, groups: Sequence[Sequence[Pieces]]) -> tuple
     ----------
     triangles : IntrinsicMesh
         The surface.
-    groups : sequence of sequences of Pieces
+    groups : sequence of sequences of CurveSegments
         The sources, in pieces.
 
     Returns
     -------
     triangles : IntrinsicMesh
         The old vertices first, then new ones; the very same object if nothing had to be cut.
-    groups : list of lists of Pieces
+    groups : list of lists of CurveSegments
         The sources on these triangles.
     """
     parts = [part for group in groups for part in group]
-    if all(part.fits for part in parts):
+    if all(part.is_conforming for part in parts):
         return triangles, [list(group) for group in groups]
     everything = Union.of(parts)
-    cut_faces, split_edges = reach(triangles, everything, [not part.fits for part in parts])
+    cut_faces, split_edges = reach(triangles, everything, [not part.is_conforming for part in parts])
     finer, moved = flipped(*Cut(triangles, everything, cut_faces, split_edges).assemble())
     pieces = iter([moved.part(k, part.oriented) for k, part in enumerate(parts)])
     return finer, [[next(pieces) for _ in group] for group in groups]
@@ -62,7 +64,7 @@ class Union:
     samples: list[NDArray[np.int64]]
 
     @classmethod
-    def of(cls, parts: Sequence[Pieces]) -> Union:
+    def of(cls, parts: Sequence[CurveSegments]) -> Union:
         """Join sources; `samples` says which nodes each of them has."""
         located = concatenated([p.nodes for p in parts])
         first, who = unique_points(located)
@@ -77,14 +79,14 @@ class Union:
             [who[a:b] for a, b in pairwise(offsets)],
         )
 
-    def part(self, k: int, oriented: bool) -> Pieces:
+    def part(self, k: int, oriented: bool) -> CurveSegments:
         """One of the sources again."""
         mine = self.owners == k
         old = self.samples[k]
         nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
         rank = np.full(len(self.nodes), -1)
         rank[nodes[::-1]] = np.arange(len(nodes))[::-1]
-        return Pieces(
+        return CurveSegments(
             self.nodes[nodes], rank[self.ends[mine]], self.faces[mine], self.edges[mine], self.vectors[mine], oriented
         )
 
@@ -133,7 +135,7 @@ class Cut:
         self.triangles, self.union = triangles, union
         self.n_vertices, self.n_edges = triangles.n_vertices, triangles.n_edges
         self.faces: list[NewFace] = []
-        self.pieces: list[NewPiece] = []
+        self.pieces: list[NewSegment] = []
         self.cut_faces = sorted(faces)
         nodes = union.nodes
         self.vertex_of = np.where(nodes.kinds == VERTEX, nodes.elements, -1).tolist()
@@ -158,7 +160,7 @@ class Cut:
             elif edge < 0 and face in self.in_face:
                 inside[face].append(p)
             else:
-                self.pieces.append(NewPiece(*ends, face, edge, union.vectors[p], union.owners[p]))
+                self.pieces.append(NewSegment(*ends, face, edge, union.vectors[p], union.owners[p]))
         for face in self.cut_faces:
             self.cut_face(face, inside[face])
 
@@ -189,7 +191,7 @@ class Cut:
             vector = union.vectors[p] * (abs(at[k + step] - at[k]) / abs(at[b] - at[a]))
             ends = self.node(vertices[k]), self.node(vertices[k + step])
             sub = self.sub_edges[edge][min(k, k + step)]
-            self.pieces.append(NewPiece(*ends, -1, sub, vector, union.owners[p]))
+            self.pieces.append(NewSegment(*ends, -1, sub, vector, union.owners[p]))
 
     def cut_face(self, face: int, inside: list[int]) -> None:
         """Cut one face along the pieces inside it."""
@@ -246,7 +248,9 @@ class Cut:
                 tail, head, over = frames[edge]
                 vector = union.vectors[p] * np.conj(positions[head] - positions[tail]) / whole
                 ends_here = self.node(vertices[u]), self.node(vertices[v])
-                self.pieces.append(NewPiece(*ends_here, -1, edge, np.conj(vector) if over else vector, union.owners[p]))
+                self.pieces.append(
+                    NewSegment(*ends_here, -1, edge, np.conj(vector) if over else vector, union.owners[p])
+                )
 
     def assemble(self) -> tuple[IntrinsicMesh, Union, NDArray[np.bool_]]:
         """The triangles after all cuts, what lies on them, and which faces are new."""
@@ -306,7 +310,7 @@ class NewFace(NamedTuple):
     positions: NDArray[np.complex128]
 
 
-class NewPiece(NamedTuple):
+class NewSegment(NamedTuple):
     """A piece, or part of one; its face does not count where it runs along an edge."""
 
     start: int

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..curve_segments import Pieces
+from ..curve_segments import CurveSegments
 from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import SNAP, barycentric_in, concatenated, locate_points, unique_points
 from .conforming_refinement import Cut, Union, reach
@@ -37,7 +37,7 @@ class Embedding:
     corners: NDArray[np.float64]
 
     @classmethod
-    def of(cls, triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> Embedding:
+    def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Embedding:
         """Cut faces wherever a piece leaves the edges, or a point the vertices."""
         finer, parents = triangles, np.arange(triangles.n_faces)
         corners = np.broadcast_to(np.eye(3), (triangles.n_faces, 3, 3))
@@ -99,14 +99,16 @@ def differences_of(
     return np.stack([-second - third, second, third], axis=-1)
 
 
-def carry_pieces(source: Pieces, embedding: Embedding, history: History, before: IntrinsicMesh) -> Pieces:
+def transfer_segments(
+    source: CurveSegments, embedding: Embedding, history: History, before: IntrinsicMesh
+) -> CurveSegments:
     """A source on the triangles `before` the embedding, as the triangles at the end of the history see it."""
     after = history.after
     none = np.zeros((len(source.nodes), 0, 3))
     spots = history.forward(*_snapped(*embedding.down(source.nodes.faces, source.nodes.barycentric, none)))
     nodes = locate_points(after, spots[0], spots[1])
     if len(source.ends) == 0:
-        return Pieces(nodes, source.ends, source.faces, source.edges, source.vectors, source.oriented)
+        return CurveSegments(nodes, source.ends, source.faces, source.edges, source.vectors, source.oriented)
 
     faces, at_start, at_end, directions = in_faces(before, source)
     along = at_end - at_start
@@ -139,7 +141,7 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
     on_edge = off.any(axis=1)
     turned = np.conj(after.edge_directions[faces, side]) * grown
     turned = np.where(after.reflected[faces, side], np.conj(turned), turned)
-    return Pieces(
+    return CurveSegments(
         located[chosen],
         who[np.stack([who_start, who_end], axis=1)],
         faces,
@@ -149,7 +151,7 @@ def carry_pieces(source: Pieces, embedding: Embedding, history: History, before:
     )
 
 
-def in_faces(triangles: IntrinsicMesh, source: Pieces) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Face, start, end (barycentric) and direction in the face's layout of every piece, along edges or not.
 
     A piece along an edge is seen from the edge's face with the largest area.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...discretization import discretize
-from ...domains.segments import in_pieces
+from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
 from ...errors import GeometryError
 from ...geometry.intrinsic.conforming_refinement import embed
@@ -87,7 +87,7 @@ class SurfaceDiscretization:
         positions = self.positions
         if positions is None and self.bring is None:
             positions = self.domain.triangulation.vertices
-        groups = in_pieces(sources, self.triangles, positions)
+        groups = segments_of_each(sources, self.triangles, positions)
         triangles, groups = embed(self.triangles, groups)
         surface = self if triangles is self.triangles else self._cut_into(triangles)
         triangles, groups = facing(triangles, groups)

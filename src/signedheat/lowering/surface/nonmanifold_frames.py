@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ...geometry.curve_segments import Pieces
+from ...geometry.curve_segments import CurveSegments
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 
 
 def facing(
-    triangles: IntrinsicMesh, groups: Sequence[Sequence[Pieces]]
-) -> tuple[IntrinsicMesh, Sequence[Sequence[Pieces]]]:
+    triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
+) -> tuple[IntrinsicMesh, Sequence[Sequence[CurveSegments]]]:
     """Make the face that is nearest to the sources the first of every edge with more than two faces.
 
     A vector that leaves one face over such an edge enters all the others. The frame of the edge tells its first face
@@ -27,22 +27,22 @@ def facing(
     ----------
     triangles : IntrinsicMesh
         The surface.
-    groups : sequence of sequences of Pieces
+    groups : sequence of sequences of CurveSegments
         The sources on it.
 
     Returns
     -------
     IntrinsicMesh
         The very same ones where nothing changes.
-    sequence of sequences of Pieces
+    sequence of sequences of CurveSegments
         The sources in the new frames.
 
     Examples
     --------
     >>> from signedheat.domains.curves import Curve
-    >>> from signedheat.domains.segments import in_pieces
+    >>> from signedheat.domains.segments import segments_of_each
     >>> three = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]), np.ones((3, 3)), 5)
-    >>> on_the_last = in_pieces([Curve([2, 2], [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])], three)
+    >>> on_the_last = segments_of_each([Curve([2, 2], [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])], three)
     >>> facing(three, on_the_last)[0].first_sides.tolist()
     [6, 1, 2, 4, 5, 7, 8]
     """
@@ -72,13 +72,13 @@ def facing(
     return turned, [[mirrored(part, changed) for part in group] for group in groups]
 
 
-def mirrored(part: Pieces, changed: NDArray[np.bool_]) -> Pieces:
+def mirrored(part: CurveSegments, changed: NDArray[np.bool_]) -> CurveSegments:
     """Vectors along edges whose frames have been reflected."""
     here = (part.edges >= 0) & changed[part.edges]
     return replace(part, vectors=np.where(here, np.conj(part.vectors), part.vectors)) if here.any() else part
 
 
-def from_sources(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> NDArray[np.float64]:
+def from_sources(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
     """(n_vertices,) about how far every vertex is from the sources: along edges."""
     lengths = np.zeros(triangles.n_edges)
     lengths[triangles.edges.face_edges] = triangles.edge_lengths
@@ -94,7 +94,7 @@ def from_sources(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> NDArray[n
     return dijkstra(graph, directed=False, indices=n)[:n]
 
 
-def corner_distances(triangles: IntrinsicMesh, part: Pieces) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def corner_distances(triangles: IntrinsicMesh, part: CurveSegments) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """How far the corners of a source's faces are from its nodes."""
     corners = triangles.corner_positions[part.nodes.faces]
     at = np.einsum("nk,nk->n", part.nodes.barycentric, corners)

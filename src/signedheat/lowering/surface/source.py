@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, csr_matrix, vstack
 from scipy.sparse.csgraph import connected_components
 
-from ...domains.segments import in_pieces
+from ...domains.segments import segments_of_each
 from ...errors import SourceError
-from ...geometry.curve_segments import Pieces, rows_of
+from ...geometry.curve_segments import CurveSegments, interpolation_at
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.surface_points import (
     FACE,
@@ -52,7 +52,7 @@ class SurfaceSource:
         inside one face, however close to a line, would flatten φ on it.
     triangles : IntrinsicMesh
         What they were lowered to; the first vertices are those of the domain's own triangles.
-    parts : list of Pieces
+    parts : list of CurveSegments
         The sources on these triangles.
     """
 
@@ -65,7 +65,7 @@ class SurfaceSource:
     oriented: bool
     pinned: NDArray[np.bool_]
     triangles: IntrinsicMesh
-    parts: Sequence[Pieces]
+    parts: Sequence[CurveSegments]
 
 
 def surface_source(
@@ -81,7 +81,7 @@ def surface_source(
     ----------
     triangles : IntrinsicMesh
         The surface; face ids of the sources refer to it.
-    sources : sequence of Curve, SurfacePoints, Pieces or sequences of them
+    sources : sequence of Curve, SurfacePoints, CurveSegments or sequences of them
         What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges
         (`embedding.embed` brings them there).
     diffusion : float
@@ -104,11 +104,11 @@ def surface_source(
     >>> surface_source(triangles, [across], 1.0, 0.5).weights
     array([0.25, 0.25])
     """
-    groups = in_pieces(sources, triangles, positions)
+    groups = segments_of_each(sources, triangles, positions)
     parts = [part for group in groups for part in group]
     if not parts or not all(groups):
         raise SourceError("there is no source: pass at least one curve or point, and no empty lists")
-    if not all(part.fits for part in parts):
+    if not all(part.is_conforming for part in parts):
         raise SourceError("unoriented curves inside faces must be embedded in the triangles first")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
     vectors = vectors + unoriented_vectors(triangles, parts, spacing)
@@ -130,7 +130,7 @@ def surface_source(
     return SurfaceSource(
         vectors=vectors,
         time=diffusion * spacing**2,
-        rows=vstack([rows_of(triangles, p.nodes) for p in parts], format="csr"),
+        rows=vstack([interpolation_at(triangles, p.nodes) for p in parts], format="csr"),
         weights=np.concatenate([line_elements(p, spacing) for p in parts]),
         components=components,
         owners=np.repeat(np.arange(len(groups)), sizes),
@@ -141,7 +141,7 @@ def surface_source(
     )
 
 
-def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> csr_array:
+def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> csr_array:
     """Eq. 11 without the value of ψ_e: i(b − a), on the edge that it runs along or in thirds on those of its face.
 
     One third is the mean of ψ_e over a face; it gives both kinds of pieces of one curve the same weight. (The
@@ -155,7 +155,7 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[Pieces]) -> csr_a
     return sums
 
 
-def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[Pieces], spacing: float) -> csr_array:
+def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
     """App. A.2: each side of a curve along edges points away from it, and round its free ends.
 
     A face beside edge ij gets i(p_j − p_i), ij in its own order, on its other two edges; on ij itself the sides cancel.
@@ -239,14 +239,14 @@ def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) ->
     return csr_array((values.ravel(), (np.zeros(len(flat), dtype=np.int64), flat)), shape=(1, n), dtype=np.complex128)
 
 
-def line_elements(part: Pieces, spacing: float) -> NDArray[np.float64]:
+def line_elements(part: CurveSegments, spacing: float) -> NDArray[np.float64]:
     """(s,) half of the lengths that meet at each node; `spacing` at isolated points."""
     if len(part.ends) == 0:
         return np.full(len(part.nodes), spacing)
     return 0.5 * np.bincount(part.ends.ravel(), np.repeat(part.lengths, 2), len(part.nodes))
 
 
-def connected(parts: Sequence[Pieces]) -> NDArray[np.int64]:
+def connected(parts: Sequence[CurveSegments]) -> NDArray[np.int64]:
     """(s,) connected component of every node, over all sources, in order of first appearance."""
     first, who = unique_points(concatenated([p.nodes for p in parts]))
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
