@@ -9,7 +9,7 @@ from surface_cases import band, book, flipped, laid_out, positions, sphere, squa
 
 import signedheat as sh
 from signedheat.domains.segments import segments_of, segments_of_each
-from signedheat.geometry.intrinsic.conforming_refinement import embed
+from signedheat.geometry.intrinsic.conforming_refinement import refine_to_conform
 from signedheat.geometry.surface_points import locate_points
 from signedheat.lowering.surface.source import surface_source
 
@@ -200,7 +200,7 @@ def test_embedding_keeps_the_surface_and_the_curves():
         [mesh.polyline([[-0.5, 0.6, 0], [0.55, -0.6, 0]], oriented=False), sh.SurfacePoints([5], [[0.2, 0.2, 0.6]])],
     ]
     groups = segments_of_each(sources, triangles)
-    finer, moved = embed(triangles, groups)
+    finer, moved = refine_to_conform(triangles, groups)
     assert finer.face_areas.sum() == pytest.approx(4.0) and finer.face_areas.min() > 0
     assert finer.n_vertices - finer.n_edges + finer.n_faces == 1  # Euler characteristic of a disk
     assert finer.is_consistently_oriented
@@ -218,7 +218,7 @@ def test_embedding_of_nothing_changes_nothing():
     mesh = square(6)
     triangles = laid_out(mesh)
     groups = segments_of_each([mesh.path([7, 8], oriented=False), mesh.polyline([[0, 0, 0], [0.4, 0.3, 0]])], triangles)
-    assert embed(triangles, groups)[0] is triangles
+    assert refine_to_conform(triangles, groups)[0] is triangles
 
 
 def test_an_edge_curve_shifted_into_faces_gives_nearly_the_same_distance():

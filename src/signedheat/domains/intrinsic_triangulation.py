@@ -22,7 +22,7 @@ from ..geometry.curve_segments import CurveSegments
 from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
 from ..geometry.intrinsic.refinement import refine_all
-from ..geometry.intrinsic.transfer import Embedding, transfer_segments
+from ..geometry.intrinsic.transfer import ConformingRefinement, transfer_segments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.mollification import mollify
 from ..progress import Progress, Stopwatch
@@ -67,7 +67,7 @@ class IntrinsicTriangulation:
     complete: bool
     close: NDArray[np.bool_] = field(repr=False)
     base: IntrinsicMesh = field(repr=False)
-    embedding: Embedding = field(repr=False)
+    refinement: ConformingRefinement = field(repr=False)
     history: History = field(repr=False)
 
     @property
@@ -98,11 +98,11 @@ class IntrinsicTriangulation:
         faces, weights = np.full(self.mesh.n_vertices, -1), np.zeros((self.mesh.n_vertices, 3))
         for k in range(3):
             faces[old[:, k]], weights[old[:, k]] = np.arange(len(old)), np.eye(3)[k]
-        cut = self.embedding.triangles
+        cut = self.refinement.triangles
         extra, corner = np.unique(cut.corner_vertices.ravel(), return_index=True)
         corner = corner[extra >= self.mesh.n_vertices]
-        put = self.embedding.up(corner // 3, np.eye(3)[corner % 3])
-        new = self.embedding.up(*self.history.new_vertices)
+        put = self.refinement.pull_back(corner // 3, np.eye(3)[corner % 3])
+        new = self.refinement.pull_back(*self.history.new_vertices)
         return np.concatenate([faces, put[0], new[0]]), np.concatenate([weights, put[1], new[1]])
 
     @cached_property
@@ -154,15 +154,15 @@ class IntrinsicTriangulation:
         wrong = np.flatnonzero((faces < 0) | (faces >= self.mesh.n_faces))
         if len(wrong):
             raise GeometryError(f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces")
-        below = self.embedding.down(faces, barycentric, np.zeros((len(faces), 0, 3)))
+        below = self.refinement.push_forward(faces, barycentric, np.zeros((len(faces), 0, 3)))
         found, weights, _ = self.history.forward(below[0], np.maximum(below[1], 0.0))
         return found, weights / weights.sum(axis=1, keepdims=True)
 
     def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Edges as they run on the mesh: number of the edge, start and end in space of each straight part."""
         lines = self.history.edges_before()
-        starts = self.in_space(*self.embedding.up(lines.faces, lines.starts))
-        return lines.owners, starts, self.in_space(*self.embedding.up(lines.faces, lines.ends))
+        starts = self.in_space(*self.refinement.pull_back(lines.faces, lines.starts))
+        return lines.owners, starts, self.in_space(*self.refinement.pull_back(lines.faces, lines.ends))
 
     def bring(self, source: Any) -> Any:
         """A source on the mesh, as these triangles see it."""
@@ -172,7 +172,7 @@ class IntrinsicTriangulation:
         return (
             seen
             if isinstance(source, CurveSegments)
-            else transfer_segments(seen, self.embedding, self.history, self.base)
+            else transfer_segments(seen, self.refinement, self.history, self.base)
         )
 
     def __repr__(self) -> str:
@@ -245,22 +245,24 @@ def intrinsic_delaunay(
     with stopwatch("embed curves"):
         base, _ = laid_out(mesh)
         listed = list(keep) if isinstance(keep, Sequence) else [keep]
-        embedding = Embedding.of(base, list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices))))
-        marked, complete = embedding.marked, True
+        refinement = ConformingRefinement.of(
+            base, list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))
+        )
+        marked, complete = refinement.marked, True
     with stopwatch("flip"):
-        gluing = flip_all(glue(embedding.triangles, marked))
-        close = np.zeros(embedding.triangles.n_faces, dtype=bool)
+        gluing = flip_all(glue(refinement.triangles, marked))
+        close = np.zeros(refinement.triangles.n_faces, dtype=bool)
     with stopwatch("refine"):
         if refine:
             inner = None if progress is None else lambda share: progress((2 + share) / 3, "refine")
-            limit = 20 * embedding.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
+            limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
             gluing, origin, close, complete = refine_all(gluing, np.radians(angle), limit, inner)
             marked = np.append(marked, False)[origin]
     n = int(gluing.counts[3])
     triangles = lay_out(gluing)
-    history = History(embedding.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
+    history = History(refinement.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
     goal = angle if refine else 0.0
-    return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, embedding, history)
+    return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, refinement, history)
 
 
 def laid_out(mesh: TriangleMesh) -> tuple[IntrinsicMesh, float]:

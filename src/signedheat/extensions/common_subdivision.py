@@ -116,4 +116,4 @@ def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
 def positions(triangulation: IntrinsicTriangulation, places) -> NDArray[np.float64]:
     """(p, 3) where points of the triangulation lie in space."""
     found = triangulation.history.backward(places.faces, places.barycentric)
-    return triangulation.in_space(*triangulation.embedding.up(*found[:2]))
+    return triangulation.in_space(*triangulation.refinement.pull_back(*found[:2]))

@@ -122,11 +122,11 @@ class IntrinsicMesh:
         edge's direction points into the faces that run along it in that direction, and out of the others.
         """
         is_first = np.zeros(3 * self.n_faces, dtype=bool)
-        is_first[self.first_sides] = True
+        is_first[self.first_halfedges] = True
         return self.edges.forward != is_first.reshape(-1, 3)
 
     @cached_property
-    def first_sides(self) -> NDArray[np.int64]:
+    def first_halfedges(self) -> NDArray[np.int64]:
         """(k,) side 3 f + j of the first face of every edge that has one."""
         if self.leading_sides is not None:
             return self.leading_sides

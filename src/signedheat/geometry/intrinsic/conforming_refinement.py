@@ -19,13 +19,13 @@ from ..surface_points import EDGE, FACE, VERTEX, LocatedPoints, concatenated, po
 from .delaunay import flip_all, glue, lay_out
 
 
-def embed(
+def refine_to_conform(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
     """Cut faces wherever an unoriented curve or an isolated point leaves edges and vertices (MATH.md §2).
 
     Whatever else lies in a face that is cut, or on an edge that is split, is embedded too; all other faces and pieces
-    stay as they are. Edges of the cut faces that carry nothing are then flipped to Delaunay, to be rid of slivers.
+    stay as they are. Edges of the cut faces that carry nothing are then flip_new_faces to Delaunay, to be rid of slivers.
 
     Parameters
     ----------
@@ -44,15 +44,15 @@ def embed(
     parts = [part for group in groups for part in group]
     if all(part.is_conforming for part in parts):
         return triangles, [list(group) for group in groups]
-    everything = Union.of(parts)
-    cut_faces, split_edges = reach(triangles, everything, [not part.is_conforming for part in parts])
-    finer, moved = flipped(*Cut(triangles, everything, cut_faces, split_edges).assemble())
+    everything = MergedSources.of(parts)
+    cut_faces, split_edges = affected_elements(triangles, everything, [not part.is_conforming for part in parts])
+    finer, moved = flip_new_faces(*FaceCutter(triangles, everything, cut_faces, split_edges).assemble())
     pieces = iter([moved.part(k, part.oriented) for k, part in enumerate(parts)])
     return finer, [[next(pieces) for _ in group] for group in groups]
 
 
 @dataclass(frozen=True, eq=False)
-class Union:
+class MergedSources:
     """The pieces of several sources, with points that coincide counted once."""
 
     nodes: LocatedPoints
@@ -64,7 +64,7 @@ class Union:
     samples: list[NDArray[np.int64]]
 
     @classmethod
-    def of(cls, parts: Sequence[CurveSegments]) -> Union:
+    def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
         """Join sources; `samples` says which nodes each of them has."""
         located = concatenated([p.nodes for p in parts])
         first, who = unique_points(located)
@@ -91,14 +91,16 @@ class Union:
         )
 
 
-def reach(triangles: IntrinsicMesh, union: Union, unfit: Sequence[bool]) -> tuple[set[int], set[int]]:
+def affected_elements(
+    triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]
+) -> tuple[set[int], set[int]]:
     """Faces to cut and edges to split: those that unfit sources need, and what else must follow."""
-    nodes, inside = union.nodes, union.edges < 0
+    nodes, inside = merged.nodes, merged.edges < 0
     nodes_of, pieces_of = defaultdict(list), defaultdict(list)
     for i in np.flatnonzero(nodes.kinds == FACE).tolist():
         nodes_of[int(nodes.elements[i])].append(i)
     for p in np.flatnonzero(inside).tolist():
-        pieces_of[int(union.faces[p])].append(p)
+        pieces_of[int(merged.faces[p])].append(p)
     on_edges = np.unique(nodes.elements[nodes.kinds == EDGE])
     marked = np.zeros(triangles.n_edges, dtype=bool)
     marked[on_edges] = True
@@ -106,10 +108,10 @@ def reach(triangles: IntrinsicMesh, union: Union, unfit: Sequence[bool]) -> tupl
     for f, k in zip(*(a.tolist() for a in np.nonzero(marked[triangles.edges.face_edges])), strict=True):
         faces_of[int(triangles.edges.face_edges[f, k])].append(f)
 
-    wanted = np.unique(np.concatenate([s for s, bad in zip(union.samples, unfit, strict=True) if bad]))
-    bad_pieces = inside & np.asarray(unfit)[union.owners]
+    wanted = np.unique(np.concatenate([s for s, bad in zip(merged.samples, unfit, strict=True) if bad]))
+    bad_pieces = inside & np.asarray(unfit)[merged.owners]
     queue = [int(e) for e in nodes.elements[wanted][nodes.kinds[wanted] == FACE]]
-    queue += union.faces[bad_pieces].tolist()
+    queue += merged.faces[bad_pieces].tolist()
     edges = {int(e) for e in nodes.elements[wanted][nodes.kinds[wanted] == EDGE]}
     for e in edges:
         queue += faces_of[e]
@@ -120,7 +122,7 @@ def reach(triangles: IntrinsicMesh, union: Union, unfit: Sequence[bool]) -> tupl
             continue
         faces.add(face)
         for p in pieces_of[face]:
-            for i in union.ends[p].tolist():
+            for i in merged.ends[p].tolist():
                 e = int(nodes.elements[i])
                 if nodes.kinds[i] == EDGE and e not in edges:
                     edges.add(e)
@@ -128,16 +130,16 @@ def reach(triangles: IntrinsicMesh, union: Union, unfit: Sequence[bool]) -> tupl
     return faces, edges
 
 
-class Cut:
+class FaceCutter:
     """A set of triangles while some of its faces are cut."""
 
-    def __init__(self, triangles: IntrinsicMesh, union: Union, faces: set[int], edges: set[int]) -> None:
-        self.triangles, self.union = triangles, union
+    def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: set[int], edges: set[int]) -> None:
+        self.triangles, self.merged = triangles, merged
         self.n_vertices, self.n_edges = triangles.n_vertices, triangles.n_edges
         self.faces: list[NewFace] = []
         self.pieces: list[NewSegment] = []
         self.cut_faces = sorted(faces)
-        nodes = union.nodes
+        nodes = merged.nodes
         self.vertex_of = np.where(nodes.kinds == VERTEX, nodes.elements, -1).tolist()
         self.node_at = {v: i for i, v in enumerate(self.vertex_of) if v >= 0}
         self.on_edge: dict[int, list[int]] = {e: [] for e in sorted(edges)}
@@ -153,14 +155,14 @@ class Cut:
         self.sub_edges = {e: [self.new_edge() for _ in range(len(m) + 1)] for e, m in self.on_edge.items()}
 
         inside = defaultdict(list)
-        rows = zip(union.ends.tolist(), union.faces.tolist(), union.edges.tolist(), strict=True)
+        rows = zip(merged.ends.tolist(), merged.faces.tolist(), merged.edges.tolist(), strict=True)
         for p, (ends, face, edge) in enumerate(rows):
             if edge in self.on_edge:
                 self.cut_along(p, edge)
             elif edge < 0 and face in self.in_face:
                 inside[face].append(p)
             else:
-                self.pieces.append(NewSegment(*ends, face, edge, union.vectors[p], union.owners[p]))
+                self.pieces.append(NewSegment(*ends, face, edge, merged.vectors[p], merged.owners[p]))
         for face in self.cut_faces:
             self.cut_face(face, inside[face])
 
@@ -181,21 +183,21 @@ class Cut:
 
     def cut_along(self, p: int, edge: int) -> None:
         """Cut a piece along a split edge at the points of the edge between its ends."""
-        union, chain = self.union, self.on_edge[edge]
-        at = [0.0, *union.nodes.along[chain].tolist(), 1.0]
+        merged, chain = self.merged, self.on_edge[edge]
+        at = [0.0, *merged.nodes.along[chain].tolist(), 1.0]
         vertices = [*(self.vertex_of[i] for i in chain), *self.triangles.edges.vertices[edge].tolist()]
         vertices = [vertices[-2], *vertices[:-2], vertices[-1]]
-        a, b = (vertices.index(self.vertex_of[i]) for i in union.ends[p].tolist())
+        a, b = (vertices.index(self.vertex_of[i]) for i in merged.ends[p].tolist())
         step = 1 if a < b else -1
         for k in range(a, b, step):
-            vector = union.vectors[p] * (abs(at[k + step] - at[k]) / abs(at[b] - at[a]))
+            vector = merged.vectors[p] * (abs(at[k + step] - at[k]) / abs(at[b] - at[a]))
             ends = self.node(vertices[k]), self.node(vertices[k + step])
             sub = self.sub_edges[edge][min(k, k + step)]
-            self.pieces.append(NewSegment(*ends, -1, sub, vector, union.owners[p]))
+            self.pieces.append(NewSegment(*ends, -1, sub, vector, merged.owners[p]))
 
     def cut_face(self, face: int, inside: list[int]) -> None:
         """Cut one face along the pieces inside it."""
-        triangles, union = self.triangles, self.union
+        triangles, merged = self.triangles, self.merged
         corners = triangles.corner_vertices[face].tolist()
         points, vertices = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], list(corners)
         sides: list[list[int]] = []
@@ -208,7 +210,7 @@ class Cut:
             (x, y), (u, v) = points[k], points[(k + 1) % 3]
             chain = [k]
             for i in members:
-                t = union.nodes.along[i] if forward else 1 - union.nodes.along[i]
+                t = merged.nodes.along[i] if forward else 1 - merged.nodes.along[i]
                 chain.append(len(points))
                 points.append((float(x + t * (u - x)), float(y + t * (v - y))))
                 vertices.append(self.vertex_of[i])
@@ -219,11 +221,11 @@ class Cut:
                 along = (chain[j], chain[j + 1]) if forward else (chain[j + 1], chain[j])
                 frames[sub] = (*along, bool(triangles.reflected[face, k]))
         for i in self.in_face[face]:
-            points.append((float(union.nodes.barycentric[i, 1]), float(union.nodes.barycentric[i, 2])))
+            points.append((float(merged.nodes.barycentric[i, 1]), float(merged.nodes.barycentric[i, 2])))
             vertices.append(self.vertex_of[i])
 
         local = {v: k for k, v in reversed(list(enumerate(vertices)))}
-        ends = [tuple(local[self.vertex_of[i]] for i in union.ends[p].tolist()) for p in inside]
+        ends = [tuple(local[self.vertex_of[i]] for i in merged.ends[p].tolist()) for p in inside]
         chains = arrange(points, ends)
         vertices += [self.new_vertex() for _ in range(len(points) - len(vertices))]
         flat = np.array(points)
@@ -246,15 +248,15 @@ class Cut:
             for u, v in pairwise(chain):
                 edge = (edge_of.get((u, v)) or edge_of[v, u])[0]
                 tail, head, over = frames[edge]
-                vector = union.vectors[p] * np.conj(positions[head] - positions[tail]) / whole
+                vector = merged.vectors[p] * np.conj(positions[head] - positions[tail]) / whole
                 ends_here = self.node(vertices[u]), self.node(vertices[v])
                 self.pieces.append(
-                    NewSegment(*ends_here, -1, edge, np.conj(vector) if over else vector, union.owners[p])
+                    NewSegment(*ends_here, -1, edge, np.conj(vector) if over else vector, merged.owners[p])
                 )
 
-    def assemble(self) -> tuple[IntrinsicMesh, Union, NDArray[np.bool_]]:
+    def assemble(self) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_]]:
         """The triangles after all cuts, what lies on them, and which faces are new."""
-        triangles, union = self.triangles, self.union
+        triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
         parents = np.concatenate([kept, [f.parent for f in self.faces]])
         order = np.argsort(
@@ -279,14 +281,14 @@ class Cut:
         new_edge[used] = np.arange(len(used))
 
         at_vertex = np.array(self.vertex_of)
-        fill = np.zeros(len(at_vertex) - len(union.nodes))
-        kinds = np.where(at_vertex >= 0, VERTEX, np.concatenate([union.nodes.kinds, fill]).astype(np.int64))
-        elements = np.concatenate([union.nodes.elements, fill]).astype(np.int64)
+        fill = np.zeros(len(at_vertex) - len(merged.nodes))
+        kinds = np.where(at_vertex >= 0, VERTEX, np.concatenate([merged.nodes.kinds, fill]).astype(np.int64))
+        elements = np.concatenate([merged.nodes.elements, fill]).astype(np.int64)
         elements[kinds == VERTEX] = at_vertex[kinds == VERTEX]
         elements[kinds == EDGE] = new_edge[elements[kinds == EDGE]]
         elements[kinds == FACE] = new_face[elements[kinds == FACE]]
-        weights = np.concatenate([union.nodes.barycentric, np.zeros((len(fill), 3))])
-        nodes = points_on_elements(finer, kinds, elements, np.concatenate([union.nodes.along, fill]), weights)
+        weights = np.concatenate([merged.nodes.barycentric, np.zeros((len(fill), 3))])
+        nodes = points_on_elements(finer, kinds, elements, np.concatenate([merged.nodes.along, fill]), weights)
 
         ends = np.array([(p.start, p.end) for p in self.pieces], dtype=np.int64).reshape(-1, 2)
         edges = np.array([p.edge for p in self.pieces], dtype=np.int64)
@@ -294,10 +296,10 @@ class Cut:
         on_edge = edges >= 0
         edges[on_edge] = new_edge[edges[on_edge]]
         faces[~on_edge] = new_face[faces[~on_edge]]
-        faces[on_edge] = first_sides(finer)[edges[on_edge]] // 3
+        faces[on_edge] = first_halfedges(finer)[edges[on_edge]] // 3
         vectors = np.array([p.vector for p in self.pieces], dtype=np.complex128)
         owners = np.array([p.owner for p in self.pieces], dtype=np.int64)
-        return finer, Union(nodes, ends, faces, edges, vectors, owners, union.samples), is_new
+        return finer, MergedSources(nodes, ends, faces, edges, vectors, owners, merged.samples), is_new
 
 
 class NewFace(NamedTuple):
@@ -321,7 +323,7 @@ class NewSegment(NamedTuple):
     owner: int
 
 
-def first_sides(triangles: IntrinsicMesh) -> NDArray[np.int64]:
+def first_halfedges(triangles: IntrinsicMesh) -> NDArray[np.int64]:
     """(e,) the first side ``3 face + k`` of each edge."""
     return np.unique(triangles.edges.face_edges, return_index=True)[1]
 
@@ -338,43 +340,45 @@ def points_on_elements(
     at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
     vertices = points_at_vertices(triangles, elements[at_vertex])
     faces[at_vertex], weights[at_vertex] = vertices.faces, vertices.barycentric
-    side = first_sides(triangles)[elements[on_edge]]
+    side = first_halfedges(triangles)[elements[on_edge]]
     faces[on_edge], weights[on_edge] = side // 3, 0.0
     weights[on_edge, side % 3] = 1 - along[on_edge]
     weights[on_edge, (side % 3 + 1) % 3] = along[on_edge]
     return LocatedPoints(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
 
 
-def flipped(triangles: IntrinsicMesh, union: Union, is_new: NDArray[np.bool_]) -> tuple[IntrinsicMesh, Union]:
+def flip_new_faces(
+    triangles: IntrinsicMesh, merged: MergedSources, is_new: NDArray[np.bool_]
+) -> tuple[IntrinsicMesh, MergedSources]:
     """Flip edges of new faces to Delaunay, but for those that carry a piece or bound a face with one inside.
 
-    Where faces do not agree on the lengths of their edges, none can be flipped.
+    Where faces do not agree on the lengths of their edges, none can be flip_new_faces.
     """
     if not triangles.agree_on_lengths:
-        return triangles, union
-    on_edge = union.edges >= 0
+        return triangles, merged
+    on_edge = merged.edges >= 0
     fixed = np.ones(triangles.n_edges, dtype=bool)
     fixed[triangles.edges.face_edges[is_new]] = False
-    fixed[union.edges[on_edge]] = True
-    fixed[triangles.edges.face_edges[union.faces[~on_edge]]] = True
-    fixed[triangles.edges.face_edges[union.nodes.elements[union.nodes.kinds == FACE]]] = True
-    fixed[union.nodes.elements[union.nodes.kinds == EDGE]] = True
+    fixed[merged.edges[on_edge]] = True
+    fixed[triangles.edges.face_edges[merged.faces[~on_edge]]] = True
+    fixed[triangles.edges.face_edges[merged.nodes.elements[merged.nodes.kinds == FACE]]] = True
+    fixed[merged.nodes.elements[merged.nodes.kinds == EDGE]] = True
     gluing = flip_all(glue(triangles, fixed))
     better = lay_out(gluing)
 
-    side = first_sides(better)
+    side = first_halfedges(better)
     ahead, same = gluing.forward[side], gluing.front[side]  # the frame of an edge, seen from its first face of now
-    carrier = union.edges[on_edge]
-    vectors, faces = union.vectors.copy(), union.faces.copy()
+    carrier = merged.edges[on_edge]
+    vectors, faces = merged.vectors.copy(), merged.faces.copy()
     seen = vectors[on_edge]
     vectors[on_edge] = np.where(ahead[carrier], 1, -1) * seen.real + 1j * np.where(same[carrier], 1, -1) * seen.imag
     faces[on_edge] = side[carrier] // 3
-    inside = union.faces[~on_edge]
+    inside = merged.faces[~on_edge]
     turned = better.edge_vectors[inside, 0] * np.conj(triangles.edge_vectors[inside, 0])
     vectors[~on_edge] *= turned / np.abs(turned)
 
-    nodes = union.nodes
+    nodes = merged.nodes
     along = np.where((nodes.kinds == EDGE) & ~ahead[np.where(nodes.kinds == EDGE, nodes.elements, 0)], 1, 0)
     along = np.where(along, 1 - nodes.along, nodes.along)
     located = points_on_elements(better, nodes.kinds, nodes.elements, along, nodes.barycentric)
-    return better, replace(union, nodes=located, faces=faces, vectors=vectors)
+    return better, replace(merged, nodes=located, faces=faces, vectors=vectors)

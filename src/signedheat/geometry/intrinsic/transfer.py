@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from ..curve_segments import CurveSegments
 from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import SNAP, barycentric_in, concatenated, locate_points, unique_points
-from .conforming_refinement import Cut, Union, reach
+from .conforming_refinement import FaceCutter, MergedSources, affected_elements
 from .history import History, straight
 
 
 @dataclass(frozen=True, eq=False)
-class Embedding:
+class ConformingRefinement:
     """Triangles cut so that some curves run along edges.
 
     Attributes
@@ -37,28 +37,28 @@ class Embedding:
     corners: NDArray[np.float64]
 
     @classmethod
-    def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Embedding:
+    def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> ConformingRefinement:
         """Cut faces wherever a piece leaves the edges, or a point the vertices."""
         finer, parents = triangles, np.arange(triangles.n_faces)
         corners = np.broadcast_to(np.eye(3), (triangles.n_faces, 3, 3))
         marked = np.zeros(triangles.n_edges, dtype=bool)
         if not parts:
             return cls(triangles, marked, parents, corners)
-        union = Union.of(parts)
-        faces, edges = reach(triangles, union, [True] * len(parts))
+        merged = MergedSources.of(parts)
+        faces, edges = affected_elements(triangles, merged, [True] * len(parts))
         if faces or edges:
-            cut = Cut(triangles, union, faces, edges)
-            finer, union, is_new = cut.assemble()
+            cut = FaceCutter(triangles, merged, faces, edges)
+            finer, merged, is_new = cut.assemble()
             kept = np.setdiff1d(parents, cut.cut_faces)
             parents = np.sort(np.concatenate([kept, [f.parent for f in cut.faces]])).astype(np.int64)
             corners = np.where(is_new[:, None, None], 0.0, np.eye(3))
             new = np.flatnonzero(is_new)
             corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
             marked = np.zeros(finer.n_edges, dtype=bool)
-        marked[union.edges[union.edges >= 0]] = True
+        marked[merged.edges[merged.edges >= 0]] = True
         return cls(finer, marked, parents, corners)
 
-    def down(
+    def push_forward(
         self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Points, and vectors (p, k, 3) at them, of the faces before the cuts, in the faces after."""
@@ -72,7 +72,7 @@ class Embedding:
         best = np.lexsort([-weights.min(axis=1), which])[np.cumsum(count) - count]
         return child[best], weights[best], np.einsum("pvk,pkl->pvl", vectors, to_child[best])
 
-    def up(
+    def pull_back(
         self, faces: NDArray[np.int64], barycentric: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Points of the faces after the cuts, in the faces before."""
@@ -100,12 +100,12 @@ def differences_of(
 
 
 def transfer_segments(
-    source: CurveSegments, embedding: Embedding, history: History, before: IntrinsicMesh
+    source: CurveSegments, refinement: ConformingRefinement, history: History, before: IntrinsicMesh
 ) -> CurveSegments:
-    """A source on the triangles `before` the embedding, as the triangles at the end of the history see it."""
+    """A source on the triangles `before` the refinement, as the triangles at the end of the history see it."""
     after = history.after
     none = np.zeros((len(source.nodes), 0, 3))
-    spots = history.forward(*_snapped(*embedding.down(source.nodes.faces, source.nodes.barycentric, none)))
+    spots = history.forward(*_snapped(*refinement.push_forward(source.nodes.faces, source.nodes.barycentric, none)))
     nodes = locate_points(after, spots[0], spots[1])
     if len(source.ends) == 0:
         return CurveSegments(nodes, source.ends, source.faces, source.edges, source.vectors, source.oriented)
@@ -115,7 +115,7 @@ def transfer_segments(
     growth = differences_of(before, faces, directions[:, None])[:, 0]
     at_piece = (along * before.corner_positions[faces]).sum(axis=1)
     vectors = np.stack([along, growth], axis=1)
-    middle = history.forward(*_snapped(*embedding.down(faces, 0.5 * (at_start + at_end), vectors)))
+    middle = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
     lines = straight(after, *middle)
 
     along = lines.vectors[:, 0]

@@ -15,7 +15,7 @@ from ...discretization import discretize
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
 from ...errors import GeometryError
-from ...geometry.intrinsic.conforming_refinement import embed
+from ...geometry.intrinsic.conforming_refinement import refine_to_conform
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from ...linear import elimination_order, factorize
@@ -88,7 +88,7 @@ class SurfaceDiscretization:
         if positions is None and self.bring is None:
             positions = self.domain.triangulation.vertices
         groups = segments_of_each(sources, self.triangles, positions)
-        triangles, groups = embed(self.triangles, groups)
+        triangles, groups = refine_to_conform(self.triangles, groups)
         surface = self if triangles is self.triangles else self._cut_into(triangles)
         triangles, groups = facing(triangles, groups)
         return surface._turned_to(triangles), groups
@@ -97,7 +97,7 @@ class SurfaceDiscretization:
         """The same triangles with other first faces at nonmanifold edges; step 3 does not see them."""
         if triangles is self.triangles:
             return self
-        key = triangles.first_sides.tobytes()
+        key = triangles.first_halfedges.tobytes()
         if key not in self._turned:
             self._turned.clear()
             turned = self._turned[key] = replace(self, triangles=triangles, _heats={}, _turned={})

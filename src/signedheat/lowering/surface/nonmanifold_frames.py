@@ -43,7 +43,7 @@ def facing(
     >>> from signedheat.domains.segments import segments_of_each
     >>> three = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]), np.ones((3, 3)), 5)
     >>> on_the_last = segments_of_each([Curve([2, 2], [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])], three)
-    >>> facing(three, on_the_last)[0].first_sides.tolist()
+    >>> facing(three, on_the_last)[0].first_halfedges.tolist()
     [6, 1, 2, 4, 5, 7, 8]
     """
     table = triangles.edges
@@ -58,7 +58,7 @@ def facing(
     opposite = np.roll(triangles.corner_vertices, -2, axis=1).ravel()[side]
     ends = distance[table.vertices[edge]].mean(axis=1)
     first = np.full(triangles.n_edges, -1)
-    first[table.face_edges.ravel()[triangles.first_sides]] = triangles.first_sides
+    first[table.face_edges.ravel()[triangles.first_halfedges]] = triangles.first_halfedges
     away = np.where(holds[side // 3], -1.0, distance[opposite])
     order = np.lexsort([side != first[edge], away, edge])  # of equal ones, the first stays first
     nearest = order[np.append(True, np.diff(edge[order]) > 0)]
