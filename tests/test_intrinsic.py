@@ -148,7 +148,7 @@ def test_aspect_ratios_of_a_million(spoil):
     n_sound = sh.intrinsic_delaunay(sound, keep=circle_on(sound), refine=True).n_vertices
     assert better.n_vertices < n_sound + 1.2 * mesh.n_faces  # and not hundreds for each needle
     assert better.triangles.face_areas.sum() == pytest.approx(4.0, rel=1e-9)
-    assert better.bring(curve).lengths.sum() == pytest.approx(150 * 2 * 0.55 * np.sin(np.pi / 150), rel=1e-6)
+    assert better.transfer(curve).lengths.sum() == pytest.approx(150 * 2 * 0.55 * np.sin(np.pi / 150), rel=1e-6)
     assert error(mesh, sh.SignedHeatSolver(better).distance(curve).restrict()) < 5e-3
 
 
@@ -161,7 +161,7 @@ def test_kept_curves_run_along_edges_and_boundaries_stay():
     polygon = 150 * 2 * 0.55 * np.sin(np.pi / 150)
     assert lengths[better.marked].sum() == pytest.approx(polygon, rel=1e-9)
     assert lengths[better.triangles.edges.face_counts == 1].sum() == pytest.approx(8.0, rel=1e-12)
-    brought = better.bring(curve)
+    brought = better.transfer(curve)
     assert (brought.edges >= 0).all() and better.marked[brought.edges].all()
     assert brought.lengths.sum() == pytest.approx(polygon, rel=1e-9)
 
@@ -173,7 +173,7 @@ def test_only_the_kept_curve_is_marked_on_a_closed_surface():
     assert better.n_vertices > 1.3 * mesh.n_vertices
     lengths = np.zeros(better.triangles.n_edges)
     lengths[better.triangles.edges.face_edges] = better.triangles.edge_lengths
-    assert lengths[better.marked].sum() == pytest.approx(better.bring(north).lengths.sum(), rel=1e-9)
+    assert lengths[better.marked].sum() == pytest.approx(better.transfer(north).lengths.sum(), rel=1e-9)
 
 
 def test_sources_that_were_not_kept_are_carried_over():
@@ -181,7 +181,7 @@ def test_sources_that_were_not_kept_are_carried_over():
     curve = circle_on(mesh)
     outward = sh.Curve(curve.faces, curve.barycentric, closed=True, normals=None)
     for better in sh.intrinsic_delaunay(mesh), sh.intrinsic_delaunay(mesh, refine=True):
-        brought = better.bring(outward)
+        brought = better.transfer(outward)
         assert brought.lengths.sum() == pytest.approx(150 * 2 * 0.55 * np.sin(np.pi / 150), rel=1e-9)
         nodes = better.vertices[better.faces[brought.nodes.faces]]
         radius = np.linalg.norm(np.einsum("nk,nkd->nd", brought.nodes.barycentric, nodes), axis=1)

@@ -159,15 +159,15 @@ class IntrinsicTriangulation:
         return found, weights / weights.sum(axis=1, keepdims=True)
 
     def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Edges as they run on the mesh: number of the edge, start and end in space of each straight part."""
+        """Edges as they run on the mesh: number of the edge, start and end in space of each straight_lines part."""
         lines = self.history.edges_before()
         starts = self.in_space(*self.refinement.pull_back(lines.faces, lines.starts))
         return lines.owners, starts, self.in_space(*self.refinement.pull_back(lines.faces, lines.ends))
 
-    def bring(self, source: Any) -> Any:
+    def transfer(self, source: Any) -> Any:
         """A source on the mesh, as these triangles see it."""
         if isinstance(source, Sequence):
-            return [self.bring(part) for part in source]
+            return [self.transfer(part) for part in source]
         seen = segments_of(source, self.base, self.mesh.vertices)
         return (
             seen

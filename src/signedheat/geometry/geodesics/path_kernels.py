@@ -123,7 +123,7 @@ def turns(a, b):
 
 
 @compiled
-def pull(tails, heads, over, start, end):
+def funnel(tails, heads, over, start, end):
     """Pull a string tight inside an unfolded sleeve: the portals at which it bends, and whether to their left.
 
     The simple funnel algorithm. Also the length.
@@ -234,7 +234,7 @@ def straighten(corners, edge_of, forward, around, left, entered, starts, start_p
     tails, heads, over, placed = unfold(corners, forward, left, entered)
     begin = point_in(starts, start_points, left[0] // 3)
     end = locate_end(corners, entered, placed, over, ends, end_points)
-    bends, to_left, length = pull(tails, heads, over, begin, end)
+    bends, to_left, length = funnel(tails, heads, over, begin, end)
     k = 0
     while k < len(bends):
         i = bends[k]
@@ -246,7 +246,7 @@ def straighten(corners, edge_of, forward, around, left, entered, starts, start_p
         t, h, o, p = unfold(corners, forward, try_left, try_entered)
         b = point_in(starts, start_points, try_left[0] // 3)
         f = locate_end(corners, try_entered, p, o, ends, end_points)
-        try_bends, try_to_left, shorter = pull(t, h, o, b, f)
+        try_bends, try_to_left, shorter = funnel(t, h, o, b, f)
         if shorter < length * (1 - 1e-12):
             left, entered, tails, heads, over, begin, end = try_left, try_entered, t, h, o, b, f
             bends, to_left, length = try_bends, try_to_left, shorter

@@ -32,7 +32,7 @@ def join(
     added = np.zeros(len(start), dtype=np.int64)
     middle = located[apart[:0]]
     if len(apart):
-        middle, added[apart] = trace(triangles, located[start[apart]], located[end[apart]], name)
+        middle, added[apart] = geodesic_paths(triangles, located[start[apart]], located[end[apart]], name)
     pair = np.repeat(np.arange(len(start)), added + 1)
     step = np.arange(len(pair)) - np.repeat(np.cumsum(added + 1) - added - 1, added + 1)
     after = len(located) + np.repeat(np.cumsum(added) - added, added + 1) + step
@@ -47,7 +47,7 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDAr
     return np.flatnonzero(shared_faces(triangles, located[start], located[(start + 1) % len(located)]) < 0)
 
 
-def trace(
+def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, NDArray]:
     """LocatedPoints on the shortest lines between starts and ends, where they cross edges or pass vertices.
@@ -134,7 +134,7 @@ def through_vertices(triangles: IntrinsicMesh, start: LocatedPoints, end: Locate
         )
     chain = concatenated([start, points_at_vertices(triangles, np.array(path[-2:0:-1])), end])
     step = np.arange(len(chain) - 1)
-    part = parts_of_faces(triangles)[shared_faces(triangles, chain[step], chain[step + 1])]
+    part = face_components(triangles)[shared_faces(triangles, chain[step], chain[step + 1])]
     turning = np.concatenate([[0], 1 + np.flatnonzero(np.diff(part)), [len(chain) - 1]])
     step = np.arange(len(turning) - 1)
     located, _, ends, _ = join(triangles, chain[turning], step, step + 1, name)
@@ -148,7 +148,7 @@ def edge_lengths(triangles: IntrinsicMesh) -> NDArray[np.float64]:
     return lengths
 
 
-def parts_of_faces(triangles: IntrinsicMesh) -> NDArray[np.int64]:
+def face_components(triangles: IntrinsicMesh) -> NDArray[np.int64]:
     """(m,) which faces can be reached from one another across edges."""
     m, edge = triangles.n_faces, triangles.edges.face_edges.ravel()
     face = np.repeat(np.arange(m), 3)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..intrinsic_mesh import IntrinsicMesh
 from .delaunay import glue
-from .transfer_kernels import carry, walk_both_ways
+from .transfer_kernels import trace_both_ways, transfer
 
 
 class Lines(NamedTuple):
@@ -56,13 +56,13 @@ class History:
         self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Points of `before`, and vectors (p, k, 3) at them, as points of `after`."""
-        return self._carry(True, faces, barycentric, vectors)
+        return self._transfer(True, faces, barycentric, vectors)
 
     def backward(
         self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Points of `after`, and vectors (p, k, 3) at them, as points of `before`."""
-        return self._carry(False, faces, barycentric, vectors)
+        return self._transfer(False, faces, barycentric, vectors)
 
     @cached_property
     def new_vertices(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -73,13 +73,13 @@ class History:
 
     def edges_before(self) -> Lines:
         """The edges of `after`, from tail to head, as lines on `before`."""
-        return straight(self.before, *self.backward(*edge_middles(self.after)))
+        return straight_lines(self.before, *self.backward(*edge_middles(self.after)))
 
     def edges_after(self) -> Lines:
         """The edges of `before`, from tail to head, as lines on `after`."""
-        return straight(self.after, *self.forward(*edge_middles(self.before)))
+        return straight_lines(self.after, *self.forward(*edge_middles(self.before)))
 
-    def _carry(
+    def _transfer(
         self,
         forward: bool,
         faces: NDArray[np.int64],
@@ -89,7 +89,7 @@ class History:
         faces, barycentric = np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64)
         vectors = np.zeros((len(faces), 0, 3)) if vectors is None else np.array(vectors, dtype=np.float64)
         n_faces = max(self.before.n_faces, self.after.n_faces)
-        carry(self.steps, self.weights, forward, n_faces, faces, barycentric, vectors)
+        transfer(self.steps, self.weights, forward, n_faces, faces, barycentric, vectors)
         return faces, barycentric, vectors
 
 
@@ -104,7 +104,7 @@ def edge_middles(triangles: IntrinsicMesh) -> tuple[NDArray, NDArray, NDArray]:
     return faces, middle, along
 
 
-def straight(
+def straight_lines(
     triangles: IntrinsicMesh,
     faces: NDArray[np.int64],
     barycentric: NDArray[np.float64],
@@ -124,7 +124,7 @@ def straight(
             np.empty((room, 3)),
             np.empty(shape),
         )
-        count = walk_both_ways(gluing, faces, barycentric, halves, *rows[1:], rows.owners)
+        count = trace_both_ways(gluing, faces, barycentric, halves, *rows[1:], rows.owners)
         if count <= room:
             break
         room = count

@@ -12,7 +12,7 @@ from ..curve_segments import CurveSegments
 from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import SNAP, barycentric_in, concatenated, locate_points, unique_points
 from .conforming_refinement import FaceCutter, MergedSources, affected_elements
-from .history import History, straight
+from .history import History, straight_lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,7 @@ def transfer_segments(
     at_piece = (along * before.corner_positions[faces]).sum(axis=1)
     vectors = np.stack([along, growth], axis=1)
     middle = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
-    lines = straight(after, *middle)
+    lines = straight_lines(after, *middle)
 
     along = lines.vectors[:, 0]
     fraction = np.einsum("rk,rk->r", lines.ends - lines.starts, along) / np.einsum("rk,rk->r", along, along)

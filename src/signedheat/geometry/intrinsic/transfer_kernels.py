@@ -1,4 +1,4 @@
-"""Compiled kernels that carry points and vectors between intrinsic triangulations of one surface.
+"""Compiled kernels that transfer points and vectors between intrinsic triangulations of one surface.
 
 Every step of a history (a flip, a split of a face or of an edge) exchanges simplices of four points with one affine
 dependency ``Σ c_k p_k = 0``. A point with nonnegative weights on the old simplex moves along c until another weight
@@ -21,7 +21,7 @@ BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2,
 
 
 @kernel
-def carry(steps, weights, forward, n_faces, faces, barycentric, vectors):
+def transfer(steps, weights, forward, n_faces, faces, barycentric, vectors):
     """Carry points and vectors at them through a history, forward or backward; in place.
 
     Parameters
@@ -140,8 +140,8 @@ def shift(x, c, lead, gone, amount):
 
 
 @kernel
-def walk(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
-    """Go straight from a point along the first of its vectors, or against it, up to its end; other vectors go along.
+def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
+    """Go straight_lines from a point along the first of its vectors, or against it, up to its end; other vectors go along.
 
     Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
     it, and the vectors there. Returns the next row.
@@ -188,13 +188,15 @@ def walk(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends
 
 
 @kernel
-def walk_both_ways(g, faces, barycentric, vectors, out_faces, out_starts, out_ends, out_vectors, owners):
-    """`walk` half of the first vector both ways from every point; rows whose owner is −1 − p go against it."""
+def trace_both_ways(g, faces, barycentric, vectors, out_faces, out_starts, out_ends, out_vectors, owners):
+    """`trace_geodesic` half of the first vector both ways from every point; rows whose owner is −1 − p go against it."""
     n = 0
     for p in range(len(faces)):
         for way in range(2):
             begin = n
-            n = walk(g, faces[p], barycentric[p], vectors[p], way == 0, out_faces, out_starts, out_ends, out_vectors, n)
+            n = trace_geodesic(
+                g, faces[p], barycentric[p], vectors[p], way == 0, out_faces, out_starts, out_ends, out_vectors, n
+            )
             for k in range(begin, min(n, len(owners))):
                 owners[k] = p if way == 0 else -1 - p
     return n

@@ -38,7 +38,7 @@ class SurfaceDiscretization:
         What the method runs on.
     restriction : (n,) int, optional
         Vertex of the triangles that stands for each vertex of the domain, where they are not the same.
-    bring : callable, optional
+    transfer : callable, optional
         Takes a source on the domain to the same source on the triangles, where their faces are not the domain's.
     positions : (n_vertices, 3) or (m, 3, 3) float, optional
         Where in space vertices lie, or the corners of each face, up to translation, where faces lie in planes of their
@@ -52,7 +52,7 @@ class SurfaceDiscretization:
     domain: Any
     triangles: IntrinsicMesh
     restriction: NDArray[np.int64] | None = None
-    bring: Callable[[Any], Any] | None = None
+    transfer: Callable[[Any], Any] | None = None
     positions: NDArray[np.float64] | None = None
     spacing: float | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
@@ -82,10 +82,10 @@ class SurfaceDiscretization:
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Unoriented curves and points inside faces get edges and vertices; nonmanifold edges are told from where."""
-        if self.bring is not None:
-            sources = [self.bring(source) for source in sources]
+        if self.transfer is not None:
+            sources = [self.transfer(source) for source in sources]
         positions = self.positions
-        if positions is None and self.bring is None:
+        if positions is None and self.transfer is None:
             positions = self.domain.triangulation.vertices
         groups = segments_of_each(sources, self.triangles, positions)
         triangles, groups = refine_to_conform(self.triangles, groups)
@@ -111,7 +111,7 @@ class SurfaceDiscretization:
             self,
             triangles=triangles,
             restriction=np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction,
-            bring=None,
+            transfer=None,
             notes={**self.notes, "vertices added for sources": added},
             _heats={},
             _turned={},

@@ -51,7 +51,7 @@ def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDis
         triangles = IntrinsicMesh.from_lengths(corners, lengths, triangles.n_vertices, edges)
     options = {
         "domain": triangulation,
-        "bring": triangulation.bring,
+        "transfer": triangulation.transfer,
         "spacing": spacing(triangles),
         "notes": {"intrinsic triangulation": triangulation.summary},
         **options,
