@@ -91,7 +91,7 @@ def test_traced_lines_match_exact_polyhedral_geodesics():
     ratios = []
     for a, b in rng.integers(0, bumpy.n_vertices, (30, 2)):
         if a != b:
-            ours = pieces(bumpy.path([a, b]), laid_out(bumpy)).lengths.sum()
+            ours = segments_of(bumpy.path([a, b]), laid_out(bumpy)).lengths.sum()
             ratios.append(ours / exact.geodesicDistance(int(a), int(b))[0])
     assert min(ratios) > 1 - 1e-9
     assert np.median(ratios) < 1 + 1e-9 and max(ratios) < 1.1  # now and then on the other side of a bump
@@ -100,12 +100,12 @@ def test_traced_lines_match_exact_polyhedral_geodesics():
 def test_lines_cross_nonmanifold_edges_and_pinched_vertices():
     pages = book(3, 6)
     across = pages.polyline([[0.7, 0.0, 0.31], 0.6 * np.array([np.cos(2 * np.pi / 3), np.sin(2 * np.pi / 3), 0.9])])
-    assert pieces(across, laid_out(pages)).lengths.sum() == pytest.approx(np.hypot(1.3, 0.23), rel=1e-12)
+    assert segments_of(across, laid_out(pages)).lengths.sum() == pytest.approx(np.hypot(1.3, 0.23), rel=1e-12)
 
     touching = sh.TriangleMesh([[-1, -1, 0], [-1, 1, 0], [0, 0, 0], [1, -1, 0], [1, 1, 0]], [[0, 2, 1], [3, 4, 2]])
     through = touching.polyline([[-0.9, 0.1, 0], [0.9, 0.1, 0]])
     assert 2 in [int(touching.faces[f][w.argmax()]) for f, w in zip(through.faces, through.barycentric, strict=True)]
-    assert pieces(through, laid_out(touching)).lengths.sum() == pytest.approx(2 * np.hypot(0.9, 0.1))
+    assert segments_of(through, laid_out(touching)).lengths.sum() == pytest.approx(2 * np.hypot(0.9, 0.1))
 
 
 def test_repeated_points_are_skipped_and_two_point_loops_work():

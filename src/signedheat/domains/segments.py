@@ -21,7 +21,7 @@ from .curves import Curve, SurfacePoints
 def segments_of(
     source: Any, triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None, number: int = 0
 ) -> CurveSegments:
-    """Cut a source into pieces.
+    """Cut a source into segments.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def segments_of(
 def segments_of_each(
     sources: Sequence[Any], triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None
 ) -> list[list[CurveSegments]]:
-    """Each of several sources in pieces; a sequence of curves and points counts as one source."""
+    """Each of several sources in segments; a sequence of curves and points counts as one source."""
     return [
         [
             segments_of(item, triangles, positions, number)

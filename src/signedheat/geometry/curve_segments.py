@@ -1,4 +1,4 @@
-"""Curves and points as a set of triangles sees them: straight pieces in faces and along edges, and their ends."""
+"""Curves and points as a set of triangles sees them: straight segments in faces and along edges, and their ends."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .surface_points import EDGE, VERTEX, LocatedPoints, incident_faces
 
 @dataclass(frozen=True, eq=False)
 class CurveSegments:
-    """One source in pieces.
+    """One source in segments.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
 """Distance on a polyhedral surface from line segments and points in its faces, exact or very nearly so.
 
-Windows of light travel from face to face in order of distance (Mitchell, Mount & Papadimitriou 1987; Chen & Han 1990),
+Windows of initial_windows travel from face to face in order of distance (Mitchell, Mount & Papadimitriou 1987; Chen & Han 1990),
 and those that a path through a vertex outruns are dropped (Xin & Wang 2009). A window is an interval of an edge, lit
 straight from one source: a point, or, since the sources here are segments too, a parallel beam at right angles to one.
 Each vertex splits a window, so that their number per edge would grow with distance; neighbouring windows on an edge
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 from ..intrinsic_mesh import IntrinsicMesh
-from .initial_windows import Faces, Lamps, emit, light
+from .initial_windows import Faces, GeodesicSources, initial_windows, propagate_across
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, hit, merge, outrun, put, ray, trim
 
 _ROUND = 1e-10
@@ -49,7 +49,9 @@ def distance_to_zero_line(
     """
     faces = Faces.of(triangles)
     values = cleared(triangles, values, 1e-7 * float(faces.lengths.mean()))
-    return _propagate(faces, bends_light(triangles), Lamps(values, _NO_ID, _NO_ID, _NO_ID, _NO_POINT), tolerance)
+    return _propagate(
+        faces, is_pseudosource(triangles), GeodesicSources(values, _NO_ID, _NO_ID, _NO_ID, _NO_POINT), tolerance
+    )
 
 
 def distance_to_edges_and_points(
@@ -71,11 +73,11 @@ def distance_to_edges_and_points(
     >>> distance_to_edges_and_points(triangles, none, np.array([1]), none, np.empty(0, complex))[0].tolist()
     [4.0, 0.0, 5.0]
     """
-    bends = bends_light(triangles)
+    pseudosources = is_pseudosource(triangles)
     sources = np.concatenate([np.asarray(vertices, dtype=np.int64), triangles.edges.vertices[edges].ravel()])
-    bends[sources] = True
-    lamps = Lamps(np.ones(triangles.n_vertices), edges, sources, faces, positions)
-    return _propagate(Faces.of(triangles), bends, lamps, tolerance)
+    pseudosources[sources] = True
+    sources = GeodesicSources(np.ones(triangles.n_vertices), edges, sources, faces, positions)
+    return _propagate(Faces.of(triangles), pseudosources, sources, tolerance)
 
 
 def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
@@ -91,7 +93,7 @@ def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float)
     return np.where(near, np.where(around > 0, -least, least), values)
 
 
-def bends_light(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
+def is_pseudosource(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
     """(n,) vertices that shortest lines can pass through: on a boundary, or with an angle of more than 2π."""
     angles = np.arctan2(1.0, triangles.corner_cotangents)
     total = np.bincount(triangles.corner_vertices.ravel(), angles.ravel(), triangles.n_vertices)
@@ -101,11 +103,11 @@ def bends_light(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
 
 
 @compiled(nogil=True)
-def _reach(v, length, heap, distance, bends):
-    """Note a path to a vertex; one that light bends round is queued."""
+def _reach(v, length, heap, distance, pseudosources):
+    """Note a path to a vertex; one that initial_windows pseudosources round is queued."""
     if length < distance[v] * (1.0 - 1e-14):
         distance[v] = length
-        if bends[v]:
+        if pseudosources[v]:
             heapq.heappush(heap, (length, -1 - v))
 
 
@@ -147,22 +149,22 @@ def _collect(state, latest, halfedge, at_tail, at_head, length, slack, tolerance
 
 
 @compiled(nogil=True)
-def _propagate(faces, bends, lamps, tolerance):
-    n = len(bends)
+def _propagate(faces, pseudosources, sources, tolerance):
+    n = len(pseudosources)
     distance = np.full(n, np.inf)
     heap = [(0.0, 0)]
     heap.pop()
     state = (np.empty((1024, 6)), np.empty(1024, dtype=np.int64), len(heap))  # none; a literal 0 compiles twice
     latest = np.full(3 * len(faces.vertices), -1, dtype=np.int64)  # window queued for each halfedge; others follow it
     slack = _ROUND + 2.0 * tolerance
-    state = light(faces, lamps, state, heap, latest, distance, slack)
+    state = initial_windows(faces, sources, state, heap, latest, distance, slack)
     for v in range(n):
-        if bends[v] and distance[v] < np.inf:
+        if pseudosources[v] and distance[v] < np.inf:
             heapq.heappush(heap, (distance[v], -1 - v))
 
     while len(heap) > 0:
         key, halfedge = heapq.heappop(heap)
-        if halfedge < 0:  # light bends round a vertex
+        if halfedge < 0:  # initial_windows pseudosources round a vertex
             v = -1 - halfedge
             if key > distance[v]:
                 continue
@@ -172,9 +174,9 @@ def _propagate(faces, bends, lamps, tolerance):
                 for step in range(1, 3):
                     other = (corner + step) % 3
                     length = key + abs(faces.positions[face, other] - source)
-                    _reach(faces.vertices[face, other], length, heap, distance, bends)
+                    _reach(faces.vertices[face, other], length, heap, distance, pseudosources)
                 side = (corner + 1) % 3
-                state = emit(
+                state = propagate_across(
                     faces, state, heap, latest, distance, face, side, POINT, 0.0, 1.0, source, 0j, key, slack
                 )  # fmt: skip
             continue
@@ -200,28 +202,30 @@ def _propagate(faces, bends, lamps, tolerance):
             d1x, d1y = ray(w, s1)
             left = d0x * cy - d0y * (cx - s0)  # negative: the ray leaves the apex to its right
             right = d1x * cy - d1y * (cx - s1)
-            if left > 0.0:  # the apex lies beside the light, in a gap between windows perhaps: by way of their end
+            if (
+                left > 0.0
+            ):  # the apex lies beside the initial_windows, in a gap between windows perhaps: by way of their end
                 to_apex = arrival(w, s0, 0.0) + np.hypot(cx - s0, cy)
             elif right < 0.0:
                 to_apex = arrival(w, s1, 0.0) + np.hypot(cx - s1, cy)
             else:
                 to_apex = arrival(w, cx, cy)
-            _reach(faces.vertices[face, (side + 2) % 3], to_apex, heap, distance, bends)
+            _reach(faces.vertices[face, (side + 2) % 3], to_apex, heap, distance, pseudosources)
             turned = unit * (w[P] + up * w[Q])
             source, normal = (origin, turned) if w[KIND] == BEAM else (origin + turned, 0j)
-            if left < 0.0:  # light on the side from tail to apex
+            if left < 0.0:  # initial_windows on the side from tail to apex
                 t0 = hit(s0, d0x, d0y, 0.0, 0.0, cx, cy)
                 t1 = hit(s1, d1x, d1y, 0.0, 0.0, cx, cy) if right < 0.0 else 1.0
                 t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
-                state = emit(
+                state = propagate_across(
                     faces, state, heap, latest, distance, face, tail_side, w[KIND], t0, t1, source, normal, w[SIGMA],
                     slack,
                 )  # fmt: skip
-            if right > 0.0:  # light on the side from apex to head
+            if right > 0.0:  # initial_windows on the side from apex to head
                 t0 = hit(s0, d0x, d0y, cx, cy, length, 0.0) if left > 0.0 else 0.0
                 t1 = hit(s1, d1x, d1y, cx, cy, length, 0.0)
                 t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
-                state = emit(
+                state = propagate_across(
                     faces, state, heap, latest, distance, face, head_side, w[KIND], t0, t1, source, normal, w[SIGMA],
                     slack,
                 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Kernels: the lamps from which light travels over a polyhedral surface, and the first windows that they light."""
+"""Kernels: the sources from which initial_windows travels over a polyhedral surface, and the first windows that they initial_windows."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ class Faces(NamedTuple):
         )
 
 
-class Lamps(NamedTuple):
-    """Where light comes from: the line on which vertex values are zero, edges, vertices, and points inside faces."""
+class GeodesicSources(NamedTuple):
+    """Where initial_windows comes from: the line on which vertex values are zero, edges, vertices, and points inside faces."""
 
     values: NDArray[np.float64]
     edges: NDArray[np.int64]
@@ -61,8 +61,8 @@ class Lamps(NamedTuple):
 
 
 @compiled(nogil=True)
-def emit(faces, state, heap, latest, distance, face, side, kind, t0, t1, point, normal, sigma, slack):
-    """Queue light that crosses a side of a face from within for the faces beyond; returns the windows.
+def propagate_across(faces, state, heap, latest, distance, face, side, kind, t0, t1, point, normal, sigma, slack):
+    """Queue initial_windows that crosses a side of a face from within for the faces beyond; returns the windows.
 
     Layout coordinates: the side is lit from fraction t0 to t1; the source is a point, or a beam along a normal through
     a point, at distance σ.
@@ -127,7 +127,7 @@ def _segment(faces, values, face):
 
 
 @compiled(nogil=True)
-def _light_corners(faces, distance, face, start, end):
+def _reach_corners(faces, distance, face, start, end):
     """Distance of the corners of a face to a segment or a point in it."""
     along = end - start
     square = abs(along) ** 2
@@ -138,7 +138,7 @@ def _light_corners(faces, distance, face, start, end):
 
 
 @compiled(nogil=True)
-def _emit_beam(faces, state, heap, latest, distance, face, start, end, normal, slack):
+def _first_beam(faces, state, heap, latest, distance, face, start, end, normal, slack):
     """Straight waves from a segment in a face, along a normal to it, to the sides that they meet."""
     along = (end - start) / abs(end - start)
     for side in range(3):
@@ -151,14 +151,14 @@ def _emit_beam(faces, state, heap, latest, distance, face, start, end, normal, s
         t0, t1 = clip(t0, t1, foot - abs(end - start), rate)
         t0, t1 = clip(t0, t1, -height, -climb)
         if t1 > t0:
-            state = emit(
+            state = propagate_across(
                 faces, state, heap, latest, distance, face, side, BEAM, t0, t1, start, normal, 0.0, slack
             )  # fmt: skip
     return state
 
 
 @compiled(nogil=True)
-def _emit_fan(faces, values, state, heap, latest, distance, face, side, point, other, slack):
+def _first_fan(faces, values, state, heap, latest, distance, face, side, point, other, slack):
     """Round waves from the end of a segment, between its beams and those of its neighbours across the side there."""
     here = (other - point) / abs(other - point)
     edge = faces.edges[face, side]
@@ -185,52 +185,52 @@ def _emit_fan(faces, values, state, heap, latest, distance, face, side, point, o
             t0, t1 = clip(0.0, 1.0, ((a - point) * here.conjugate()).real, ((b - a) * here.conjugate()).real)
             t0, t1 = clip(t0, t1, ((a - point) * back.conjugate()).real, ((b - a) * back.conjugate()).real)
             if t1 > t0:
-                state = emit(
+                state = propagate_across(
                     faces, state, heap, latest, distance, face, far, POINT, t0, t1, point, 0j, 0.0, slack
                 )  # fmt: skip
     return state
 
 
 @compiled(nogil=True)
-def light(faces, lamps, state, heap, latest, distance, slack):
-    """Distance at the corners of faces with lamps, then the first windows."""
+def initial_windows(faces, sources, state, heap, latest, distance, slack):
+    """Distance at the corners of faces with sources, then the first windows."""
     for face in range(len(faces.vertices)):
-        crossed, _, _, start, end = _segment(faces, lamps.values, face)
+        crossed, _, _, start, end = _segment(faces, sources.values, face)
         if crossed:
-            _light_corners(faces, distance, face, start, end)
-    for edge in lamps.edges:
+            _reach_corners(faces, distance, face, start, end)
+    for edge in sources.edges:
         for k in range(faces.first_halfedge[edge], faces.first_halfedge[edge + 1]):
             face, side = faces.halfedges[k] // 3, faces.halfedges[k] % 3
-            _light_corners(
+            _reach_corners(
                 faces, distance, face, faces.positions[face, side], faces.positions[face, (side + 1) % 3]
             )  # fmt: skip
-    for i in range(len(lamps.faces)):
-        _light_corners(faces, distance, lamps.faces[i], lamps.positions[i], lamps.positions[i])
-    for v in lamps.vertices:
+    for i in range(len(sources.faces)):
+        _reach_corners(faces, distance, sources.faces[i], sources.positions[i], sources.positions[i])
+    for v in sources.vertices:
         distance[v] = 0.0
 
     for face in range(len(faces.vertices)):
-        crossed, first, second, start, end = _segment(faces, lamps.values, face)
+        crossed, first, second, start, end = _segment(faces, sources.values, face)
         if crossed:
             normal = 1j * (end - start) / abs(end - start)
-            state = _emit_beam(faces, state, heap, latest, distance, face, start, end, normal, slack)
-            state = _emit_beam(faces, state, heap, latest, distance, face, start, end, -normal, slack)
+            state = _first_beam(faces, state, heap, latest, distance, face, start, end, normal, slack)
+            state = _first_beam(faces, state, heap, latest, distance, face, start, end, -normal, slack)
             for side, point, other in ((first, start, end), (second, end, start)):
-                state = _emit_fan(
-                    faces, lamps.values, state, heap, latest, distance, face, side, point, other, slack
+                state = _first_fan(
+                    faces, sources.values, state, heap, latest, distance, face, side, point, other, slack
                 )  # fmt: skip
-    for edge in lamps.edges:
+    for edge in sources.edges:
         for k in range(faces.first_halfedge[edge], faces.first_halfedge[edge + 1]):
             face, side = faces.halfedges[k] // 3, faces.halfedges[k] % 3
             start, end = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
             normal = 1j * (end - start) / abs(end - start)  # faces lie to the left of their sides
-            state = _emit_beam(faces, state, heap, latest, distance, face, start, end, normal, slack)
-    for i in range(len(lamps.faces)):
-        face, point = lamps.faces[i], lamps.positions[i]
+            state = _first_beam(faces, state, heap, latest, distance, face, start, end, normal, slack)
+    for i in range(len(sources.faces)):
+        face, point = sources.faces[i], sources.positions[i]
         for side in range(3):
             a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
             if ((point - a) * (1j * (b - a)).conjugate()).real > 1e-9 * abs(b - a) ** 2:  # not on that side
-                state = emit(
+                state = propagate_across(
                     faces, state, heap, latest, distance, face, side, POINT, 0.0, 1.0, point, 0j, 0.0, slack
                 )  # fmt: skip
     return state

@@ -1,4 +1,4 @@
-"""Kernels: windows of light on the edges of a polyhedral surface.
+"""Kernels: windows on the edges of a polyhedral surface.
 
 In the frame of an edge, its tail is at the origin, its head on the positive x axis, light comes from below. A window is
 a row ``(s0, s1, p, q, sigma, kind)``: the interval; kind `POINT`: waves from the point (p, q ≤ 0), whose own distance

@@ -25,7 +25,7 @@ def refine_to_conform(
     """Cut faces wherever an unoriented curve or an isolated point leaves edges and vertices (MATH.md §2).
 
     Whatever else lies in a face that is cut, or on an edge that is split, is embedded too; all other faces and pieces
-    stay as they are. Edges of the cut faces that carry nothing are then flip_new_faces to Delaunay, to be rid of slivers.
+    stay as they are. Edges of the cut faces that carry nothing are then flipped to Delaunay, to be rid of slivers.
 
     Parameters
     ----------

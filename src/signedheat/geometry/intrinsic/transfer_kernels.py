@@ -141,7 +141,7 @@ def shift(x, c, lead, gone, amount):
 
 @kernel
 def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
-    """Go straight_lines from a point along the first of its vectors, or against it, up to its end; other vectors go along.
+    """Go straight from a point along its first vector, or against it, up to its end; other vectors go along.
 
     Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
     it, and the vectors there. Returns the next row.
@@ -189,7 +189,7 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
 
 @kernel
 def trace_both_ways(g, faces, barycentric, vectors, out_faces, out_starts, out_ends, out_vectors, owners):
-    """`trace_geodesic` half of the first vector both ways from every point; rows whose owner is −1 − p go against it."""
+    """Trace half of the first vector both ways from every point; rows whose owner is −1 − p go against it."""
     n = 0
     for p in range(len(faces)):
         for way in range(2):
