@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..discretization import discretize
 from ..fields.tet_field import TetField
 from ..geometry.box_tree import BoxTree
-from ..geometry.geodesics.any_angle import Walls, bent_distance
+from ..geometry.geodesics.any_angle import FacePlanes, any_angle_distance
 from ..geometry.marching_tets import level_triangles
 from ..geometry.nearest import nearest_on_triangles
 from ..geometry.tet_clipping import barycentric
@@ -53,10 +53,10 @@ def _(
     triangles = positions[corners]
     nearest, _ = nearest_on_triangles(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)), points)
     nearest[np.isnan(values)] = -1
-    walls = Walls(
+    walls = FacePlanes(
         unknowns, tet_neighbors(mesh.faces), mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs
     )
-    distance, nearest, feet, hidden = bent_distance(
+    distance, nearest, feet, hidden = any_angle_distance(
         walls,
         points,
         *by_element(unknowns, len(values), 4),

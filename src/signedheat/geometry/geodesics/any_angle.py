@@ -1,4 +1,4 @@
-"""Kernels: distance in tets along straight lines from a surface, bent where they meet walls.
+"""Kernels: distance in tets along straight lines from a surface, bent where they meet planes.
 
 Where the segment to the nearest point of the surface lies in the mesh, its length is the distance. Elsewhere shortest
 lines bend at the boundary. They are found vertex by vertex, in order of distance: each takes over from a neighbour the
@@ -18,7 +18,7 @@ from ...compiled import compiled
 from ..nearest import place_on_triangle
 
 
-class Walls(NamedTuple):
+class FacePlanes(NamedTuple):
     """What lines need to know of tets to walk through them; see `sources.clipping.Planes` for the last three."""
 
     tets: NDArray[np.int64]
@@ -30,15 +30,15 @@ class Walls(NamedTuple):
 
 
 @compiled(nogil=True)
-def _beyond(walls, tet, k, x, y, z):
+def _beyond(planes, tet, k, x, y, z):
     """How far a point lies outside the face opposite corner k of a tet."""
-    f = walls.tet_faces[tet, k]
-    height = walls.normals[f, 0] * x + walls.normals[f, 1] * y + walls.normals[f, 2] * z - walls.offsets[f]
-    return walls.signs[tet, k] * height
+    f = planes.tet_faces[tet, k]
+    height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
+    return planes.signs[tet, k] * height
 
 
 @compiled(nogil=True)
-def _seen(walls, points, first_tet, tets_at, v, target, slack):
+def _seen(planes, points, first_tet, tets_at, v, target, slack):
     """Whether the segment from vertex v to a target lies in the mesh; the target does."""
     x, y, z = points[v]
     u, w, t = target
@@ -46,23 +46,23 @@ def _seen(walls, points, first_tet, tets_at, v, target, slack):
     for i in range(first_tet[v], first_tet[v + 1]):  # the tet that the segment starts into
         worst = -np.inf
         for k in range(4):
-            if walls.tets[tets_at[i], k] != v:
-                worst = max(worst, _beyond(walls, tets_at[i], k, u, w, t))
+            if planes.tets[tets_at[i], k] != v:
+                worst = max(worst, _beyond(planes, tets_at[i], k, u, w, t))
         if worst < least:
             tet, least = tets_at[i], worst
     if least > slack:
         return False
-    for _ in range(len(walls.tets)):
+    for _ in range(len(planes.tets)):
         leave, at = -1, np.inf
         for k in range(4):
-            there = _beyond(walls, tet, k, u, w, t)
+            there = _beyond(planes, tet, k, u, w, t)
             if there > slack:
-                here = _beyond(walls, tet, k, x, y, z)
+                here = _beyond(planes, tet, k, x, y, z)
                 if there > here and -here / (there - here) < at:
                     leave, at = k, -here / (there - here)
         if leave < 0:
             return True
-        tet = walls.neighbors[tet, leave]
+        tet = planes.neighbors[tet, leave]
         if tet < 0:
             return False
     return False
@@ -88,14 +88,14 @@ def _length(point, x, y, z):
 
 
 @compiled(nogil=True)
-def bent_distance(
-    walls, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, owners, nearest, slack
+def any_angle_distance(
+    planes, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, owners, nearest, slack
 ):
     """Distance of every vertex from triangles in the mesh.
 
     Parameters
     ----------
-    walls : Walls
+    planes : FacePlanes
         The mesh.
     points : (n, 3) float
         Its vertices, measured from the middle of the mesh, as the planes are.
@@ -138,13 +138,13 @@ def bent_distance(
             t = triangles[nearest[v]]
             for d in range(3):
                 feet[v, d] = a * t[0, d] + b * t[1, d] + g * t[2, d]
-            if _seen(walls, points, first_tet, tets_at, v, feet[v], slack):
+            if _seen(planes, points, first_tet, tets_at, v, feet[v], slack):
                 distance[v], known[v] = np.sqrt(square), True
     heap = [(0.0, 0)]
     heap.pop()
     for i in range(len(triangles)):  # what lies in a tet is seen from its corners, though it may not be the nearest
         for k in range(4):
-            v = walls.tets[owners[i], k]
+            v = planes.tets[owners[i], k]
             if not known[v] and nearest[v] >= 0:
                 x, y, z = points[v]
                 square, a, b, g = place_on_triangle(triangles[i], x, y, z)
@@ -159,7 +159,7 @@ def bent_distance(
             hidden += 1
             for i in range(first_tet[v], first_tet[v + 1]):
                 for k in range(4):
-                    u = walls.tets[tets_at[i], k]
+                    u = planes.tets[tets_at[i], k]
                     if known[u]:
                         heapq.heappush(heap, (distance[u], u))
     done = np.zeros(n, dtype=np.bool_)
@@ -170,7 +170,7 @@ def bent_distance(
         done[u] = True
         for i in range(first_tet[u], first_tet[u + 1]):
             for k in range(4):
-                v = walls.tets[tets_at[i], k]
+                v = planes.tets[tets_at[i], k]
                 if known[v] or done[v] or nearest[v] < 0:
                     continue
                 x, y, z = points[v]
@@ -183,7 +183,7 @@ def bent_distance(
                 length += _length(target, x, y, z)
                 if length >= distance[v]:
                     continue
-                if not _seen(walls, points, first_tet, tets_at, v, target, slack):
+                if not _seen(planes, points, first_tet, tets_at, v, target, slack):
                     via, near, foot, length = u, nearest[u], feet[u], distance[u] + _length(points[u], x, y, z)
                 if length < distance[v]:
                     distance[v], bend[v], nearest[v] = length, via, near
