@@ -8,7 +8,7 @@ from scipy import sparse
 from tet_cases import boxes, rectangle, sphere
 
 import signedheat as sh
-from signedheat.geometry.tet_clipping import Planes, barycentric, clip_triangles, locate
+from signedheat.geometry.tet_clipping import Planes, barycentric, clip_triangles, containing_tets
 from signedheat.linear import factorize
 from signedheat.linear.krylov import IncompleteCholesky, outward_order
 
@@ -129,7 +129,7 @@ def test_sources_in_lattice_planes_count_once():
 def test_points_are_located():
     mesh = boxes((3, 3, 3), 1.0, jitter=0.15)
     points = np.random.default_rng(1).uniform(-1, 4, (2000, 3))
-    tets = locate(mesh, Planes.of(mesh), points)
+    tets = containing_tets(mesh, Planes.of(mesh), points)
     inside = ((points >= 0) & (points <= 3)).all(axis=1)
     assert ((tets >= 0) == inside).all()
     weights = barycentric(mesh, tets[inside], points[inside])

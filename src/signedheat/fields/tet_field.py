@@ -17,7 +17,7 @@ from ..errors import GeometryError, OutsideError
 from ..geometry.box_tree import BoxTree
 from ..geometry.marching_tets import closed_level_set
 from ..geometry.nearest import nearest_on_triangles
-from ..geometry.tet_clipping import Planes, barycentric, locate
+from ..geometry.tet_clipping import Planes, barycentric, containing_tets
 from .files import save_field
 
 
@@ -189,7 +189,7 @@ class TetField:
 
     def _place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Vertices and weights that interpolate at each point or the nearest on the boundary, and the way from it."""
-        tets = locate(self.mesh, self._planes, points)
+        tets = containing_tets(self.mesh, self._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
         corners = np.zeros((len(points), 4), dtype=np.int64)
         weights, away = np.zeros((len(points), 4)), np.zeros((len(points), 3))

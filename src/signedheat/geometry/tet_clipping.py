@@ -1,7 +1,7 @@
 """Oriented triangles cut by the tets that they cross, and points located in tets.
 
 A source in space need not follow the mesh in any way. Every triangle is cut into one convex piece for each tet that it
-crosses; the pieces' area vectors add up to the triangle's. A piece that lies in a face belongs to all tets there
+crosses; the polygons' area vectors add up to the triangle's. A piece that lies in a face belongs to all tets there
 in equal parts.
 """
 
@@ -24,7 +24,7 @@ TOUCHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class ClippedPolygons:
     """What a source leaves in each tet.
 
     Attributes
@@ -66,9 +66,9 @@ class Planes:
     signs : (m, 4) float
         +1 where the normal points out of the tet, −1 where into it.
     shares : (f,) float
-        One over the number of tets that can hold pieces at the face.
+        One over the number of tets that can hold polygons at the face.
     solid : (m,) bool
-        Tets that can hold pieces: those that are not flat.
+        Tets that can hold polygons: those that are not flat.
     center : (3,) float
         Middle of the mesh, from which coordinates are measured, for the sake of rounding.
     """
@@ -105,7 +105,7 @@ class Planes:
         )
 
 
-def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -> Pieces:
+def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -> ClippedPolygons:
     """Cut (k, 3, 3) triangles by the tets that they cross; what lies outside the mesh is left out.
 
     Examples
@@ -131,17 +131,19 @@ def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -
         planes.solid,
     )
     tets, parents, area_vectors, areas, centers, in_face = found
-    return Pieces(tets, parents, area_vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face)
+    return ClippedPolygons(
+        tets, parents, area_vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face
+    )
 
 
-def locate(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
+def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
     """(k,) a tet that each point lies in, −1 outside the mesh.
 
     Examples
     --------
     >>> from signedheat import TetMesh
     >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
-    >>> locate(mesh, Planes.of(mesh), np.array([[0.1, 0.1, 0.1], [1.0, 1.0, 1.0]]))
+    >>> containing_tets(mesh, Planes.of(mesh), np.array([[0.1, 0.1, 0.1], [1.0, 1.0, 1.0]]))
     array([ 0, -1])
     """
     tree = mesh.search_tree

@@ -13,7 +13,7 @@ from scipy import sparse
 from ...domains.tet_mesh import TetMesh
 from ...errors import SourceError
 from ...geometry.directions import unit
-from ...geometry.tet_clipping import Pieces, Planes, barycentric, clip_triangles, locate
+from ...geometry.tet_clipping import ClippedPolygons, Planes, barycentric, clip_triangles, containing_tets
 from ..area_elements import AreaElements, area_elements
 
 WHOLE = 1 - 1e-6
@@ -95,21 +95,21 @@ def tet_source(
             raise SourceError(f"source {number} ({source!r}) does not lie in space of three dimensions, as tets do")
         if not elements.vectors.any():
             raise SourceError(f"source {number} ({source!r}) has no area at all: its faces are degenerate")
-        pieces = _cut(mesh, planes, elements)
-        if len(pieces.tets) == 0:
+        polygons = _cut(mesh, planes, elements)
+        if len(polygons.tets) == 0:
             raise SourceError(
                 f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}: move it into "
                 "the mesh, or check that both have the same units"
             )
-        outside = 1 - pieces.areas.sum() / elements.weights.sum()
+        outside = 1 - polygons.areas.sum() / elements.weights.sum()
         if outside > 1e-9:
             notes[f"source {number} outside the mesh"] = f"{100 * outside:.3g} % of its area, left out"
         spacing = max(spacing, elements.spacing)
-        cuts.append(pieces)
-        components.append(elements.components[pieces.parents] + n_components)
+        cuts.append(polygons)
+        components.append(elements.components[polygons.parents] + n_components)
         n_components = int(components[-1].max()) + 1
     time = diffusion * spacing**2
-    loads = sum(_loads(mesh, pieces, np.sqrt(time)) for pieces in cuts)
+    loads = sum(_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts)
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
         raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
     patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
@@ -117,7 +117,7 @@ def tet_source(
     return TetSource(
         vectors=loads[:, :3],
         strengths=loads[:, 3],
-        centers=np.concatenate([_centers(mesh, pieces) for pieces in cuts]),
+        centers=np.concatenate([_centers(mesh, polygons) for polygons in cuts]),
         time=time,
         rows=sparse.vstack(rows, format="csr"),
         bends=sparse.vstack(bends, format="csr"),
@@ -128,19 +128,19 @@ def tet_source(
     )
 
 
-def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> Pieces:
+def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygons:
     if elements.corners.shape[1] == 3:
-        pieces = clip_triangles(mesh, planes, elements.corners)
+        polygons = clip_triangles(mesh, planes, elements.corners)
         sizes = np.linalg.norm(elements.vectors, axis=1)
         counted = elements.weights / np.where(sizes > 0, sizes, 1)  # −1 where a fan leaves its polygon
-        return replace(pieces, areas=pieces.areas * counted[pieces.parents])
-    tets = locate(mesh, planes, elements.corners[:, 0])
+        return replace(polygons, areas=polygons.areas * counted[polygons.parents])
+    tets = containing_tets(mesh, planes, elements.corners[:, 0])
     k = np.flatnonzero(tets >= 0)
     centers = barycentric(mesh, tets[k], elements.corners[k, 0])
-    return Pieces(tets[k], k, elements.vectors[k], elements.weights[k], centers, np.full(len(k), -1))
+    return ClippedPolygons(tets[k], k, elements.vectors[k], elements.weights[k], centers, np.full(len(k), -1))
 
 
-def _loads(mesh: TetMesh, pieces: Pieces, width: float) -> NDArray[np.float64]:
+def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> NDArray[np.float64]:
     """(f, 4) X₀ at the faces, and the same for areas without direction.
 
     It is ∫ ψ N, without the parts where ψ is negative, which would send out waves of the wrong sign: on a face of the
@@ -148,71 +148,75 @@ def _loads(mesh: TetMesh, pieces: Pieces, width: float) -> NDArray[np.float64]:
     that lies δ √t in front of it sends e^δ times what is due ahead, and e^−δ times what is due backwards. Shares
     weighted by a mean of e^−δ and e^δ send as much as the piece itself both ways, wherever such a mean exists.
     """
-    shares = np.maximum(1 - 3 * pieces.barycentric, 0)
-    corners = mesh.vertices[mesh.tets[pieces.tets]]
+    shares = np.maximum(1 - 3 * polygons.barycentric, 0)
+    corners = mesh.vertices[mesh.tets[polygons.tets]]
     face_centers = (corners.sum(axis=1, keepdims=True) - corners) / 3
-    away = np.einsum("pki,pi->pk", face_centers - _centers(mesh, pieces)[:, None], unit(pieces.area_vectors))
+    away = np.einsum("pki,pi->pk", face_centers - _centers(mesh, polygons)[:, None], unit(polygons.area_vectors))
     ahead = np.exp(np.clip(away / width, -20, 20))
     sent = [(shares * weight * (ahead - 1 / ahead)).sum(axis=1) for weight in (1 / ahead, ahead)]
     mean = [np.maximum(sign * excess, 1e-300)[:, None] for sign, excess in zip((1, -1), sent[::-1], strict=True)]
     shares *= mean[0] / ahead + mean[1] * ahead
     shares /= (shares * (ahead + 1 / ahead)).sum(axis=1, keepdims=True) / 2
-    faces, n = mesh.faces.tet_faces[pieces.tets].ravel(), len(mesh.faces.vertices)
-    columns = [*pieces.area_vectors.T, pieces.areas]
+    faces, n = mesh.faces.tet_faces[polygons.tets].ravel(), len(mesh.faces.vertices)
+    columns = [*polygons.area_vectors.T, polygons.areas]
     return np.stack([np.bincount(faces, (shares * column[:, None]).ravel(), n) for column in columns], axis=1)
 
 
 def _patches(
-    mesh: TetMesh, unknowns: NDArray[np.int64], n_unknowns: int, pieces: Pieces, components: NDArray[np.int64]
+    mesh: TetMesh,
+    unknowns: NDArray[np.int64],
+    n_unknowns: int,
+    polygons: ClippedPolygons,
+    components: NDArray[np.int64],
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
     """Rows, bends, areas and components of the patches.
 
     One row for each piece would say more than φ, linear on every tet, can obey but by being flat around the source.
     A quadratic φ is at x, of barycentric coordinates λ between corners v, ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
     """
-    corners = unknowns[pieces.tets]
-    conforming = _on_whole_faces(mesh, pieces, components)
+    corners = unknowns[polygons.tets]
+    conforming = _on_whole_faces(mesh, polygons, components)
     k = np.flatnonzero(conforming)
-    of_face = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[pieces.in_face[k]]
+    of_face = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[polygons.in_face[k]]
     at_vertices = corners[k[:, None], of_face].ravel()
     inside = np.flatnonzero(~conforming)
-    nearest = corners[inside, pieces.barycentric[inside].argmax(axis=1)]
+    nearest = corners[inside, polygons.barycentric[inside].argmax(axis=1)]
 
     keys = np.concatenate([np.repeat(components[k], 3), components[inside]]) * n_unknowns
     keys += np.concatenate([at_vertices, nearest])
-    areas = np.concatenate([np.repeat(pieces.areas[k] / 3, 3), pieces.areas[inside]])
+    areas = np.concatenate([np.repeat(polygons.areas[k] / 3, 3), polygons.areas[inside]])
     found, patch = np.unique(keys, return_inverse=True)
     weights = np.bincount(patch, weights=areas)
     real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # and not fans that cancel outside a polygon
     n_on = len(at_vertices)
     columns = np.concatenate([at_vertices, corners[inside].ravel()])
-    entries = np.concatenate([areas[:n_on], (areas[n_on:, None] * pieces.barycentric[inside]).ravel()])
+    entries = np.concatenate([areas[:n_on], (areas[n_on:, None] * polygons.barycentric[inside]).ravel()])
     index = np.concatenate([patch[:n_on], np.repeat(patch[n_on:], 4)])
     rows = sparse.csr_matrix(
         (entries / np.where(real, weights, 1)[index], (index, columns)), shape=(len(found), n_unknowns)
     )
     rows.eliminate_zeros()
-    away = (_centers(mesh, pieces)[:, None] - mesh.vertices[mesh.tets[pieces.tets]])[inside].reshape(-1, 3)
+    away = (_centers(mesh, polygons)[:, None] - mesh.vertices[mesh.tets[polygons.tets]])[inside].reshape(-1, 3)
     steps = (entries / np.where(real, weights, 1)[index])[n_on:, None] * away / 2
     places = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
     bends = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
     return rows[real], bends[real], weights[real], found[real] // n_unknowns
 
 
-def _centers(mesh: TetMesh, pieces: Pieces) -> NDArray[np.float64]:
-    return np.einsum("pk,pki->pi", pieces.barycentric, mesh.vertices[mesh.tets[pieces.tets]])
+def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> NDArray[np.float64]:
+    return np.einsum("pk,pki->pi", polygons.barycentric, mesh.vertices[mesh.tets[polygons.tets]])
 
 
-def _on_whole_faces(mesh: TetMesh, pieces: Pieces, components: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which pieces lie in faces that their component covers."""
-    on = pieces.in_face >= 0
+def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which polygons lie in faces that their component covers."""
+    on = polygons.in_face >= 0
     covered = np.zeros(len(on), dtype=bool)
     if on.any():
         n_faces = len(mesh.faces.vertices)
-        face = mesh.faces.tet_faces[pieces.tets[on], pieces.in_face[on]]
+        face = mesh.faces.tet_faces[polygons.tets[on], polygons.in_face[on]]
         _, which = np.unique(components[on] * n_faces + face, return_inverse=True)
-        area = np.linalg.norm(mesh.geometry.area_vectors[pieces.tets[on], pieces.in_face[on]], axis=1)
-        covered[on] = np.bincount(which, weights=pieces.areas[on])[which] >= WHOLE * area
+        area = np.linalg.norm(mesh.geometry.area_vectors[polygons.tets[on], polygons.in_face[on]], axis=1)
+        covered[on] = np.bincount(which, weights=polygons.areas[on])[which] >= WHOLE * area
     return covered
 
 
