@@ -21,7 +21,7 @@ from ...geometry.mollification import mollify
 from ...linear import elimination_order, factorize
 from ...operators.cotan import cotan_matrix, divergence
 from ..direct_integration import DirectIntegration
-from .nonmanifold_frames import facing
+from .nonmanifold_frames import nonmanifold_frames
 from .source import surface_source
 from .vector_heat import VectorHeat
 
@@ -90,7 +90,7 @@ class SurfaceDiscretization:
         groups = segments_of_each(sources, self.triangles, positions)
         triangles, groups = refine_to_conform(self.triangles, groups)
         surface = self if triangles is self.triangles else self._cut_into(triangles)
-        triangles, groups = facing(triangles, groups)
+        triangles, groups = nonmanifold_frames(triangles, groups)
         return surface._turned_to(triangles), groups
 
     def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:

@@ -14,7 +14,7 @@ from ...geometry.curve_segments import CurveSegments
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 
 
-def facing(
+def nonmanifold_frames(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, Sequence[Sequence[CurveSegments]]]:
     """Make the face that is nearest to the sources the first of every edge with more than two faces.
@@ -43,7 +43,7 @@ def facing(
     >>> from signedheat.domains.segments import segments_of_each
     >>> three = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3], [1, 0, 4]]), np.ones((3, 3)), 5)
     >>> on_the_last = segments_of_each([Curve([2, 2], [[0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])], three)
-    >>> facing(three, on_the_last)[0].first_halfedges.tolist()
+    >>> nonmanifold_frames(three, on_the_last)[0].first_halfedges.tolist()
     [6, 1, 2, 4, 5, 7, 8]
     """
     table = triangles.edges
