@@ -9,7 +9,7 @@ from grid_cases import assert_closed_manifold, enclosed_volume
 import signedheat as sh
 from signedheat.linear.stages import solve_in_stages
 from signedheat.lowering.grid import masked as masked_grid
-from signedheat.lowering.grid.free_nodes import OpenNodes
+from signedheat.lowering.grid.free_nodes import FreeNodes
 
 LEFT_OF_WALL = sh.Polyline([[0.3, 2.0], [0.3, 0.0]])
 
@@ -164,7 +164,7 @@ def test_corridors_have_no_end_where_numbers_underflow():
 
 def test_stages_are_what_logarithms_are():
     n = 2000
-    nodes = OpenNodes(sh.Grid(0.0, 1.0, n, np.zeros(n, dtype=bool)))
+    nodes = FreeNodes(sh.Grid(0.0, 1.0, n, np.zeros(n, dtype=bool)))
     from scipy import sparse
 
     matrix = sparse.csr_matrix(sparse.eye_array(n) + nodes.laplacian)
@@ -182,7 +182,7 @@ def test_stages_are_what_logarithms_are():
 def test_lines_of_sight():
     solid = np.zeros((5, 5), dtype=bool)
     solid[2, 2] = True
-    nodes = OpenNodes(sh.Grid((0, 0), 1.0, solid.shape, solid))
+    nodes = FreeNodes(sh.Grid((0, 0), 1.0, solid.shape, solid))
     seen = np.ones((5, 5), dtype=bool)
     seen[~solid] = nodes.see(np.broadcast_to([0.0, 0.0], (24, 2)))
     hidden = {(3, 3), (4, 4), (3, 4), (4, 3), (3, 2), (2, 3)}

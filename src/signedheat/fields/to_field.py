@@ -54,7 +54,7 @@ def _(
     unreached = ids[np.isnan(values)]
     if len(unreached):
         warn_user(
-            f"{len(unreached)} of {len(values)} open nodes are cut off from every source by solid ones: the "
+            f"{len(unreached)} of {len(values)} free nodes are cut off from every source by solid ones: the "
             "distance there is NaN",
             UnreachedWarning,
         )

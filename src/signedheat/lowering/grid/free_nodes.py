@@ -12,18 +12,18 @@ from scipy import sparse
 from ...compiled import compiled
 from ...domains.grid import Grid
 
-ECHO = 3
+REFLECTION = 3
 """Nodes beside a wall whose gradients its echo turns by more than a degree."""
 
 
 @dataclass(frozen=True, eq=False)
-class OpenNodes:
+class FreeNodes:
     """The nodes of a grid that are not solid, numbered in the order of the grid.
 
     Examples
     --------
     >>> import numpy as np
-    >>> nodes = OpenNodes(Grid(0.0, 0.5, 4, mask=np.array([False, False, True, False])))
+    >>> nodes = FreeNodes(Grid(0.0, 0.5, 4, mask=np.array([False, False, True, False])))
     >>> nodes.neighbors.tolist()
     [[-1, 1], [0, -1], [-1, -1]]
     >>> nodes.laplacian.toarray().tolist()
@@ -34,7 +34,7 @@ class OpenNodes:
 
     @cached_property
     def ids(self) -> NDArray[np.int64]:
-        """(n,) node of the grid that each open node is."""
+        """(n,) node of the grid that each free node is."""
         return np.flatnonzero(~self.grid.mask.ravel())
 
     @cached_property
@@ -46,12 +46,12 @@ class OpenNodes:
 
     @cached_property
     def indices(self) -> NDArray[np.int64]:
-        """(n, d) place of each open node, in cells."""
+        """(n, d) place of each free node, in cells."""
         return np.stack(np.unravel_index(self.ids, self.grid.shape), axis=1)
 
     @cached_property
     def neighbors(self) -> NDArray[np.int64]:
-        """(n, 2d) open node before and after each along every axis; −1 where there is none."""
+        """(n, 2d) free node before and after each along every axis; −1 where there is none."""
         padded = np.pad(self.numbers.reshape(self.grid.shape), 1, constant_values=-1)
         place = self.indices + 1
         around = []
@@ -72,7 +72,7 @@ class OpenNodes:
         return sparse.csr_matrix(sparse.diags_array(there @ weights) - parts)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) −∇·Y, each face between two open nodes taking the mean of theirs, and all others nothing."""
+        """(n,) −∇·Y, each face between two free nodes taking the mean of theirs, and all others nothing."""
         result = np.zeros(len(directions))
         for axis, step in enumerate(self.grid.spacing):
             for side, sign in ((2 * axis, 1.0), (2 * axis + 1, -1.0)):
@@ -94,7 +94,7 @@ class OpenNodes:
             slopes[:, axis] = (ahead - behind) / (2 * step)
         return slopes
 
-    def without_echo(self, directions: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    def remove_wall_reflection(self, directions: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Directions of the chosen nodes, those that lead into a wall taken from farther inside.
 
         Heat that a wall throws back takes from the gradient what points into it, within a few √t, that is nodes.
@@ -104,7 +104,7 @@ class OpenNodes:
             for wall in (0, 1):
                 inward, sign = self.neighbors[:, 2 * axis + 1 - wall], 2 * wall - 1
                 chain = [np.flatnonzero(chosen & (self.neighbors[:, 2 * axis + wall] < 0))]
-                for _ in range(ECHO):
+                for _ in range(REFLECTION):
                     chain = [ids[inward[chain[-1]] >= 0] for ids in chain]
                     chain.append(inward[chain[-1]])
                     chain = [ids[chosen[chain[-1]]] for ids in chain]
@@ -114,7 +114,7 @@ class OpenNodes:
         return result
 
     def see(self, targets: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(n,) whether the straight line from each open node to its target, in cells, passes no solid node's box."""
+        """(n,) whether the straight line from each free node to its target, in cells, passes no solid node's box."""
         counts = np.array(self.grid.shape)
         strides = np.append(np.cumprod(counts[:0:-1])[::-1], 1)
         return _see(self.indices, targets, self.grid.mask.ravel(), counts, strides)

@@ -21,7 +21,7 @@ from ...linear.stages import solve_in_stages
 from ..area_elements import sample_on_grid
 from ..direct_integration import DirectIntegration
 from ..tets.discretization import from_first
-from .free_nodes import OpenNodes
+from .free_nodes import FreeNodes
 from .integration import deviation
 from .masked_source import MaskedSource
 from .source import GridSource
@@ -30,7 +30,7 @@ SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the pieces into which sources are cut."""
 
 DIRECT_NODES = {1: 10_000_000, 2: 1_000_000, 3: 40_000, 4: 5_000}
-"""Up to this number of open nodes both systems are factorised; that grows the faster the higher the dimension."""
+"""Up to this number of free nodes both systems are factorised; that grows the faster the higher the dimension."""
 
 DIRECTION_ERROR = 1e-4
 """Componentwise residual at which conjugate gradients stop."""
@@ -47,9 +47,9 @@ class MaskedGridDiscretization:
     _factors: dict[float, Any] = field(default_factory=dict, repr=False)
 
     @cached_property
-    def nodes(self) -> OpenNodes:
+    def nodes(self) -> FreeNodes:
         """The nodes that are not solid."""
-        return OpenNodes(self.grid)
+        return FreeNodes(self.grid)
 
     @property
     def direct(self) -> bool:
@@ -89,7 +89,7 @@ class MaskedGridDiscretization:
             with np.errstate(divide="ignore"):
                 heights[known] = np.log(np.maximum(values[known, -1], 0.0)) + logarithm
         vectors, straight = vectors[:, :-1], self._straight(source)
-        falling = nodes.without_echo(-unit(slopes), ~straight)
+        falling = nodes.remove_wall_reflection(-unit(slopes), ~straight)
         roots = uphill_roots(heights, nodes.neighbors, straight)
         side = np.sign(np.einsum("ij,ij->i", unit(vectors), falling))[roots]
         return np.where(straight[:, None], vectors, side[:, None] * falling)
@@ -129,7 +129,7 @@ class MaskedGridDiscretization:
         return nodes.see(source.positions[nearest]) & ~past_end
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """X at the open nodes, where it is already."""
+        """X at the free nodes, where it is already."""
         return vectors
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -139,7 +139,7 @@ class MaskedGridDiscretization:
 
 @dataclass(frozen=True, eq=False)
 class MaskedIntegration(DirectIntegration):
-    """Step 3 on open nodes; levels are met as on other grids, by a smooth correction, unless exactly is asked for."""
+    """Step 3 on free nodes; levels are met as on other grids, by a smooth correction, unless exactly is asked for."""
 
     diffusing: MaskedGridDiscretization | None = None
 

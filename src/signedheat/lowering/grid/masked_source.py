@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...errors import SourceError
-from .free_nodes import OpenNodes
+from .free_nodes import FreeNodes
 from .source import GridSource
 
 
 @dataclass(frozen=True, eq=False)
 class MaskedSource:
-    """Sources lowered to the open nodes of a grid.
+    """Sources lowered to the free nodes of a grid.
 
     Attributes
     ----------
@@ -36,8 +36,8 @@ class MaskedSource:
     beside_solid: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, whole: GridSource, nodes: OpenNodes) -> MaskedSource:
-        """Bring sources to open nodes.
+    def of(cls, whole: GridSource, nodes: FreeNodes) -> MaskedSource:
+        """Bring sources to free nodes.
 
         Raises
         ------
