@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...discretization import discretize
 from ...domains.grid import Grid
 from ...errors import MemoryLimitError, SourceError
-from ...operators.grid.multilevel import Level, collapse, diffuse_on_pyramid
+from ...operators.grid.multilevel import Level, collapse, diffuse_multilevel
 from ...operators.grid.readout import unit_vectors
 from ...operators.grid.stencil import divergence
 from ...operators.grid.wavefront import padded_shape
@@ -73,7 +73,7 @@ class GridDiscretization:
         return GridSource(samples, self.grid, diffusion)
 
     def diffuse(self, source: GridSource) -> list[Level]:
-        return diffuse_on_pyramid(source.vectors, source.time_on, source.finest)
+        return diffuse_multilevel(source.vectors, source.time_on, source.finest)
 
     def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
         dimension = self.grid.dimension

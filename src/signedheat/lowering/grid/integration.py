@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...discretization import Levels
 from ...domains.grid import Grid
-from ...operators.grid.multilevel import collapse, diffuse_on_pyramid, leave_out
+from ...operators.grid.multilevel import collapse, diffuse_multilevel, skip_finest
 from ...operators.grid.node_sources import NodeSources
 from ...operators.grid.readout import quotients
 from ...operators.grid.stencil import interpolation_stencil, laplacian, solve_poisson
@@ -109,19 +109,19 @@ def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -
 def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float32]:
     """(*grid.shape) mean of values given at the samples, weighted by area and nearness: as the normals are diffused.
 
-    It varies slowly, so the finest level of the pyramid is left out.
+    It varies slowly, so the finest level of the hierarchy is left out.
     """
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)
     finest, axes = source.vectors, slice(-source.grid.dimension, None)
-    left_out, shape, steps = leave_out(finest.shape, finest.steps, max(1, source.finest))
+    left_out, shape, steps = skip_finest(finest.shape, finest.steps, max(1, source.finest))
     ratios = finest.steps[axes] / np.where(steps[axes] > 0, steps[axes], np.inf)
     stencil = interpolation_stencil(source.samples.positions * ratios, shape[axes])
     weights = source.weights / source.weights.max()
     pairs = np.stack([weights, weights * values / largest], axis=1)
     nodes = NodeSources.scattered(shape, steps, *stencil, pairs)
-    levels = left_out + diffuse_on_pyramid(nodes, source.time_on, rounds=1)
+    levels = left_out + diffuse_multilevel(nodes, source.time_on, rounds=1)
     mean = collapse(levels, finest.shape, 1, quotients).reshape(source.grid.shape)
     mean *= np.float32(largest)
     return mean

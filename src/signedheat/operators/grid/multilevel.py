@@ -1,4 +1,4 @@
-"""Diffusion from sources on a grid, over a pyramid of coarser grids.
+"""Diffusion from sources on a grid, on a hierarchy of coarser grids.
 
 X falls by e over √t. Farther than a few √t from the source its direction varies slowly, and a grid of twice the
 spacing, with the time that belongs to it (``t = τ max(h, h_source)²``, as on the finest grid), carries it on at an
@@ -43,7 +43,7 @@ ROUNDS_EVERYWHERE = 12
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """What was diffused on one grid of the pyramid.
+    """What was diffused on one grid of the hierarchy.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Level:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class CoarseGuess:
     """Values that a finer level found.
 
     Attributes
@@ -76,7 +76,7 @@ class Known:
     where: NDArray[np.bool_]
 
 
-def diffuse_on_pyramid(
+def diffuse_multilevel(
     sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = ROUNDS
 ) -> list[Level]:
     """Solve ``(1 − tΔ) X = B`` on every level, from `finest` (0: the grid of the sources) to the coarsest.
@@ -133,10 +133,10 @@ def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np
     return factors
 
 
-def leave_out(
+def skip_finest(
     shape: tuple[int, ...], steps: NDArray[np.float64], finest: int
 ) -> tuple[list[Level], tuple[int, ...], NDArray[np.float64]]:
-    """The first levels of the pyramid, with nothing in them; shape and spacing of the coarser grid that follows."""
+    """The first levels of the hierarchy, with nothing in them; shape and spacing of the coarser grid that follows."""
     levels: list[Level] = []
     while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
         levels.append(Level(None, None, factors))
@@ -146,7 +146,7 @@ def leave_out(
 
 def _diffuse_level(
     sources: NodeSources,
-    known: Known | None,
+    known: CoarseGuess | None,
     time: Callable[[float], float],
     factors: NDArray[np.int64],
     rounds: int,
@@ -201,7 +201,7 @@ def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[
     return tuple(int(n) for n in coarse), np.where(coarse > 1, steps * factors, 0.0)
 
 
-def _carried(level: Level, shape: tuple[int, ...], power: float) -> Known | None:
+def _carried(level: Level, shape: tuple[int, ...], power: float) -> CoarseGuess | None:
     """What a level found, for the next coarser one: in stretches of which it knows every node."""
     vectors = np.zeros((*shape, 4), dtype=np.float32)
     counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
@@ -209,7 +209,7 @@ def _carried(level: Level, shape: tuple[int, ...], power: float) -> Known | None
     full = np.full(counts.shape[3], STRETCH)
     full[-1] = shape[3] - STRETCH * (len(full) - 1)
     where = counts >= full
-    return Known(vectors, where) if where.any() else None
+    return CoarseGuess(vectors, where) if where.any() else None
 
 
 def collapse(
