@@ -18,7 +18,7 @@ def unfold(g, h, side, tx, ty, hx, hy):
 
     `side` is 1 where the face of h is laid out counter-clockwise, −1 where clockwise.
     """
-    t = g.ring[h]
+    t = g.sibling[h]
     if g.forward[t] == g.forward[h]:
         side = -side
     else:
@@ -70,7 +70,7 @@ def find_circumcenter(g, f):
         if g.fixed[g.edge[h]]:
             return BLOCKED, h, 0.0, 0.0
         l = (leaving + 1) % 3
-        t = g.ring[h]
+        t = g.sibling[h]
         kt = t % 3
         ax, ay, turned = unfold(g, h, side, x[leaving], y[leaving], x[l], y[l])
         if turned == side:
@@ -107,7 +107,7 @@ def encroached(g, f, px, py, ends, halfedges):
             if dot < 0.0:
                 return h
             continue
-        t = g.ring[h]
+        t = g.sibling[h]
         n, d = tangent_at(g, preceding(t))
         in_circle = dot * 2.0 * np.sqrt(n * d) + (d - n) * abs(cross(px, py, tx, ty, hx, hy)) < 0.0
         visited += 1

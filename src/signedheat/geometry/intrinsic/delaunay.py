@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..edges import EdgeTable
 from ..intrinsic_mesh import IntrinsicMesh
-from .gluing_kernels import Gluing, settle
+from .gluing_kernels import Gluing, flip_until_delaunay
 
 
 def flip_to_delaunay(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> IntrinsicMesh:
@@ -50,10 +50,10 @@ def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None)
     order = np.argsort(edge, kind="stable")
     first = np.searchsorted(edge[order], np.arange(n_edges))
     last = np.searchsorted(edge[order], np.arange(n_edges), side="right") - 1
-    ring = np.empty_like(edge)
-    ring[order] = np.roll(order, -1)
+    sibling = np.empty_like(edge)
+    sibling[order] = np.roll(order, -1)
     used = first <= last
-    ring[order[last[used]]] = order[first[used]]
+    sibling[order[last[used]]] = order[first[used]]
     start = np.where(used, order[np.minimum(first, len(order) - 1)], 0)
     sums = np.bincount(edge, weights=triangles.edge_lengths.ravel(), minlength=n_edges)
     lengths = sums / np.maximum(edges.face_counts, 1)
@@ -64,7 +64,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None)
         edge=edge.copy(),
         forward=edges.forward.ravel().copy(),
         front=start[edge] == np.arange(len(edge)),
-        ring=ring,
+        sibling=sibling,
         start=start,
         length=lengths / unit,
         fixed=fixed,
@@ -82,7 +82,7 @@ def flip_all(gluing: Gluing) -> Gluing:
     n_edges = int(gluing.counts[1])
     gluing.counts[4] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
-    while not settle(gluing, stack, stacked):
+    while not flip_until_delaunay(gluing, stack, stacked):
         gluing = gluing._replace(steps=doubled(gluing.steps), weights=doubled(gluing.weights))
     return gluing
 

@@ -25,7 +25,7 @@ MOST_FLIPS = 1000
 class Gluing(NamedTuple):
     """An intrinsic triangulation under construction; arrays are longer than what is used of them.
 
-    `tail`, `edge`, `forward`, `front` and `ring` have one entry per halfedge: its tail vertex; its edge; whether it
+    `tail`, `edge`, `forward`, `front` and `sibling` have one entry per halfedge: its tail vertex; its edge; whether it
     runs along the edge's own direction; which of the edge's two sides it is on (moved along, so that the two sides of
     a source keep their names); and the next halfedge of the same edge, cyclically: itself at a boundary.
     `start`, `length`, `fixed` and `flips` have one entry per edge: one of its halfedges; its length, in multiples of
@@ -39,7 +39,7 @@ class Gluing(NamedTuple):
     edge: NDArray[np.int64]
     forward: NDArray[np.bool_]
     front: NDArray[np.bool_]
-    ring: NDArray[np.int64]
+    sibling: NDArray[np.int64]
     start: NDArray[np.int64]
     length: NDArray[np.float64]
     fixed: NDArray[np.bool_]
@@ -87,15 +87,15 @@ def tangent_at(g, h):
 @kernel
 def is_interior(g, h):
     """Whether exactly two different faces meet at the halfedge's edge."""
-    other = g.ring[h]
-    return other != h and g.ring[other] == h and other // 3 != h // 3
+    other = g.sibling[h]
+    return other != h and g.sibling[other] == h and other // 3 != h // 3
 
 
 @kernel
 def violates_delaunay(g, h):
     """Whether the two angles opposite to an interior edge sum to more than π (by more than rounding)."""
     n, d = tangent_at(g, preceding(h))
-    m, e = tangent_at(g, preceding(g.ring[h]))
+    m, e = tangent_at(g, preceding(g.sibling[h]))
     return n * m > d * e * (1.0 + 1e-10)
 
 
@@ -104,10 +104,10 @@ def move(g, old, new):
     """Move halfedges old[k] to the places new[k], a permutation of them, all at once; corners are left alone."""
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
     for k in range(len(old)):
-        after = g.ring[old[k]]
+        after = g.sibling[old[k]]
         before = after
-        while g.ring[before] != old[k]:
-            before = g.ring[before]
+        while g.sibling[before] != old[k]:
+            before = g.sibling[before]
         for l in range(len(old)):
             if before == old[l]:
                 before = -1
@@ -119,10 +119,10 @@ def move(g, old, new):
         flags[k] = 2 * g.forward[old[k]] + g.front[old[k]]
     for k in range(len(old)):
         h = new[k]
-        g.ring[h], g.edge[h], g.forward[h], g.front[h] = successors[k], edges[k], flags[k] >= 2, flags[k] % 2 == 1
+        g.sibling[h], g.edge[h], g.forward[h], g.front[h] = successors[k], edges[k], flags[k] >= 2, flags[k] % 2 == 1
         g.start[edges[k]] = h
         if predecessors[k] >= 0:
-            g.ring[predecessors[k]] = h
+            g.sibling[predecessors[k]] = h
 
 
 @kernel
@@ -152,7 +152,7 @@ def diamond(g, h):
     Returns the signed areas of jab and iab, the areas of the twin's face and of h's face, and the length of ab. They
     say how the four corners depend on each other: area_jab·i + area_iab·j = area_twin·a + area_h·b.
     """
-    t = g.ring[h]
+    t = g.sibling[h]
     mirrored = g.forward[h] == g.forward[t]
     at_i, at_j = (t, following(t)) if mirrored else (following(t), t)
     ai, ja = g.length[g.edge[preceding(h)]], g.length[g.edge[following(h)]]
@@ -180,10 +180,10 @@ def flip(g, h):
     ``h: i → j`` with apex a and its twin ``t: j → i`` with apex b become ``h: b → a`` with apex i, ``t: a → b`` with
     apex j. Faces and places are kept, so that a history can be run backwards.
     """
-    t = g.ring[h]
+    t = g.sibling[h]
     if g.forward[h] == g.forward[t]:
         turn_over(g, t // 3)
-        t = g.ring[h]
+        t = g.sibling[h]
     h1, h2, t1, t2 = following(h), preceding(h), following(t), preceding(t)
     area_jab, area_iab, area_g, area_f, length = diamond(g, h)
     if not (length > 0.0 and area_iab > 0.0 and area_jab > 0.0):
@@ -199,7 +199,7 @@ def flip(g, h):
 
 
 @kernel
-def settle(g, stack, stacked):
+def flip_until_delaunay(g, stack, stacked):
     """Flip until every edge that is not fixed has the Delaunay property; False if the history is full before.
 
     `stack` holds the edges still to be looked at, `counts[4]` of them, and `stacked` says which they are.
@@ -216,7 +216,7 @@ def settle(g, stack, stacked):
         if not flip(g, h):
             continue
         g.flips[e] += 1
-        t = g.ring[h]
+        t = g.sibling[h]
         for side in (following(h), preceding(h), following(t), preceding(t)):
             look_at(g, stack, stacked, g.edge[side])
     return True
@@ -279,12 +279,12 @@ def split_edge(g, h, fraction):
     Face (tail, head, apex) becomes (tail, x, apex) and a new face (x, head, apex). No face may have the edge twice.
     The part at the edge's own tail keeps its number.
     """
-    count = ring_size(g, h)
+    count = sibling_count(g, h)
     around, beside = np.empty(count, np.int64), np.empty(count, np.int64)
     y = h
     for k in range(count):
         around[k] = y
-        y = g.ring[y]
+        y = g.sibling[y]
     e, x = g.edge[h], g.counts[2]
     g.counts[2] = x + 1
     along = fraction if g.forward[h] else 1.0 - fraction
@@ -311,23 +311,23 @@ def split_edge(g, h, fraction):
         next_near, next_far = (around[l], beside[l]) if g.forward[around[l]] else (beside[l], around[l])
         g.edge[near], g.edge[far] = e, other
         g.start[e], g.start[other] = near, far
-        g.ring[near], g.ring[far] = next_near, next_far
+        g.sibling[near], g.sibling[far] = next_near, next_far
     return x
 
 
 @kernel
-def ring_size(g, h):
+def sibling_count(g, h):
     """Number of halfedges of an edge."""
-    count, y = 1, g.ring[h]
+    count, y = 1, g.sibling[h]
     while y != h:
         count += 1
-        y = g.ring[y]
+        y = g.sibling[y]
     return count
 
 
 @kernel
 def pair(g, h, tail, t, head, e):
     """Glue two halfedges into a new edge."""
-    g.tail[h], g.edge[h], g.forward[h], g.front[h], g.ring[h] = tail, e, True, True, t
-    g.tail[t], g.edge[t], g.forward[t], g.front[t], g.ring[t] = head, e, False, False, h
+    g.tail[h], g.edge[h], g.forward[h], g.front[h], g.sibling[h] = tail, e, True, True, t
+    g.tail[t], g.edge[t], g.forward[t], g.front[t], g.sibling[t] = head, e, False, False, h
     g.start[e] = h

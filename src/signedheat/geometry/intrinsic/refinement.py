@@ -14,7 +14,7 @@ from .delaunay import doubled, lay_out
 from .gluing_kernels import Gluing
 from .refinement_kernels import FULL, GROW, N_BINS, NARROW, PAUSED, Agenda, Goal, list_all, refine
 
-PER_FACE = ("tail", "edge", "forward", "front", "ring")
+PER_FACE = ("tail", "edge", "forward", "front", "sibling")
 PER_EDGE = ("start", "length", "fixed", "flips")
 TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
 
@@ -131,7 +131,7 @@ def sectors(gluing: Gluing) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Which sector every corner belongs to, and the angle of each: from fixed edge to fixed edge around a vertex."""
     n = 3 * int(gluing.counts[0])
     h = np.flatnonzero(~gluing.fixed[gluing.edge[:n]])
-    t = gluing.ring[h]
+    t = gluing.sibling[h]
     following = 3 * (t // 3) + (t + 1) % 3
     other = np.where(gluing.forward[h] == gluing.forward[t], t, following)
     graph = csr_matrix((np.ones(len(h)), (h, other)), shape=(n, n))

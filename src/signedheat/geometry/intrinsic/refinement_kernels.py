@@ -18,12 +18,12 @@ from .gluing_kernels import (
     SPLIT_EDGE,
     SPLIT_FACE,
     apex_position,
+    flip_until_delaunay,
     following,
     kernel,
     look_at,
     preceding,
-    ring_size,
-    settle,
+    sibling_count,
     split_edge,
     split_face,
     tangent_at,
@@ -78,7 +78,7 @@ class Goal(NamedTuple):
 def refine(g, agenda, goal, patience):
     """Insert vertices until no face that can be helped has a smaller angle than the goal; pause after `patience`."""
     pause = g.counts[2] + patience
-    while settle(g, agenda.stack, agenda.stacked):
+    while flip_until_delaunay(g, agenda.stack, agenda.stacked):
         for n in range(agenda.seen[0], g.counts[3]):
             for f in changed_faces(g, n):
                 list_face(g, agenda, f, goal)
@@ -237,7 +237,7 @@ def sector(g, corner):
     for side in range(2):
         c, h = corner, (corner if side == 0 else preceding(corner))
         while not g.fixed[g.edge[h]] and total < np.pi:
-            t = g.ring[h]
+            t = g.sibling[h]
             at_tail = (h == c) == (g.forward[t] == g.forward[h])  # is the vertex the tail of t?
             c, h = (t, preceding(t)) if at_tail else (following(t), following(t))
             if c == corner:
@@ -249,7 +249,7 @@ def sector(g, corner):
 
 @kernel
 def has_room(g, agenda, ring):
-    """Whether a split of an edge with `ring` faces fits into the arrays (one of a face takes less)."""
+    """Whether a split of an edge with `sibling` faces fits into the arrays (one of a face takes less)."""
     faces, edges, vertices, steps = g.counts[0], g.counts[1], g.counts[2], g.counts[3]
     return (
         3 * (faces + ring + 2) <= len(g.tail)
@@ -286,7 +286,7 @@ def insert(g, agenda, f, px, py):
         length = g.length[g.edge[3 * f + k]]
         above = cross(x[k], y[k], x[l], y[l], px, py)
         weights[(k + 2) % 3] = max(above / area, 0.0)
-        t = g.ring[3 * f + k]
+        t = g.sibling[3 * f + k]
         if above / length < min(0.01 * length, 0.25 * nearest) and t // 3 != f and not g.fixed[g.edge[3 * f + k]]:
             on_edge = k
             fraction = ((px - x[k]) * (x[l] - x[k]) + (py - y[k]) * (y[l] - y[k])) / length**2
@@ -308,7 +308,7 @@ def folded_face(g, h):
     while True:
         if g.edge[following(y)] == g.edge[h] or g.edge[preceding(y)] == g.edge[h]:
             return y // 3
-        y = g.ring[y]
+        y = g.sibling[y]
         if y == h:
             return -1
 
@@ -322,7 +322,7 @@ def vertex_beside(g, h):
         along = along / length if g.forward[y] == g.forward[h] else 1.0 - along / length
         if above < min(height, NEARNESS * length * min(along, 1.0 - along)):
             nearby, height, fraction = g.tail[preceding(y)], above, along
-        y = g.ring[y]
+        y = g.sibling[y]
         if y == h:
             return nearby, height, fraction
 
@@ -335,7 +335,7 @@ def room_beside(g, h, fraction):
         along, above = apex_position(g, y)
         here = fraction if g.forward[y] == g.forward[h] else 1.0 - fraction
         nearest = min(nearest, np.hypot(along - here * length, above))
-        y = g.ring[y]
+        y = g.sibling[y]
         if y == h:
             return nearest
 
@@ -352,7 +352,7 @@ def split_segment(g, agenda, h, f, goal):
     segment, length, step = agenda.segment[e], g.length[e], g.counts[3]
     if length < 1e-9 * agenda.segment_length[segment]:
         return True
-    ring = ring_size(g, h)
+    ring = sibling_count(g, h)
     if not has_room(g, agenda, ring):
         return False
     folded = folded_face(g, h)

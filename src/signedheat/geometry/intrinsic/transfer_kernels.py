@@ -169,8 +169,8 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
         if leaving < 0 or left < 1e-12:
             break
         h = 3 * f + (leaving + 1) % 3
-        t = g.ring[h]
-        if t == h or g.ring[t] != h:
+        t = g.sibling[h]
+        if t == h or g.sibling[t] != h:
             break  # a boundary: only by rounding
         i, j, a = h % 3, following(h) % 3, leaving
         ti, tj = (t % 3, following(t) % 3) if g.forward[h] == g.forward[t] else (following(t) % 3, t % 3)
