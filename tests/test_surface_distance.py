@@ -123,11 +123,11 @@ def test_constraints_hold_at_every_sample():
     solver = sh.SignedHeatSolver(mesh)
     tolerance = 1e-8 * solver.discretization.spacing
     field = solver.distance(curves)
-    assert np.abs(field.source.rows @ field.values).max() < tolerance
+    assert np.abs(field.source.interpolation @ field.values).max() < tolerance
     field = solver.distance(curves, sh.LevelValues(range(len(curves))))
-    assert np.abs(field.source.rows @ field.values - field.source.owners).max() < tolerance
+    assert np.abs(field.source.interpolation @ field.values - field.source.source_ids).max() < tolerance
     field = solver.distance(curves, sh.EachComponent())
-    levels = field.source.rows @ field.values
+    levels = field.source.interpolation @ field.values
     means = np.bincount(field.source.components, levels) / np.bincount(field.source.components)
     assert np.abs(levels - means[field.source.components]).max() < tolerance
     assert np.ptp(means) > 1e-3
@@ -147,7 +147,7 @@ def test_each_component_is_the_minimum_over_all_constants():
         return 0.5 * (2 * phi @ (stiffness @ phi) - stiffness.diagonal() @ phi**2) - load @ phi
 
     best = solver.distance(curves, sh.EachComponent())
-    levels = best.source.rows @ best.values
+    levels = best.source.interpolation @ best.values
     constants = np.array([levels[best.source.components == k][0] for k in range(len(curves))])
     assert energy(best.values) < energy(solver.distance(curves).values)
     for k in range(len(curves)):
@@ -161,13 +161,13 @@ def test_dependent_rows_are_no_obstacle():
     curve = loops(mesh)[0]
     twice = [curve, curve, mesh.points_at(mesh.faces[100]), sh.SurfacePoints([100], [[0.2, 0.3, 0.5]])]
     field = sh.SignedHeatSolver(mesh).distance([curve, curve])
-    assert np.abs(field.source.rows @ field.values).max() < 1e-8 * 0.05
+    assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
     field = sh.SignedHeatSolver(mesh).distance(twice)
-    assert np.abs(field.source.rows @ field.values).max() < 1e-8 * 0.05
+    assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
     wave = mesh.vertices[:, 2] + 1e-7 * np.sin(1e3 * mesh.vertices[:, 0])
     close = mesh.level_set(mesh.vertices[:, 2], 0.2) + mesh.level_set(wave, 0.2)
     field = sh.SignedHeatSolver(mesh).distance(close)
-    assert np.abs(field.source.rows @ field.values).max() < 1e-8 * 0.05
+    assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
 
 
 def level_sets(mesh, rng):
@@ -220,8 +220,8 @@ def test_the_zero_set_holds_to_rounding_however_curves_cross_the_mesh(make, seed
     solver = sh.SignedHeatSolver(mesh)
     usual, hard = (solver.distance(curve, constraint) for constraint in (sh.ZeroSet(), sh.ZeroSet(hard=True)))
     tolerance = 1e-8 * solver.discretization.spacing
-    assert np.abs((usual.source.rows @ usual.values)[usual.source.pinned]).max() < tolerance
-    assert np.abs(hard.source.rows @ hard.values).max() < tolerance
+    assert np.abs((usual.source.interpolation @ usual.values)[usual.source.pinned]).max() < tolerance
+    assert np.abs(hard.source.interpolation @ hard.values).max() < tolerance
     assert np.ptp(usual.values) > 0.1
 
 

@@ -147,10 +147,10 @@ def test_samples_weights_components_and_owners():
     line, branch, apart = mesh.path([9, 10, 11, 12]), mesh.path([19, 11]), mesh.path([33, 34])
     source = surface_source(laid_out(mesh), [line, [branch, apart], mesh.points_at([50, 50, 9])], 2.0, 0.1)
     assert source.components.tolist() == [0, 0, 0, 0, 0, 0, 1, 1, 2, 0]
-    assert source.owners.tolist() == [0, 0, 0, 0, 1, 1, 1, 1, 2, 2]
+    assert source.source_ids.tolist() == [0, 0, 0, 0, 1, 1, 1, 1, 2, 2]
     h = 2 / 7
     assert source.weights == pytest.approx([h / 2, h, h, h / 2, h / 2, h / 2, h / 2, h / 2, 0.1, 0.1])
-    assert source.rows.indices.tolist() == [9, 10, 11, 12, 19, 11, 33, 34, 50, 9]
+    assert source.interpolation.indices.tolist() == [9, 10, 11, 12, 19, 11, 33, 34, 50, 9]
     assert source.time == pytest.approx(0.02) and source.oriented
 
 
@@ -159,7 +159,7 @@ def test_rows_interpolate():
     curve = mesh.polyline([[-0.7, -0.55, 0], [0.65, 0.8, 0]])
     linear = mesh.vertices @ [2.0, -3.0, 0.0] + 1
     source = surface_source(laid_out(mesh), [curve], 1.0, 1.0)
-    assert source.rows @ linear == pytest.approx(positions(mesh, curve) @ [2.0, -3.0, 0.0] + 1)
+    assert source.interpolation @ linear == pytest.approx(positions(mesh, curve) @ [2.0, -3.0, 0.0] + 1)
     assert not source.pinned[0] and source.pinned[1:-1].all()
 
 

@@ -76,7 +76,7 @@ def test_curved_sources_leave_no_offset(constraint):
     exact = np.linalg.norm(mesh.vertices, axis=1) - 1
     assert abs((phi.values - exact).mean()) < 0.002
     source = sh.SignedHeatSolver(mesh).discretization.lower([ball], 1.0)
-    above = source.weights @ (source.rows @ exact) / source.weights.sum()
+    above = source.weights @ (source.interpolation @ exact) / source.weights.sum()
     assert above > 0.008
     middles = ball.vertices[ball.faces].mean(axis=1)
     assert abs(phi(middles).mean()) < 0.001
@@ -115,7 +115,7 @@ def test_a_source_that_follows_faces_is_pinned_to_their_vertices():
     phi = distance(mesh, wall)
     assert np.abs(phi.values - (mesh.vertices[:, 2] - 0.75)).max() < 1e-9
     source = sh.SignedHeatSolver(mesh).discretization.lower([wall], 1.0)
-    assert source.rows.nnz == source.rows.shape[0] == 81
+    assert source.interpolation.nnz == source.interpolation.shape[0] == 81
 
 
 def test_level_values_and_groups(cube):
@@ -306,7 +306,7 @@ def test_components_are_numbered_as_sources_name_them(cube):
     )
     source = sh.SignedHeatSolver(cube).discretization.lower([tilted(1.0)[0], two], 1.0)
     assert sorted(set(source.components.tolist())) == [0, 1, 2]
-    assert (source.owners == (source.components > 0)).all()
-    assert np.asarray(source.rows.sum(axis=1)).ravel() == pytest.approx(np.ones(len(source.weights)))
+    assert (source.source_ids == (source.components > 0)).all()
+    assert np.asarray(source.interpolation.sum(axis=1)).ravel() == pytest.approx(np.ones(len(source.weights)))
     areas = np.bincount(source.components, source.weights)
     assert areas[0] > areas[1]  # the section through the middle is the largest

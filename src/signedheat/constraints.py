@@ -103,9 +103,9 @@ class LevelValues:
         object.__setattr__(self, "values", values)
 
     def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
-        n_sources, n_components = int(source.owners.max()) + 1, int(source.components.max()) + 1
+        n_sources, n_components = int(source.source_ids.max()) + 1, int(source.components.max()) + 1
         if len(self.values) == n_sources:
-            index = source.owners
+            index = source.source_ids
         elif len(self.values) == n_components:
             index = source.components
         else:

@@ -27,7 +27,7 @@ class SourceTerm(Protocol):
         """t of Eq. 12: ``diffusion · max(h_domain, h_source)²``."""
 
     @property
-    def rows(self) -> Any:
+    def interpolation(self) -> Any:
         """A: sparse (s, n), row i interpolates φ at source sample i."""
 
     @property
@@ -39,7 +39,7 @@ class SourceTerm(Protocol):
         """(s,) connected component of the source that each sample lies on, from 0."""
 
     @property
-    def owners(self) -> NDArray[np.int64]:
+    def source_ids(self) -> NDArray[np.int64]:
         """(s,) which of the sources that were passed in each sample comes from, from 0."""
 
 

@@ -141,7 +141,7 @@ class IntrinsicMesh:
         return not self.reflected.any()
 
     @cached_property
-    def face_parts(self) -> NDArray[np.int64]:
+    def face_components(self) -> NDArray[np.int64]:
         """(m,) part of the surface that each face lies in, named by its first face; parts may share vertices."""
         return join_faces(self.edges.face_edges, self.n_edges)
 

@@ -86,7 +86,7 @@ class AreaSamples:
     vectors: NDArray[np.float64]
     weights: NDArray[np.float64]
     components: NDArray[np.int64]
-    owners: NDArray[np.int64]
+    source_ids: NDArray[np.int64]
     spacing: float
     outside: float
     cancelled: float

@@ -41,7 +41,7 @@ class DirectIntegration:
     _last: list[Any] = field(default_factory=list, repr=False)
 
     @cached_property
-    def parts(self) -> NDArray[np.int64]:
+    def components(self) -> NDArray[np.int64]:
         """(n,) connected part of the domain that each unknown lies in."""
         return sparse.csgraph.connected_components(self.stiffness, directed=False)[1].astype(np.int64)
 
@@ -77,7 +77,7 @@ class DirectIntegration:
         The constants are those at which no group pulls: the multipliers of each add up to zero. One constant per
         connected part of the domain stays free, and is chosen by the mean.
         """
-        rows, values = source.rows[chosen], levels.values[chosen]
+        rows, values = source.interpolation[chosen], levels.values[chosen]
         if levels.groups is None:
             fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
             _refuse_contradictions(rows, values, fitted[:, 0])
@@ -85,7 +85,7 @@ class DirectIntegration:
         group = levels.groups[chosen]
         bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a sample alone is bound to nothing
         rows, values, group = rows[bound], values[bound], np.unique(group[bound], return_inverse=True)[1]
-        fixed = group[np.unique(self._part_of(rows), return_index=True)[1]]
+        fixed = group[np.unique(self._component_of(rows), return_index=True)[1]]
         free = np.setdiff1d(group, fixed)
         held = np.flatnonzero(np.isin(group, free))
         entries = np.ones(len(held)), (held, np.searchsorted(free, group[held]))
@@ -103,12 +103,12 @@ class DirectIntegration:
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
         """``(C + λ Aᵀ W A) φ = b``."""
-        rows = source.rows
+        rows = source.interpolation
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
 
     def anchored(self, source: SourceTerm) -> Factor:
         """Factor of C with φ held at zero along the source."""
-        return self._pulled_factor(source.rows, self.springs(source))
+        return self._pulled_factor(source.interpolation, self.springs(source))
 
     def springs(self, source: SourceTerm) -> NDArray[np.float64]:
         """(s,) stiffness that holds φ at each sample as firmly as it should be."""
@@ -151,7 +151,7 @@ class DirectIntegration:
         if self._last and all(np.array_equal(old, new) for old, new in zip(self._last[0], key, strict=True)):
             return self._last[1]
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
-        unreached = np.isin(self.parts[self._first_vertices], self._part_of(rows), invert=True)
+        unreached = np.isin(self.components[self._first_vertices], self._component_of(rows), invert=True)
         factor = self.factorize(_grounded(matrix, self._first_vertices[unreached]))
         self._last[:] = key, factor
         return factor
@@ -159,29 +159,29 @@ class DirectIntegration:
     @cached_property
     def _first_vertices(self) -> NDArray[np.int64]:
         """One vertex of each part."""
-        return np.unique(self.parts, return_index=True)[1]
+        return np.unique(self.components, return_index=True)[1]
 
-    def _part_of(self, rows: sparse.csr_matrix) -> NDArray[np.int64]:
+    def _component_of(self, rows: sparse.csr_matrix) -> NDArray[np.int64]:
         """(s,) part of the domain that each sample lies in."""
-        return self.parts[rows.indices[rows.indptr[:-1]]]
+        return self.components[rows.indices[rows.indptr[:-1]]]
 
     def _reached(self, values: NDArray[np.float64], rows: sparse.csr_matrix) -> NDArray[np.float64]:
         """NaN on parts without samples."""
-        return np.where(np.isin(self.parts, self._part_of(rows)), values, np.nan)
+        return np.where(np.isin(self.components, self._component_of(rows)), values, np.nan)
 
     def _centered(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
         """The weighted mean over the samples of each part made zero; NaN where a part has none."""
-        rows = source.rows
-        part, n_parts = self._part_of(rows), len(self._first_vertices)
+        rows = source.interpolation
+        part, n_parts = self._component_of(rows), len(self._first_vertices)
         weight = np.bincount(part, source.weights, n_parts)
         mean = np.full(n_parts, np.nan)
         at_samples = source.weights * self._at_samples(values, source)
         np.divide(np.bincount(part, at_samples, n_parts), weight, out=mean, where=weight > 0)
-        return values - mean[self.parts]
+        return values - mean[self.components]
 
     def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
         """(s,) φ on the source."""
-        return source.rows @ values
+        return source.interpolation @ values
 
 
 def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.csr_matrix:

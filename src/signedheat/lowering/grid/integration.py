@@ -75,7 +75,7 @@ class GridIntegration:
     ) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the deviations from the levels."""
         volume = float(np.prod(self.grid.spacing))
-        rows, weights = source.rows, source.weights / volume
+        rows, weights = source.interpolation, source.weights / volume
         free = Levels(np.zeros_like(levels.values), levels.groups)
 
         def spread(at_samples: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -131,9 +131,9 @@ def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray
     """(nodes,) smallest change that takes these values at the samples, in the sense of least squares."""
     from scipy.sparse.linalg import lsqr
 
-    touched = np.unique(source.rows.indices)
+    touched = np.unique(source.interpolation.indices)
     change = np.zeros(source.grid.n_nodes)
-    change[touched] = lsqr(source.rows[:, touched], values, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
+    change[touched] = lsqr(source.interpolation[:, touched], values, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
     return change
 
 

@@ -146,10 +146,10 @@ class MaskedIntegration(DirectIntegration):
     def fit(self, divergence: NDArray[np.float64], source: MaskedSource, levels: Levels) -> NDArray[np.float64]:
         """Subtract from φ the mean of its error at the samples, weighted by area and by the heat that each sends."""
         phi = self.solve(divergence, source)
-        excess = deviation(source.rows @ phi, source, levels)
+        excess = deviation(source.interpolation @ phi, source, levels)
         if not excess.any():
             return phi
-        loads = source.rows.T @ (source.weights[:, None] * np.stack([np.ones_like(excess), excess], axis=1))
+        loads = source.interpolation.T @ (source.weights[:, None] * np.stack([np.ones_like(excess), excess], axis=1))
         mean = np.zeros_like(phi)
         for values, _ in self.diffusing.solve_heat(source.time, loads):
             known = values[:, 0] > 0

@@ -22,7 +22,7 @@ class MaskedSource:
     ----------
     whole : GridSource
         The same on the grid without solid nodes.
-    rows : (s, n) sparse
+    interpolation : (s, n) sparse
         Interpolates at the samples, from those nodes around them that are open.
     kept : (s,) int
         Samples of `whole` that have one.
@@ -31,7 +31,7 @@ class MaskedSource:
     """
 
     whole: GridSource
-    rows: sparse.csr_matrix
+    interpolation: sparse.csr_matrix
     kept: NDArray[np.int64]
     beside_solid: NDArray[np.bool_]
 
@@ -51,7 +51,7 @@ class MaskedSource:
         weights = np.where(numbers >= 0, weights, 0.0)
         total = weights.sum(axis=1)
         kept = np.flatnonzero(total > 0)
-        lost = np.setdiff1d(whole.owners, whole.owners[kept])
+        lost = np.setdiff1d(whole.source_ids, whole.source_ids[kept])
         if len(lost):
             raise SourceError(
                 f"source {lost[0]} lies within solid nodes of the grid, where nothing reaches it: move it out of them"
@@ -76,8 +76,8 @@ class MaskedSource:
         return self.whole.components[self.kept]
 
     @property
-    def owners(self) -> NDArray[np.int64]:
-        return self.whole.owners[self.kept]
+    def source_ids(self) -> NDArray[np.int64]:
+        return self.whole.source_ids[self.kept]
 
     @property
     def normals(self) -> NDArray[np.float64]:
@@ -87,7 +87,7 @@ class MaskedSource:
     @cached_property
     def vectors(self) -> NDArray[np.float64]:
         """(n, d + 1) X₀, and the area without direction."""
-        return self.rows.T @ np.concatenate([self.normals, self.weights[:, None]], axis=1)
+        return self.interpolation.T @ np.concatenate([self.normals, self.weights[:, None]], axis=1)
 
     @property
     def positions(self) -> NDArray[np.float64]:

@@ -56,8 +56,8 @@ class GridSource:
         return self.samples.components
 
     @property
-    def owners(self) -> NDArray[np.int64]:
-        return self.samples.owners
+    def source_ids(self) -> NDArray[np.int64]:
+        return self.samples.source_ids
 
     @cached_property
     def stencil(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -65,7 +65,7 @@ class GridSource:
         return interpolation_stencil(self.samples.positions, self.grid.shape)
 
     @cached_property
-    def rows(self) -> csr_matrix:
+    def interpolation(self) -> csr_matrix:
         from scipy.sparse import csr_matrix
 
         nodes, weights = self.stencil

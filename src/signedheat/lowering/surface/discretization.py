@@ -148,7 +148,7 @@ class SurfaceDiscretization:
 
     def reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
         """(n_vertices,) whether a vertex has a face on a part that holds vectors. Vectors only pass along edges."""
-        parts = self.triangles.face_parts
+        parts = self.triangles.face_components
         if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
         held, lit = np.zeros(self.triangles.n_edges, dtype=bool), np.zeros(self.triangles.n_faces, dtype=bool)

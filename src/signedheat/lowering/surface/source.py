@@ -37,13 +37,13 @@ class SurfaceSource:
         X₀, in the frames of the edges; few are not zero.
     time : float
         t of Eq. 12.
-    rows : (s, n_vertices) sparse
+    interpolation : (s, n_vertices) sparse
         Row i interpolates φ at sample i; samples are the distinct points of every source.
     weights : (s,) float
         Length of curve that belongs to each sample; `spacing` for isolated points.
     components : (s,) int
         Connected component of the sources taken together, numbered in the order in which the sources name them.
-    owners : (s,) int
+    source_ids : (s,) int
         Which source each sample belongs to.
     oriented : bool
         Whether any source has two sides; where none has, φ is an unsigned distance.
@@ -58,10 +58,10 @@ class SurfaceSource:
 
     vectors: csr_array
     time: float
-    rows: csr_matrix
+    interpolation: csr_matrix
     weights: NDArray[np.float64]
     components: NDArray[np.int64]
-    owners: NDArray[np.int64]
+    source_ids: NDArray[np.int64]
     oriented: bool
     pinned: NDArray[np.bool_]
     triangles: IntrinsicMesh
@@ -130,10 +130,10 @@ def surface_source(
     return SurfaceSource(
         vectors=vectors,
         time=diffusion * spacing**2,
-        rows=vstack([interpolation_at(triangles, p.nodes) for p in parts], format="csr"),
+        interpolation=vstack([interpolation_at(triangles, p.nodes) for p in parts], format="csr"),
         weights=np.concatenate([line_elements(p, spacing) for p in parts]),
         components=components,
-        owners=np.repeat(np.arange(len(groups)), sizes),
+        source_ids=np.repeat(np.arange(len(groups)), sizes),
         oriented=any(p.oriented for p in parts),
         pinned=outside | ~np.isin(components, components[outside]),
         triangles=triangles,

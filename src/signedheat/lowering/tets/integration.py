@@ -40,7 +40,7 @@ class TetIntegration(DirectIntegration):
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
         """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups."""
-        rows = source.rows
+        rows = source.interpolation
         springs, factor = self.springs(source), self.anchored(source)
         pull = sparse.csr_matrix(rows.T @ sparse.diags_array(springs))
         fitted = factor.solve(divergence + pull @ levels.values)
@@ -48,7 +48,7 @@ class TetIntegration(DirectIntegration):
         fitted = factor.solve(divergence + pull @ values)
         if levels.groups is None:
             return self._reached(fitted, rows)
-        parts = self._part_of(rows)
+        parts = self._component_of(rows)
         first = levels.groups[np.unique(parts, return_index=True)[1]]  # one group of each part keeps its level
         others = np.setdiff1d(levels.groups, first)
         if len(others):
@@ -67,7 +67,7 @@ class TetIntegration(DirectIntegration):
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
         """``(C + λ Aᵀ W A) φ = b``, with φ on the source for A φ."""
         free = super().penalize(divergence, source, strength)
-        pull = source.rows.T @ (strength * source.weights * self._bend(free, source))
+        pull = source.interpolation.T @ (strength * source.weights * self._bend(free, source))
         return super().penalize(divergence - pull, source, strength)
 
     def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
@@ -79,5 +79,5 @@ class TetIntegration(DirectIntegration):
 
     def springs(self, source: SourceTerm) -> NDArray[np.float64]:
         """(s,) stiff at vertices, soft inside tets."""
-        at_vertex = np.diff(source.rows.indptr) == 1
+        at_vertex = np.diff(source.interpolation.indptr) == 1
         return np.where(at_vertex, PIN * self.stiffness.diagonal().max(), self.strength * source.weights)

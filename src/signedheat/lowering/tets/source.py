@@ -34,7 +34,7 @@ class TetSource:
         Points on the source, one for each piece of it.
     time : float
         t of Eq. 12.
-    rows : (s, n) sparse
+    interpolation : (s, n) sparse
         Row i averages φ over patch i of the source: what lies nearest to one vertex of the tets that it crosses.
         Where the source follows faces of the mesh, the patch is the vertex itself.
     bends : (s, 3n) sparse
@@ -52,11 +52,11 @@ class TetSource:
     strengths: NDArray[np.float64]
     centers: NDArray[np.float64]
     time: float
-    rows: sparse.csr_matrix
+    interpolation: sparse.csr_matrix
     bends: sparse.csr_matrix
     weights: NDArray[np.float64]
     components: NDArray[np.int64]
-    owners: NDArray[np.int64]
+    source_ids: NDArray[np.int64]
     notes: Mapping[str, Any]
 
 
@@ -119,11 +119,11 @@ def tet_source(
         strengths=loads[:, 3],
         centers=np.concatenate([_centers(mesh, polygons) for polygons in cuts]),
         time=time,
-        rows=sparse.vstack(rows, format="csr"),
+        interpolation=sparse.vstack(rows, format="csr"),
         bends=sparse.vstack(bends, format="csr"),
         weights=np.concatenate(weights),
         components=np.unique(np.concatenate(members), return_inverse=True)[1],
-        owners=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
+        source_ids=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
         notes=notes,
     )
 
