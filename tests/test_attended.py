@@ -7,7 +7,7 @@ import pytest
 from grid_cases import box, sphere
 
 import signedheat as sh
-from signedheat.parallel import attended
+from signedheat.parallel import run_cancellable
 
 
 class Stop(Exception):
@@ -21,19 +21,19 @@ def stop():
 def test_what_the_report_raises_ends_the_wait():
     begin = time.perf_counter()
     with pytest.raises(Stop):
-        attended(lambda: time.sleep(20), stop)
+        run_cancellable(lambda: time.sleep(20), stop)
     assert time.perf_counter() - begin < 10
 
 
 def test_what_the_job_raises_comes_through():
     for error in (ValueError, TimeoutError):
         with pytest.raises(error):
-            attended(lambda error=error: (_ for _ in ()).throw(error("in the job")), lambda: None)
+            run_cancellable(lambda error=error: (_ for _ in ()).throw(error("in the job")), lambda: None)
 
 
 def test_a_job_is_reported_on_until_it_ends():
     calls = []
-    assert attended(lambda: time.sleep(0.6) or "done", lambda: calls.append(None)) == "done"
+    assert run_cancellable(lambda: time.sleep(0.6) or "done", lambda: calls.append(None)) == "done"
     assert calls
 
 

@@ -19,14 +19,14 @@ def n_threads() -> int:
     return min(available, int(wanted)) if wanted.isdigit() and int(wanted) > 0 else available
 
 
-def attended(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
+def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
     """What a job returns. It runs on a thread of its own, and `report` is called until it has ended.
 
     What `report` raises is raised at once, and what the job does from then on is lost.
 
     Examples
     --------
-    >>> attended(lambda: 6 * 7, lambda: None)
+    >>> run_cancellable(lambda: 6 * 7, lambda: None)
     42
     """
     if report is None:

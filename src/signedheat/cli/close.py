@@ -9,7 +9,7 @@ from ..extensions.close_curves import refuse_without_sides
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
 from ..visualization.slices import PICTURE_FORMATS
 from ..visualization.surfaces import save_surface
-from .computing import naming
+from .computing import prefix_errors
 from .options import Summary, add_command
 from .surface import add_curves_and_output, advice, measured
 
@@ -34,7 +34,7 @@ def run(arguments: Namespace) -> Summary:
     if arguments.preview:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
     surface, curves, field = measured(arguments)
-    with naming(arguments.curves):
+    with prefix_errors(arguments.curves):
         refuse_without_sides(curves)
         found = field.contour(0.0)
     write_curves(arguments.output, found, surface)

@@ -25,7 +25,7 @@ MOST = 0.9
 
 
 @contextmanager
-def naming(path: Any) -> Iterator[None]:
+def prefix_errors(path: Any) -> Iterator[None]:
     """Put the name of the input in front of errors that concern it."""
     try:
         yield
@@ -73,7 +73,7 @@ def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
     if spacing is not None and len(spacing) == 1:
         spacing = spacing[0]
     if arguments.mask is not None:
-        with naming(arguments.mask):
+        with prefix_errors(arguments.mask):
             return read_mask(arguments.mask, origin=arguments.origin, spacing=spacing)
     if arguments.origin is not None:
         return Grid(arguments.origin, spacing, arguments.grid_shape)

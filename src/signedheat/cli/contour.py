@@ -17,7 +17,7 @@ from ..io import (
     write_curves,
     write_polylines,
 )
-from .computing import naming
+from .computing import prefix_errors
 from .offset import counts, ensure_offset_writable
 from .options import Summary, add_command, finite
 
@@ -53,7 +53,7 @@ def run(arguments: Namespace) -> Summary:
         return lines(field, arguments)
     planar = isinstance(field, GridField) and field.grid.dimension == 2
     ensure_offset_writable(arguments.output, planar)
-    with naming(arguments.field):
+    with prefix_errors(arguments.field):
         found = field.contour(arguments.level)
     if planar:
         write_polylines(arguments.output, found)
@@ -68,7 +68,7 @@ def run(arguments: Namespace) -> Summary:
 def lines(field: VertexField, arguments: Namespace) -> Summary:
     """Curves on a surface."""
     ensure_writable(arguments.output, CURVE_FORMATS, "curves")
-    with naming(arguments.field):
+    with prefix_errors(arguments.field):
         curves = field.contour(arguments.level)
     write_curves(arguments.output, curves, field.domain)
     summary = {"input": arguments.field, "level": arguments.level, "output": arguments.output, "curves": len(curves)}

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..extensions.morphology import RESOLUTION, closing, dilate, erode, opening, shell, thicken
 from ..io import SHAPE_FORMATS, ensure_writable, read, save
-from .computing import naming
+from .computing import prefix_errors
 from .options import Parser, Summary, add_command, finite, whole_number
 
 OPERATIONS = {
@@ -51,7 +51,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         parser.error(f"argument DISTANCE: {arguments.operation} takes {wanted}, not {len(arguments.distances)}")
     ensure_writable(arguments.output, SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
     shape = read(arguments.shape)
-    with naming(arguments.shape):
+    with prefix_errors(arguments.shape):
         surface = operation(shape, *arguments.distances, resolution=arguments.resolution)
     save(surface, arguments.output)
     summary = {

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
 from ..visualization.slices import PICTURE_FORMATS, save_slices
-from .computing import check_grid_options, compute, describe, grid_for, hint, is_planar, naming, read_source
+from .computing import check_grid_options, compute, describe, grid_for, hint, is_planar, prefix_errors, read_source
 from .options import Parser, Summary, add_command, add_grid_options, finite
 
 
@@ -52,7 +52,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
     shape = read_source(arguments.shape)
     reach = max(abs(distance) for distance in arguments.distances)
-    with naming(arguments.shape):
+    with prefix_errors(arguments.shape):
         field = compute(shape, grid_for(shape, arguments, reach), arguments)
         found = [field.offset(distance) for distance in arguments.distances]
     for what, output in zip(found, outputs, strict=True):

@@ -15,7 +15,7 @@ from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..solver import SignedHeatSolver
 from ..visualization.slices import PICTURE_FORMATS
 from ..visualization.surfaces import save_surface
-from .computing import naming
+from .computing import prefix_errors
 from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
 from .progress import ProgressBar
 
@@ -71,7 +71,7 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     if arguments.intrinsic and not isinstance(surface, TriangleMesh):
         raise SourceError(f"{arguments.mesh}: --intrinsic is for triangle meshes; this is a {type(surface).__name__}")
     curves = read_curves(arguments.curves, surface)
-    with naming(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
+    with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
         solver = SignedHeatSolver(surface, arguments.diffusion, progress, arguments.intrinsic)
         field = solver.distance(curves, arguments.constraint)
     return surface, curves, field

@@ -16,7 +16,7 @@ from ..io import ensure_writable, read
 from ..io.tets import TET_FIELD_FORMATS
 from ..solver import SignedHeatSolver
 from ..visualization.slices import PICTURE_FORMATS, save_slices
-from .computing import describe, naming
+from .computing import describe, prefix_errors
 from .options import Parser, Summary
 from .progress import ProgressBar
 
@@ -38,7 +38,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     mesh = read(given) if given else None
     if mesh is not None and not isinstance(mesh, TetMesh):
         raise GeometryError(f"{given} holds no tets, but a {type(mesh).__name__}: use a .mesh, .msh, .vtu or .ele file")
-    with naming(arguments.shape):
+    with prefix_errors(arguments.shape):
         if mesh is None:
             mesh = tetrahedralize(shape, resolution=arguments.resolution or RESOLUTION, padding=arguments.padding)
         with ProgressBar(arguments.quiet or arguments.json) as progress:

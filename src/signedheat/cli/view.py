@@ -16,7 +16,7 @@ from ..io.files import extension
 from ..io.tets import TET_FIELD_FORMATS
 from ..visualization.slices import PICTURE_FORMATS, save_scene, save_slices
 from ..visualization.surfaces import save_surface
-from .computing import naming
+from .computing import prefix_errors
 from .options import Summary, add_command
 from .tets import on_grid
 
@@ -38,7 +38,7 @@ def run(arguments: Namespace) -> Summary:
     """Draw."""
     ensure_writable(arguments.output, PICTURE_FORMATS, "a picture")
     thing = shape_or_field(arguments.file)
-    with naming(arguments.file):
+    with prefix_errors(arguments.file):
         if isinstance(thing, VertexField):
             save_surface(thing, arguments.output)
         elif isinstance(thing, GridField):

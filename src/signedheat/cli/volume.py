@@ -8,7 +8,7 @@ from typing import Any
 from ..io import ensure_field_writable, ensure_writable, save_field
 from ..visualization.slices import PICTURE_FORMATS, save_slices
 from . import tets
-from .computing import check_grid_options, compute, describe, grid_for, hint, naming, read_source
+from .computing import check_grid_options, compute, describe, grid_for, hint, prefix_errors, read_source
 from .options import Parser, Summary, add_command, add_grid_options
 
 
@@ -48,7 +48,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     if arguments.preview:
         ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
     shape = read_source(arguments.shape)
-    with naming(arguments.shape):
+    with prefix_errors(arguments.shape):
         field = compute(shape, grid_for(shape, arguments), arguments)
     save_field(field, arguments.output)
     if arguments.preview:

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
 from ..operators.grid.closest_points import distance_to_zero_set
-from ..parallel import attended
+from ..parallel import run_cancellable
 from ..progress import Progress
 from .sharpening import sharpen
 
@@ -26,7 +26,7 @@ def sharpen_grid(field: GridField, progress: Progress | None = None) -> GridFiel
     if progress is not None:
         progress(0.0, "sharpen")
     begin = time.perf_counter()
-    values = attended(
+    values = run_cancellable(
         lambda: distance_to_zero_set(field.values, field.grid.spacing),
         None if progress is None else lambda: progress(0.0, "sharpen"),
     )

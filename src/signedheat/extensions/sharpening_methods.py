@@ -16,7 +16,7 @@ from ..discretization import Discretization
 from ..domains.validation import finite_number, positive_number
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..operators.linear_elements import LinearElements
-from ..parallel import attended
+from ..parallel import run_cancellable
 from ..progress import Progress
 
 
@@ -59,7 +59,7 @@ class Geodesic:
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
         """|φ| measured anew; parts without a zero set keep what they have."""
-        distance, notes = attended(
+        distance, notes = run_cancellable(
             lambda: straight_distance(discretization, values, source, self.tolerance),
             None if progress is None else lambda: progress(0.0, "sharpen"),
         )
