@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..errors import SourceError
 from ..geometry.meshes import Triangles
-from ..geometry.polylines import chains
+from ..geometry.polylines import assemble_polylines
 from .curves import Curve
 
 
@@ -36,7 +36,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     oriented = is_consistent(mesh)
     normals = None if oriented else gradients(mesh, values, crossed)
     curves = []
-    for order, backwards, closed in chains(*on_edges.T, directed=oriented):
+    for order, backwards, closed in assemble_polylines(*on_edges.T, directed=oriented):
         first = np.where(backwards, sides[order, 1], sides[order, 0])
         last = np.where(backwards, sides[order, 0], sides[order, 1])[-1:]
         face = crossed[order]
@@ -92,7 +92,7 @@ def along_sides(mesh: Triangles, chosen: NDArray[np.bool_]) -> list[Curve]:
     tails, heads = mesh.faces[faces, sides], mesh.faces[faces, following]
     oriented = is_consistent(mesh)
     curves = []
-    for order, backwards, closed in chains(tails, heads, directed=oriented):
+    for order, backwards, closed in assemble_polylines(tails, heads, directed=oriented):
         face = faces[order]
         corner = np.where(backwards, following[order], sides[order])
         if not closed:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def chains(
+def assemble_polylines(
     tails: NDArray[np.int64], heads: NDArray[np.int64], directed: bool = True
 ) -> list[tuple[NDArray[np.int64], NDArray[np.bool_], bool]]:
     """Join segments into chains as long as there is one way on.
@@ -25,7 +25,7 @@ def chains(
 
     Examples
     --------
-    >>> [(segments.tolist(), closed) for segments, _, closed in chains(np.array([1, 0, 5]), np.array([2, 1, 5]))]
+    >>> [(segments.tolist(), closed) for segments, _, closed in assemble_polylines(np.array([1, 0, 5]), np.array([2, 1, 5]))]
     [([1, 0], False), ([2], True)]
     """
     nodes, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)

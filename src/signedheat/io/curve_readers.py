@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..domains.curves import Curve
 from ..domains.projection import closest_points
 from ..errors import FileFormatError, SourceError
-from ..geometry.polylines import chains
+from ..geometry.polylines import assemble_polylines
 from .files import PathLike, text
 from .point_lists import read_point_lists
 
@@ -94,7 +94,7 @@ def read_segments(path: PathLike, lines: list[list[str]], domain: Any) -> list[G
                 nodes.append(parsed(words, edges, domain))
         except (ValueError, IndexError) as error:
             raise damaged(path, number, words, str(error)) from error
-    return strands(path, SIGNED, nodes, segments)
+    return polylines_of_segments(path, SIGNED, nodes, segments)
 
 
 def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: Any) -> Node:
@@ -116,7 +116,9 @@ def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: Any) -> No
     return Node(tuple(v for v, _ in pairs), tuple(w for _, w in pairs))
 
 
-def strands(path: PathLike, kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]) -> list[Group]:
+def polylines_of_segments(
+    path: PathLike, kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]
+) -> list[Group]:
     """Segments between nodes, joined to curves; nodes at the same place count as one."""
     bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
     if bad:
@@ -134,7 +136,7 @@ def strands(path: PathLike, kind: str, nodes: list[Node], segments: Sequence[tup
     ends = place[np.array([s for s in segments if place[s[0]] != place[s[1]]], dtype=np.int64).reshape(-1, 2)]
     distinct = list(rank)
     groups = []
-    for order, backwards, _ in chains(ends[:, 0], ends[:, 1], directed=kind == SIGNED):
+    for order, backwards, _ in assemble_polylines(ends[:, 0], ends[:, 1], directed=kind == SIGNED):
         first = np.where(backwards, ends[order, 1], ends[order, 0])
         last = ends[order[-1], 0 if backwards[-1] else 1]
         groups.append(Group(kind, [distinct[i] for i in [*first.tolist(), int(last)]]))
@@ -162,7 +164,7 @@ def read_json(path: PathLike, domain: Any) -> list[Any]:
                 groups.append(Group(POINTS, nodes))
             elif group["kind"] in (SIGNED, UNSIGNED):
                 segments = [(int(i), int(j)) for i, j in group["segments"]]
-                groups += strands(path, group["kind"], nodes, segments)
+                groups += polylines_of_segments(path, group["kind"], nodes, segments)
             else:
                 raise ValueError(f"the kind '{group['kind']}' is none of {SIGNED}, {UNSIGNED}, {POINTS}")
         return groups
