@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from awful_cases import stretched_square
+from degenerate_meshes import stretched_square
 from surface_cases import sphere
 
 import signedheat as sh

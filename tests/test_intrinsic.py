@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from awful_cases import stretched_square, with_caps, with_needles
+from degenerate_meshes import stretched_square, with_caps, with_needles
 from scipy.spatial import Delaunay
 from surface_cases import band, book, flipped, sphere, square
 

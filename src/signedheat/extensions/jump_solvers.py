@@ -167,7 +167,7 @@ def minimize_fast(
 
 
 def _lags(spring, difference, low, high, z, before, scaled) -> bool:
-    """Whether the multipliers are slow to flip_until_delaunay: the dual residual is more than twice the primal one, as parts."""
+    """Whether the multipliers are slow to settle: the dual residual is more than twice the primal one, as parts."""
     primal = np.sqrt(spring @ (difference - z) ** 2)
     jumps = np.sqrt(spring @ (difference - np.clip(difference, low, high)) ** 2)
     dual = np.sqrt(spring @ (z - before) ** 2)

@@ -25,7 +25,8 @@ def assemble_polylines(
 
     Examples
     --------
-    >>> [(segments.tolist(), closed) for segments, _, closed in assemble_polylines(np.array([1, 0, 5]), np.array([2, 1, 5]))]
+    >>> lines = assemble_polylines(np.array([1, 0, 5]), np.array([2, 1, 5]))
+    >>> [(segments.tolist(), closed) for segments, _, closed in lines]
     [([1, 0], False), ([2], True)]
     """
     nodes, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)

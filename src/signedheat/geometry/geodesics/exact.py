@@ -1,8 +1,8 @@
 """Distance on a polyhedral surface from line segments and points in its faces, exact or very nearly so.
 
-Windows of initial_windows travel from face to face in order of distance (Mitchell, Mount & Papadimitriou 1987; Chen & Han 1990),
-and those that a path through a vertex outruns are dropped (Xin & Wang 2009). A window is an interval of an edge, lit
-straight from one source: a point, or, since the sources here are segments too, a parallel beam at right angles to one.
+Windows travel from face to face in order of distance (Mitchell, Mount & Papadimitriou 1987; Chen & Han 1990), and those
+that a path through a vertex outruns are dropped (Xin & Wang 2009). A window is an interval of an edge, reached straight
+from one source: a point, or, since the sources here are segments too, a parallel beam at right angles to one.
 Each vertex splits a window, so that their number per edge would grow with distance; neighbouring windows on an edge
 that one circular or straight wave can stand for are therefore made one (as Surazhsky et al. 2005 do), and the work
 stays in proportion to the number of faces.
@@ -104,7 +104,7 @@ def is_pseudosource(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
 
 @compiled(nogil=True)
 def _reach(v, length, heap, distance, pseudosources):
-    """Note a path to a vertex; one that initial_windows pseudosources round is queued."""
+    """Note a path to a vertex; a pseudosource, round which paths bend, is queued."""
     if length < distance[v] * (1.0 - 1e-14):
         distance[v] = length
         if pseudosources[v]:
@@ -164,7 +164,7 @@ def _propagate(faces, pseudosources, sources, tolerance):
 
     while len(heap) > 0:
         key, halfedge = heapq.heappop(heap)
-        if halfedge < 0:  # initial_windows pseudosources round a vertex
+        if halfedge < 0:  # a pseudosource
             v = -1 - halfedge
             if key > distance[v]:
                 continue
@@ -204,7 +204,7 @@ def _propagate(faces, pseudosources, sources, tolerance):
             right = d1x * cy - d1y * (cx - s1)
             if (
                 left > 0.0
-            ):  # the apex lies beside the initial_windows, in a gap between windows perhaps: by way of their end
+            ):  # the apex lies beside what the window sees, in a gap between windows perhaps: by way of their end
                 to_apex = arrival(w, s0, 0.0) + np.hypot(cx - s0, cy)
             elif right < 0.0:
                 to_apex = arrival(w, s1, 0.0) + np.hypot(cx - s1, cy)
@@ -213,7 +213,7 @@ def _propagate(faces, pseudosources, sources, tolerance):
             _reach(faces.vertices[face, (side + 2) % 3], to_apex, heap, distance, pseudosources)
             turned = unit * (w[P] + up * w[Q])
             source, normal = (origin, turned) if w[KIND] == BEAM else (origin + turned, 0j)
-            if left < 0.0:  # initial_windows on the side from tail to apex
+            if left < 0.0:  # seen on the side from tail to apex
                 t0 = hit(s0, d0x, d0y, 0.0, 0.0, cx, cy)
                 t1 = hit(s1, d1x, d1y, 0.0, 0.0, cx, cy) if right < 0.0 else 1.0
                 t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
@@ -221,7 +221,7 @@ def _propagate(faces, pseudosources, sources, tolerance):
                     faces, state, heap, latest, distance, face, tail_side, w[KIND], t0, t1, source, normal, w[SIGMA],
                     slack,
                 )  # fmt: skip
-            if right > 0.0:  # initial_windows on the side from apex to head
+            if right > 0.0:  # seen on the side from apex to head
                 t0 = hit(s0, d0x, d0y, cx, cy, length, 0.0) if left > 0.0 else 0.0
                 t1 = hit(s1, d1x, d1y, cx, cy, length, 0.0)
                 t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)

@@ -1,4 +1,4 @@
-"""Kernels: the sources from which initial_windows travels over a polyhedral surface, and the first windows that they initial_windows."""
+"""Kernels: sources of distance on a polyhedral surface, and the first windows that they open."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Faces(NamedTuple):
 
 
 class GeodesicSources(NamedTuple):
-    """Where initial_windows comes from: the line on which vertex values are zero, edges, vertices, and points inside faces."""
+    """Where distance begins: the zero line of vertex values, edges, vertices, and points inside faces."""
 
     values: NDArray[np.float64]
     edges: NDArray[np.int64]
@@ -62,7 +62,7 @@ class GeodesicSources(NamedTuple):
 
 @compiled(nogil=True)
 def propagate_across(faces, state, heap, latest, distance, face, side, kind, t0, t1, point, normal, sigma, slack):
-    """Queue initial_windows that crosses a side of a face from within for the faces beyond; returns the windows.
+    """Propagate distance across a side of a face, from within, to the faces beyond; returns the windows.
 
     Layout coordinates: the side is lit from fraction t0 to t1; the source is a point, or a beam along a normal through
     a point, at distance σ.
