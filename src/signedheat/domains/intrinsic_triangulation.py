@@ -159,7 +159,7 @@ class IntrinsicTriangulation:
         return found, weights / weights.sum(axis=1, keepdims=True)
 
     def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Edges as they run on the mesh: number of the edge, start and end in space of each straight_lines part."""
+        """Edges as they run on the mesh: number of the edge, start and end in space of each straight part."""
         lines = self.history.edges_before()
         starts = self.in_space(*self.refinement.pull_back(lines.faces, lines.starts))
         return lines.owners, starts, self.in_space(*self.refinement.pull_back(lines.faces, lines.ends))

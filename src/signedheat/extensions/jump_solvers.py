@@ -132,7 +132,7 @@ def minimize_fast(
     spring = problem.weights / problem.weights.mean()
     incidence = problem.incidence()
     transposed = sparse.csr_matrix(incidence.T)
-    with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they transfer
+    with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
         factor = factorize(_grounded_laplacian(incidence, spring))
         constants = factor.solve(transposed @ (spring * (0.5 * (low + high))))
         step = problem.differences(constants)

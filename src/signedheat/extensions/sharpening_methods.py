@@ -134,7 +134,7 @@ class Convex:
                 "intrinsic_delaunay(mesh) if need be instead of with intrinsic=True"
             )
         sizes, total = elements.sizes, elements.sizes.sum()
-        with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they transfer
+        with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
             factor = discretization.integration.anchored(source)
             phi = np.nan_to_num(values)
             pull = elements.masses * np.sign(phi) / (np.ptp(phi) or 1.0)

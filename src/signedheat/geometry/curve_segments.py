@@ -109,7 +109,7 @@ def in_layout(
 
 
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
-    """(n, n_vertices) sparse: values at vertices → values at located."""
+    """(n, n_vertices) sparse: values at vertices → values at points."""
     weights = located.barycentric
     index = np.repeat(np.arange(len(located)), 3).reshape(-1, 3)
     used = weights > 0

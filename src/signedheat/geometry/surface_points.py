@@ -86,7 +86,7 @@ def locate_points(
 
 
 def points_at_vertices(triangles: IntrinsicMesh, vertices: NDArray[np.int64], name: str = "point") -> LocatedPoints:
-    """Vertices as located, each through its first face."""
+    """Vertices as located points, each through its first face."""
     corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices, name)
     kinds = np.full(len(vertices), VERTEX)
     return LocatedPoints(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
@@ -213,5 +213,5 @@ def unique_points(located: LocatedPoints) -> tuple[NDArray[np.int64], NDArray[np
 
 
 def concatenated(parts: Sequence[LocatedPoints]) -> LocatedPoints:
-    """LocatedPoints one after another."""
+    """Located points one after another."""
     return LocatedPoints(*(np.concatenate([getattr(p, f) for p in parts]) for f in LocatedPoints.__dataclass_fields__))

@@ -1,4 +1,4 @@
-"""Kernels: distance in tets along straight lines from a surface, bent where they meet planes.
+"""Kernels: distance in tets along straight lines from a surface, bent where they meet walls.
 
 Where the segment to the nearest point of the surface lies in the mesh, its length is the distance. Elsewhere shortest
 lines bend at the boundary. They are found vertex by vertex, in order of distance: each takes over from a neighbour the

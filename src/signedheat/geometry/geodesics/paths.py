@@ -24,7 +24,7 @@ from .path_kernels import shortest_lines
 def join(
     triangles: IntrinsicMesh, located: LocatedPoints, start: NDArray[np.int64], end: NDArray[np.int64], name: str
 ) -> tuple[LocatedPoints, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Join starts to ends: all located, with the shortest lines between those that share no face cut into segments.
+    """Join starts to ends: all points, with the shortest lines between those that share no face cut into segments.
 
     Returns the located, old ones first; starts and ends of segments, in order; and which pair each belongs to.
     """
@@ -42,7 +42,7 @@ def join(
 
 
 def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDArray[np.int64]:
-    """Which segments of a curve through located have ends that share no face."""
+    """Which segments of a curve through points have ends that share no face."""
     start = np.arange(len(located) if closed else len(located) - 1)
     return np.flatnonzero(shared_faces(triangles, located[start], located[(start + 1) % len(located)]) < 0)
 
@@ -50,7 +50,7 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDAr
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, NDArray]:
-    """LocatedPoints on the shortest lines between starts and ends, where they cross edges or pass vertices.
+    """Points on the shortest lines between starts and ends, where they cross edges or pass vertices.
 
     A line is shortest among its neighbours: no vertex that it passes could be passed on the other side for less. The
     first guess is the shortest way through midpoints of edges; the faces on it are unfolded, a string is pulled tight

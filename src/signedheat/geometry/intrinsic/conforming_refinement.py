@@ -335,7 +335,7 @@ def points_on_elements(
     along: NDArray[np.float64],
     barycentric: NDArray[np.float64],
 ) -> LocatedPoints:
-    """LocatedPoints told by their elements; `along` says where on edges and `barycentric` where in faces."""
+    """Points told by their elements; `along` says where on edges and `barycentric` where in faces."""
     faces, weights = elements.copy(), barycentric.copy()
     at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
     vertices = points_at_vertices(triangles, elements[at_vertex])

@@ -249,7 +249,7 @@ def sector(g, corner):
 
 @kernel
 def has_room(g, agenda, ring):
-    """Whether a split of an edge with `sibling` faces fits into the arrays (one of a face takes less)."""
+    """Whether a split of an edge with so many faces fits into the arrays (one of a face takes less)."""
     faces, edges, vertices, steps = g.counts[0], g.counts[1], g.counts[2], g.counts[3]
     return (
         3 * (faces + ring + 2) <= len(g.tail)
