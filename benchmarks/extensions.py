@@ -177,8 +177,8 @@ def awkward() -> None:
 def in_tets() -> None:
     """A sphere in a box, and a wall in an L of jittered tets, round whose corner distance runs."""
     sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-    from tet_cases import boxes, lattice, rectangle
-    from tet_cases import sphere as ball
+    from shapes.tet_cases import boxes, lattice, rectangle
+    from shapes.tet_cases import sphere as ball
 
     print("\nε as above; slope: root mean square of |∇φ| − 1; seconds")
     print(f"{'':12} {'tets':>8} {'t/h²':>4} | {'heat':>29} | {'+ geodesic':>29} | {'+ convex':>29}")

@@ -26,7 +26,7 @@ import signedheat as sh
 from signedheat.extensions.tet_meshers import box_walls
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
-from tet_cases import plain_recipe
+from shapes.tet_cases import plain_recipe
 
 HALF = 1.6
 SIZES = (8e3, 7.1e4, 2.62e5, 1.14e6)

@@ -1,0 +1,115 @@
+"""``signedheat surface``, and what ``signedheat info`` says of curves."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.surface_cases import sphere, square
+from signedheat.cli import main
+
+
+@pytest.fixture
+def files(tmp_path):
+    mesh = sphere(3)
+    mesh.save(tmp_path / "ball.ply")
+    curve = mesh.level_set(mesh.vertices[:, 2], 0.2)[0]
+    half = sh.Curve(curve.faces[:60], curve.barycentric[:60])
+    sh.write_curves(tmp_path / "curves.txt", [half, mesh.path([0, 30])], mesh)
+    return tmp_path
+
+
+def test_a_field_comes_out(files, capsys):
+    out = files / "phi.npz"
+    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", str(out)]
+    assert main([*arguments, "--constraint", "each-component", "--diffusion", "2"]) == 0
+    assert "642 vertices" in capsys.readouterr().out
+    mesh = sh.read(files / "ball.ply")
+    curves = sh.read_curves(files / "curves.txt", mesh)
+    phi = sh.SignedHeatSolver(mesh, 2.0).distance(curves, sh.EachComponent())
+    assert (np.load(out)["values"] == phi.values).all()
+
+
+def test_json_contours_and_a_picture(files, capsys):
+    out, picture = files / "phi.vtp", files / "phi.png"
+    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", str(out), "--json"]
+    assert main([*arguments, "--contours", "5", "--preview", str(picture)]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["minimum"] < 0 < summary["maximum"] and summary["unreached"] == 0
+    mesh = sh.read(files / "ball.ply")
+    assert len(sh.read_curves(summary["contours"], mesh)) >= 5
+    assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
+
+
+def test_levels(files, capsys):
+    arguments = ["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", str(files / "phi.ply")]
+    assert main([*arguments, "--constraint", "levels:0,0.5"]) == 0
+    assert main([*arguments, "--constraint", "levels:0,0.5,1,2"]) == 1
+    assert "4 level values" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "message"),
+    [
+        ({"curves": "missing.txt"}, 1, "there is no such file"),
+        ({"mesh": "missing.ply"}, 1, "there is no such file"),
+        ({"out": "phi.docx"}, 1, "use one of"),
+        ({"constraint": "hopeful"}, 2, "none of"),
+        ({"diffusion": "-1"}, 2, "not positive"),
+        ({"constraint": "levels:a"}, 2, "no finite number"),
+        ({"constraint": "soft:-1"}, 2, "argument --constraint: -1 is not positive ("),
+        (
+            {"constraint": "zero"},
+            2,
+            "'zero' is none of free, zero-set, hard, each-component, soft:WEIGHT, l",
+        ),
+    ],
+)
+def test_failures_are_one_line(files, capsys, change, status, message):
+    given = {
+        "mesh": "ball.ply",
+        "curves": "curves.txt",
+        "out": "phi.ply",
+        "constraint": "free",
+        "diffusion": "1",
+    } | change
+    arguments = ["surface", str(files / given["mesh"]), str(files / given["curves"]), "-o", str(files / given["out"])]
+    arguments += [f"--constraint={given['constraint']}", f"--diffusion={given['diffusion']}"]
+    assert main(arguments) == status
+    error = capsys.readouterr().err
+    assert message in error and len(error.strip().splitlines()) == 1
+
+
+def test_info_says_what_lies_where(tmp_path, capsys):
+    mesh = square(6)
+    mesh.save(tmp_path / "flat.ply")
+    curves = [mesh.path([7, 8, 20]), mesh.path([21, 22, 16, 15], closed=True), mesh.points_at([0])]
+    sh.write_curves(tmp_path / "curves.json", curves, mesh)
+    assert main(["info", str(tmp_path / "flat.ply"), str(tmp_path / "curves.json"), "--json"]) == 0
+    first, second, third = json.loads(capsys.readouterr().out)["curves"]
+    assert first["share_no_face"] == [1] and first["open_ends"] == ["vertex 7", "vertex 20"]
+    assert first["length"] == pytest.approx(0.4 + np.hypot(0.8, 0))
+    assert second["open_ends"] == [] and second["at_vertices"] == 4 and second["along_edges"] == 4
+    assert third["kind"] == "points"
+    assert main(["info", str(tmp_path / "flat.ply"), str(tmp_path / "curves.json")]) == 0
+    assert "1 segments share no face: 1" in capsys.readouterr().out
+
+
+def test_fields_on_surfaces_can_be_contoured_viewed_and_told_about(files, capsys):
+    field = str(files / "phi.npz")
+    assert main(["surface", str(files / "ball.ply"), str(files / "curves.txt"), "-o", field, "--quiet"]) == 0
+    assert isinstance(sh.load_field(field), sh.VertexField)
+    assert main(["contour", field, "0.3", "-o", str(files / "line.json")]) == 0
+    phi = sh.load_field(field)
+    for curve in sh.read_curves(files / "line.json", phi.domain):
+        assert phi(curve) == pytest.approx(0.3)
+    assert main(["contour", field, "0.3", "-o", str(files / "line.stl")]) == 1
+    assert main(["contour", field, "99", "-o", str(files / "line.obj")]) == 1
+    capsys.readouterr()
+    assert main(["info", field, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["kind"] == "VertexField"
+    assert main(["view", field, "-o", str(files / "view.png")]) == 0
+    assert (files / "view.png").stat().st_size > 20_000

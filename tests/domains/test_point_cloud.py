@@ -1,0 +1,222 @@
+"""Point clouds as a domain: local triangulations, and distance on them."""
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+import signedheat as sh
+from shapes import domain_cases as cases
+from signedheat.geometry.hole_filling import hole_fillings
+from signedheat.geometry.local_triangulations import local_triangulations
+
+
+def sphere_with_circle(n, height=0.3, seed=0):
+    """Points with a circle of points among them; the circle's ids; distance to it."""
+    ring = cases.parallel(int(np.sqrt(n)), height)
+    points = cases.sphere_points(n, seed)
+    near = np.linalg.norm(points[:, None] - ring[None], axis=2).min(axis=1)
+    points = np.concatenate([ring, points[near > 1.2 / np.sqrt(n)]])
+    return points, np.arange(len(ring)), np.arcsin(points[:, 2]) - np.arcsin(height)
+
+
+def cylinder_with_circle(n, seed=0):
+    rng = np.random.default_rng(seed)
+    angle, height = 2 * np.pi * rng.random(n), 4 * rng.random(n) - 2
+    ring_angle = np.linspace(0, 2 * np.pi, int(0.8 * np.sqrt(n)), endpoint=False)
+    keep = np.abs(height - 0.2) > 0.8 / np.sqrt(n)
+    angle = np.concatenate([ring_angle, angle[keep]])
+    height = np.concatenate([np.full(len(ring_angle), 0.2), height[keep]])
+    points = np.stack([np.cos(angle), np.sin(angle), height], axis=1)
+    return points, np.arange(len(ring_angle)), height - 0.2
+
+
+def plane_with_circle(n, seed=0):
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0, 2 * np.pi, int(0.7 * np.sqrt(n)), endpoint=False)
+    ring = 0.5 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    points = np.column_stack([2 * rng.random((n, 2)) - 1, np.zeros(n)])
+    keep = np.abs(np.linalg.norm(points, axis=1) - 0.5) > 0.8 / np.sqrt(n)
+    points = np.concatenate([ring, points[keep]])
+    return points, np.arange(len(ring)), 0.5 - np.linalg.norm(points, axis=1)
+
+
+CASES = {"sphere": sphere_with_circle, "cylinder": cylinder_with_circle, "plane": plane_with_circle}
+
+
+def along_the_circle(cloud, ids, exact):
+    """Distance to a closed path, signed as `exact` whichever side the cloud has chosen for its normals."""
+    phi = sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True)).values
+    return phi * np.sign((phi * exact).sum())
+
+
+def test_in_the_plane_the_local_triangulations_are_the_delaunay_triangulation():
+    points = np.random.default_rng(0).random((400, 2))
+    found = local_triangulations(np.column_stack([points, np.zeros(400)])).faces
+    inner = (np.abs(points - 0.5) < 0.35).all(axis=1)
+
+    def well_inside(faces):
+        return {tuple(sorted(f)) for f in faces.tolist() if inner[f].all()}
+
+    assert well_inside(found) == well_inside(Delaunay(points).simplices)
+
+
+@pytest.mark.parametrize("n", [200, 3000])
+def test_a_sphere_of_points_becomes_a_closed_sphere(n):
+    points = cases.sphere_points(n)
+    mesh = sh.PointCloud(points).triangulation
+    assert (mesh.edges.face_counts == 2).all()
+    assert n - len(mesh.edges.vertices) + mesh.n_faces == 2
+    outward = (mesh.face_area_vectors * points[mesh.faces].sum(axis=1)).sum(axis=1)
+    assert (outward > 0).all()
+
+
+def test_points_on_a_lattice_are_covered_once_however_ambiguous():
+    points = np.stack(np.meshgrid(np.arange(12.0), np.arange(9.0), [0.0]), axis=-1).reshape(-1, 3)
+    mesh = sh.PointCloud(points).triangulation
+    assert mesh.n_faces == 2 * 11 * 8
+    assert mesh.face_areas == pytest.approx(0.5)
+
+
+def test_a_noisy_cloud_hardly_has_holes_and_no_edge_has_three_faces():
+    points = cases.sphere_points(4000) + 0.006 * np.random.default_rng(1).normal(size=(4000, 3))
+    counts = sh.PointCloud(points).triangulation.edges.face_counts
+    assert counts.max() == 2
+    assert (counts == 1).mean() < 0.005
+
+
+def test_small_holes_are_filled_and_outer_boundaries_stay():
+    vertices, polygons = cases.triangles(6)
+    faces = np.array(polygons)
+    hole = [30, 31]
+    filled = hole_fillings(vertices, np.tile([0.0, 0, 1], (len(vertices), 1)), np.delete(faces, hole, axis=0))
+    assert {tuple(sorted(f)) for f in filled.tolist()} == {tuple(sorted(f)) for f in faces[hole].tolist()} or (
+        len(filled) == 2 and set(filled.ravel()) == set(faces[hole].ravel())
+    )
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_error_falls_and_is_below_the_peers(name):
+    peers = pytest.importorskip("potpourri3d")
+    errors, sizes = [], [500, 2000, 8000]
+    for n in sizes:
+        points, ids, exact = CASES[name](n)
+        errors.append(cases.error(along_the_circle(sh.PointCloud(points), ids, exact), exact))
+        normals = {"sphere": points, "cylinder": points * [1, 1, 0], "plane": points * 0 + [0, 0, 1]}[name]
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        solver = peers.PointCloudHeatSolver(points)
+        peer = np.asarray(solver.compute_signed_distance([[*map(int, ids), int(ids[0])]], normals))
+        assert errors[-1] < min(cases.error(peer, exact), cases.error(-peer, exact))
+    assert cases.fitted_order([n**-0.5 for n in sizes], errors) > 0.9
+
+
+def test_flipped_normals_change_nothing_when_the_curve_brings_its_own():
+    points, ids, exact = sphere_with_circle(1500)
+    north = np.cross(np.cross(points[ids], [0, 0, 1]), points[ids])
+    fields = []
+    for part in (0.0, 0.3, 0.7, 1.0):
+        flips = np.where(np.random.default_rng(5).random(len(points)) < part, -1.0, 1.0)
+        cloud = sh.PointCloud(points, points * flips[:, None])
+        path = cloud.path(ids, closed=True)
+        curve = sh.Curve(path.faces, path.barycentric, closed=True, normals=north)
+        fields.append(sh.SignedHeatSolver(cloud).distance(curve).values)
+    assert cases.error(fields[0], exact) < 2e-3
+    for field in fields[1:]:
+        assert field == pytest.approx(fields[0], abs=1e-9)
+
+
+def test_some_flipped_normals_do_not_turn_the_side_of_a_curve():
+    points, ids, exact = sphere_with_circle(1500)
+    flips = np.where(np.random.default_rng(6).random(len(points)) < 0.3, -1.0, 1.0)
+    for normals, sign in ((points, 1), (points * flips[:, None], 1), (None, 1), (-points, -1)):
+        cloud = sh.PointCloud(points, normals)
+        phi = sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True)).values
+        assert cases.error(sign * phi, exact) < 2e-3
+
+
+def test_polylines_and_paths_through_the_same_points_agree():
+    points, ids, _ = sphere_with_circle(2000)
+    cloud = sh.PointCloud(points)
+    solver = sh.SignedHeatSolver(cloud)
+    by_ids = solver.distance(cloud.path(ids, closed=True)).values
+    by_points = solver.distance(cloud.polyline(points[ids], closed=True)).values
+    assert by_points == pytest.approx(by_ids, abs=1e-6)
+    between = solver.distance(cloud.polyline(cases.parallel(90, 0.1), closed=True), sh.Free()).values
+    assert cases.error(between, np.arcsin(points[:, 2]) - np.arcsin(0.1)) < 4e-3
+
+
+def test_the_boundary_of_an_open_cloud_does_not_bend_distance():
+    rng = np.random.default_rng(3)
+    points = np.column_stack([rng.random((3000, 2)), np.zeros(3000)])
+    cloud = sh.PointCloud(points, np.tile([0.0, 0, 1], (3000, 1)))
+    curve = cloud.polyline([[0.02, 0.5, 0], [0.98, 0.5, 0]])
+    phi = sh.SignedHeatSolver(cloud).distance(curve).values
+    assert np.abs(phi - (points[:, 1] - 0.5)).max() < 0.02
+
+
+def test_points_that_coincide_get_the_same_distance_as_without_them():
+    points, ids, _ = sphere_with_circle(800)
+    cloud = sh.PointCloud(points)
+    phi = sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True)).values
+    order = np.concatenate([np.arange(len(points)), np.repeat(np.arange(0, 200), 40)])
+    double = sh.PointCloud(points[order])
+    field = sh.SignedHeatSolver(double).distance(double.path(len(points) + 40 * ids[:5]))
+    assert field.diagnostics.notes["duplicate points"] == 8000
+    again = sh.SignedHeatSolver(double).distance(double.path(ids, closed=True)).values
+    assert again == pytest.approx(phi[order], abs=1e-9)
+
+
+def test_outliers_get_no_distance_and_disturb_no_one():
+    points, ids, exact = sphere_with_circle(1500)
+    far = np.array([[3.0, 0, 0], [0, 2.5, 0], [0.1, 0, 0.1]])
+    cloud = sh.PointCloud(np.concatenate([points, far]))
+    with pytest.warns(sh.UnreachedWarning):
+        field = sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True))
+    assert np.isnan(field.values[-3:]).all()
+    assert cases.error(field.values[:-3], exact) < 2e-3
+    assert field.diagnostics.notes["points without triangles"].tolist() == [len(points) + k for k in range(3)]
+
+
+def test_a_mobius_strip_of_points_is_like_one_of_triangles():
+    """A strip with a half twist has no consistent normals: a curve across it brings its own."""
+    along, across = np.meshgrid(
+        np.linspace(0, 2 * np.pi, 120, endpoint=False), np.linspace(-0.3, 0.3, 9), indexing="ij"
+    )
+    radius = 1 + across * np.cos(along / 2)
+    points = np.stack([radius * np.cos(along), radius * np.sin(along), across * np.sin(along / 2)], axis=-1)
+    ids = np.arange(along.size).reshape(along.shape)
+    ahead = np.vstack([ids[1:], ids[:1, ::-1]])
+    cells = np.stack([ids[:, :-1], ahead[:, :-1], ahead[:, 1:], ids[:, 1:]], axis=-1).reshape(-1, 4)
+    points = points.reshape(-1, 3)
+    mesh = sh.TriangleMesh(points, np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]]))
+    cloud = sh.PointCloud(points, n_neighbors=24)
+    fields = []
+    for domain in (mesh, cloud):
+        path = domain.path(ids[0])
+        curve = sh.Curve(path.faces, path.barycentric, normals=np.tile([0.0, 1, 0], (path.n_segments, 1)))
+        fields.append(sh.SignedHeatSolver(domain).distance(curve).values)
+    assert fields[1] == pytest.approx(fields[0], abs=0.02)
+    assert fields[0].max() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("points", "match"),
+    [
+        (np.zeros((5, 3)), "1 distinct"),
+        (np.outer(np.arange(9.0), [1, 2, 3]), "no triangles"),
+        (np.random.default_rng(0).random((9, 2)), "3 coordinates"),
+    ],
+)
+def test_clouds_that_are_no_surface_are_refused(points, match):
+    with pytest.raises(sh.GeometryError, match=match):
+        sh.SignedHeatSolver(sh.PointCloud(points)).distance([sh.SurfacePoints([0], [[1, 0, 0]])])
+
+
+def test_scale_and_motion():
+    points, ids, _ = sphere_with_circle(700)
+    turn = np.linalg.qr(np.random.default_rng(8).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    fields = []
+    for positions in (points, 1e3 * points @ turn.T + [5e3, -2e3, 1e3]):
+        cloud = sh.PointCloud(positions)
+        fields.append(sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True)).values)
+    assert fields[1] / 1e3 == pytest.approx(fields[0], abs=1e-6)

@@ -1,0 +1,288 @@
+"""What every extension says of bad input: one documented exception, or one line and a status, and nothing is lost."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.tet_cases import boxes
+from signedheat import samples
+from signedheat.cli import main
+
+BALL = samples.sphere(2)
+RING = BALL.level_set(BALL.vertices[:, 2], 0.2)
+GRID = sh.Grid((-2, -2, -2), 0.25, (17, 17, 17))
+PLANE = sh.Grid((0, 0), 1.0, (8, 8))
+BOX = boxes((2, 2, 2), 1.0)
+POINTS = samples.oriented_points(BALL, 50)
+BARE = sh.PointCloud(POINTS.points)
+HEIGHT = sh.VertexField(BALL, BALL.vertices[:, 2])
+NAN, INF = float("nan"), float("inf")
+
+
+def case(words, *arguments, error=sh.SignedHeatError, **keywords):
+    return pytest.param(arguments, keywords, error, words, id=words)
+
+
+def refused(call, arguments, keywords, error, words):
+    with pytest.raises(error, match=words) as caught:
+        call(*arguments, **keywords)
+    assert type(caught.value) is not ValueError and len(str(caught.value)) > 25
+
+
+@pytest.mark.parametrize("operation", [sh.dilate, sh.erode, sh.opening, sh.closing])
+@pytest.mark.parametrize(
+    ("arguments", "keywords", "error", "words"),
+    [
+        case("distance must be finite and not negative here|finite and not negative", BALL, NAN),
+        case("finite and not negative, not inf", BALL, INF),
+        case("not negative, not -1", BALL, -1),
+        case("must be a number, not 'x'", BALL, "x"),
+        case("must be a number, not None", BALL, None),
+        case("must be a number", BALL, [0.1, 0.2]),
+        case("there is no source", [], 0.1, error=sh.SourceError),
+        case("there is no source", [], 0.1, BALL, error=sh.SourceError),
+        case("not to a NoneType", None, 0.1, error=sh.SourceError),
+        case("not to a VertexField", HEIGHT, 0.1, error=sh.SourceError),
+        case("pass that surface as the domain", RING, 0.1, error=sh.SourceError),
+        case("whole number of at least 2", BALL, 0.1, resolution=1, error=sh.GeometryError),
+        case("lower resolution", BALL, 0.1, resolution=100_000, error=sh.MemoryLimitError),
+        case("no normals", BARE, 0.1, resolution=12, error=sh.SourceError),
+        case("is not a domain", BALL, 0.1, "grid", error=TypeError),
+        case("3 dimensions, and the grid in 2", BALL, 0.1, PLANE, error=sh.SourceError),
+        case("measured to a Curve", BALL, 0.1, BALL, error=sh.SourceError),
+        case("not to a Curve", RING, 0.1, GRID, error=sh.SourceError),
+        case("level -?9", RING, 9.0, BALL, error=sh.OutsideError),
+        case("leaves the grid|level -?5", BALL, 5.0, GRID, error=sh.OutsideError),
+    ],
+)
+def test_growing_and_shrinking(operation, arguments, keywords, error, words):
+    refused(operation, arguments, keywords, error, words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keywords", "error", "words"),
+    [
+        case("inner distance must be finite", BALL, NAN, 1),
+        case("outer distance must be finite", BALL, 0, INF),
+        case("inner distance must be a number", BALL, "a", 1),
+        case("inner < outer, not 1 and 0: swap", BALL, 1, 0),
+        case("inner < outer", BALL, 0, 0),
+        case("raise the resolution", BALL, 0, 0.01, resolution=24),
+        case("not to a NoneType", None, 0, 0.3, error=sh.SourceError),
+        case("there is no source", [], 0, 0.3, error=sh.SourceError),
+        case("pass that surface", RING[0], 0, 0.3, error=sh.SourceError),
+        case("no normals", BARE, 0, 0.3, error=sh.SourceError),
+        case("not on a TriangleMesh", BALL, 0, 0.3, BALL, error=TypeError),
+        case("not on a TetMesh", BALL, 0, 0.3, BOX, error=TypeError),
+        case("3 dimensions, and the grid in 2", BALL, 0, 0.3, PLANE, error=sh.SourceError),
+    ],
+)
+def test_shell(arguments, keywords, error, words):
+    refused(sh.shell, arguments, keywords, error, words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keywords", "error", "words"),
+    [
+        case("reach above must be finite and not negative, not nan", BALL, NAN),
+        case("reach above must be finite and not negative, not -1", BALL, -1),
+        case("reach below must be finite and not negative, not inf", BALL, 0.1, INF),
+        case("reach above must be a number", BALL, None),
+        case("by nothing", BALL, 0),
+        case("raise the resolution", BALL, 0.01, resolution=24),
+        case("there is no source", [], 0.3, error=sh.SourceError),
+        case("a PointCloud has none", POINTS, 0.3, resolution=24, error=sh.SourceError),
+        case("a Polyline has none", sh.Polyline([[0, 0], [1, 0]]), 0.3, resolution=24, error=sh.SourceError),
+        case("not on a TetMesh", BALL, 0.3, None, BOX, error=TypeError),
+        case("2 dimensions of the grid", BALL, 1.0, None, PLANE, error=sh.SourceError),
+    ],
+)
+def test_thicken(arguments, keywords, error, words):
+    refused(sh.thicken, arguments, keywords, error, words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keywords", "error", "words"),
+    [
+        *(
+            case(f"not a {type(domain).__name__}", domain, RING, error=TypeError)
+            for domain in (None, POINTS, GRID, BOX, sh.DigitalSurface(np.ones((2, 2, 2), bool)))
+        ),
+        case("there is no source", BALL, [], error=sh.SourceError),
+        case("no empty lists", BALL, [[]], error=sh.SourceError),
+        case("source 0 is a NoneType", BALL, None, error=sh.SourceError),
+        case("source 0 is a TriangleMesh", BALL, BALL, error=sh.SourceError),
+        case("another mesh", BALL, sh.Curve([9999, 9999], [[1, 0, 0], [0, 1, 0]]), error=sh.SourceError),
+        case("diffusion must be finite", BALL, RING, diffusion=NAN),
+        case("diffusion must be positive", BALL, RING, diffusion=-1),
+        case("diffusion must be a number", BALL, RING, diffusion="x"),
+        case("smoothing must be positive", BALL, RING, smoothing=0),
+        case("smoothing must be finite", BALL, RING, smoothing=INF),
+        case("smoothing must be a number", BALL, RING, smoothing="x"),
+        case(
+            "no area",
+            sh.TriangleMesh([[0, 0, 0]] * 3, [[0, 1, 2]]),
+            sh.Curve([0, 0], [[1, 0, 0], [0, 1, 0]]),
+            error=sh.GeometryError,
+        ),
+    ],
+)
+def test_piecewise_distance(arguments, keywords, error, words):
+    refused(sh.piecewise_distance, arguments, keywords, error, words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keywords", "error", "words"),
+    [
+        case("is not a domain", None, RING, error=TypeError),
+        case("not to a Curve", GRID, RING, error=sh.SourceError),
+        case("there is no source", BALL, [], error=sh.SourceError),
+        case("source 0 is a NoneType", BALL, None, error=sh.SourceError),
+        case("source 0 is a TriangleMesh", BALL, BALL, error=sh.SourceError),
+        case("orient the curves", BALL, BALL.path([0, 5], oriented=False), error=sh.SourceError),
+        case("orient the curves", BALL, BALL.points_at([3]), error=sh.SourceError),
+        case("diffusion must be finite", BALL, RING, diffusion=NAN),
+        case("is not a constraint", BALL, RING, constraint="zero", error=TypeError),
+        case("is not a constraint", BALL, RING, constraint=sh.ZeroSet, error=TypeError),
+        case("3 level values", BALL, RING, constraint=sh.LevelValues([0, 1, 2]), error=sh.ConstraintError),
+    ],
+)
+def test_close_curves(arguments, keywords, error, words):
+    refused(sh.close_curves, arguments, keywords, error, words)
+
+
+def with_one(values, value):
+    values = np.array(values, dtype=float)
+    values.ravel()[5] = value
+    return values
+
+
+ROUND = np.linalg.norm(GRID.points, axis=-1) - 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "keywords", "error", "words"),
+    [
+        case("a NoneType cannot be sharpened", None, error=TypeError),
+        case("a TriangleMesh cannot be sharpened", BALL, error=TypeError),
+        case("a PiecewiseField cannot be sharpened", sh.piecewise_distance(BALL, RING), error=TypeError),
+        case("cannot be sharpened", sh.GridField(GRID, with_one(ROUND, INF)), error=sh.GeometryError),
+        case("one sign", sh.GridField(GRID, 0 * ROUND + 1), error=sh.OutsideError),
+        case("infinite at vertex 5", sh.VertexField(BALL, with_one(BALL.vertices[:, 2], INF)), error=sh.GeometryError),
+        case("no value anywhere", sh.VertexField(BALL, np.full(BALL.n_vertices, NAN)), error=sh.OutsideError),
+        case("values of shape", sh.VertexField(BALL, np.ones(3)), error=sh.GeometryError),
+        case("values of shape", sh.VertexField(BALL, np.full(BALL.n_vertices, "x")), error=sh.GeometryError),
+        case("one sign", sh.VertexField(BALL, np.zeros(BALL.n_vertices)), error=sh.OutsideError),
+        case("infinite at vertex 5", sh.TetField(BOX, with_one(BOX.vertices[:, 2], INF)), error=sh.GeometryError),
+        case("no value anywhere", sh.TetField(BOX, np.full(BOX.n_vertices, NAN)), error=sh.OutsideError),
+        case("one sign", sh.TetField(BOX, np.zeros(BOX.n_vertices)), error=sh.OutsideError),
+        case("comes without one", HEIGHT, method=sh.Convex(), error=sh.SourceError),
+        case("comes without one", sh.TetField(BOX, BOX.vertices[:, 0]), method=sh.Convex(), error=sh.SourceError),
+        case("no method of sharpening", HEIGHT, method="convex", error=TypeError),
+        case("no method of sharpening", HEIGHT, method=sh.Convex, error=TypeError),
+        case("unexpected keyword", sh.GridField(GRID, ROUND), method=sh.Convex(), error=TypeError),
+    ],
+)
+def test_sharpen(arguments, keywords, error, words):
+    refused(sh.sharpen, arguments, keywords, error, words)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: sh.Convex(tolerance=NAN),
+        lambda: sh.Convex(tolerance=0),
+        lambda: sh.Convex(max_rounds=0),
+        lambda: sh.Convex(max_rounds=2.5),
+        lambda: sh.Convex(relaxation=2.0),
+        lambda: sh.Geodesic(-1),
+        lambda: sh.Geodesic(NAN),
+        lambda: sh.Geodesic("x"),
+    ],
+)
+def test_methods(make):
+    with pytest.raises(sh.SignedHeatError, match="must be"):
+        make()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    BALL.save(tmp_path / "ball.ply")
+    sh.write_curves(tmp_path / "ring.txt", RING, BALL)
+    sh.write_curves(tmp_path / "points.txt", [BALL.points_at([3])], BALL)
+    for name in ("ball.ply", "ring.txt"):
+        whole = (tmp_path / name).read_bytes()
+        (tmp_path / f"cut-{name}").write_bytes(whole[: len(whole) * 2 // 3])
+        (tmp_path / f"empty-{name}").write_bytes(b"")
+    header = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    faces = b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "nan.ply").write_bytes(header + faces + b"0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n")
+    BARE.save(tmp_path / "bare.xyz")
+    (tmp_path / "folder").mkdir()
+    return tmp_path
+
+
+MORPH = [
+    ("dilate missing.ply 0.1 -o out.stl", 1, "missing.ply: there is no such file"),
+    ("dilate cut-ball.ply 0.1 -o out.stl", 1, "cut-ball.ply"),
+    ("dilate empty-ball.ply 0.1 -o out.stl", 1, "the file is empty"),
+    ("dilate nan.ply 0.1 -o out.stl", 1, "nan.ply: 1 of 3 vertices hold NaN"),
+    ("dilate bare.xyz 0.1 -o out.stl", 1, "bare.xyz: the point cloud has no normals"),
+    ("dilate ring.txt 0.1 -o out.stl", 1, "not a known format"),
+    ("dilate folder 0.1 -o out.stl", 1, "no extension"),
+    ("dilate ball.ply 0.1 -o out.docx", 1, "not a known format"),
+    ("dilate ball.ply 0.1 -o nowhere/out.stl", 1, "cannot be written"),
+    ("dilate ball.ply 0.1 -o out.xyz", 1, "not a known format"),
+    ("dilate ball.ply -0.1 -o out.stl", 1, "not negative"),
+    ("dilate ball.ply nan -o out.stl", 2, "no finite number"),
+    ("dilate ball.ply inf -o out.stl", 2, "no finite number"),
+    ("dilate ball.ply -o out.stl", 2, "DISTANCE"),
+    ("dilate ball.ply 0.1 0.2 -o out.stl", 2, "takes 1, not 2"),
+    ("grow ball.ply 0.1 -o out.stl", 2, "invalid choice"),
+    ("dilate ball.ply 0.1", 2, "--output"),
+    ("dilate ball.ply 0.1 -o out.stl --resolution 1", 2, "whole number"),
+    ("erode ball.ply 3 -o out.stl --resolution 16", 1, "ball.ply: "),
+    ("shell ball.ply 0.3 0.1 -o out.stl", 1, "inner < outer"),
+    ("thicken ball.ply 0 -o out.stl", 1, "by nothing"),
+    ("thicken ball.ply 0.1 -0.2 -o out.stl", 1, "not negative"),
+]
+CLOSE = [
+    ("missing.ply ring.txt -o out.obj", 1, "missing.ply: there is no such file"),
+    ("ball.ply missing.txt -o out.obj", 1, "missing.txt: there is no such file"),
+    ("cut-ball.ply ring.txt -o out.obj", 1, "cut-ball.ply"),
+    ("ball.ply cut-ring.txt -o out.obj", 1, "cut-ring.txt"),
+    ("ball.ply empty-ring.txt -o out.obj", 1, "the file is empty"),
+    ("nan.ply ring.txt -o out.obj", 1, "nan.ply: 1 of 3 vertices hold NaN"),
+    ("ball.ply points.txt -o out.obj", 1, "points.txt: curves without sides"),
+    ("ball.ply ring.txt -o out.stl", 1, "not a known format"),
+    ("ball.ply ring.txt -o nowhere/out.obj", 1, "cannot be written"),
+    ("ball.ply ring.txt -o out.obj --preview out.docx", 1, "not a known format"),
+    ("ball.ply ring.txt", 2, "--output"),
+    ("ball.ply ring.txt -o out.obj --diffusion -1", 2, "not positive"),
+    ("ball.ply ring.txt -o out.obj --diffusion nan", 2, "no finite number"),
+    ("ball.ply ring.txt -o out.obj --constraint hopeful", 2, "none of"),
+    ("ball.ply ring.txt -o out.obj --constraint levels:1,2,3", 1, "ring.txt: 3 level values"),
+]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [(f"morph {w}", s, m) for w, s, m in MORPH] + [(f"close {w}", s, m) for w, s, m in CLOSE],
+)
+def test_commands(folder, monkeypatch, capsys, words, status, message):
+    """One line that names the file, a status, and an output that was there before is still there."""
+    monkeypatch.chdir(folder)
+    for name in ("out.stl", "out.obj"):
+        (folder / name).write_text("precious")
+    before = sorted(path.name for path in folder.iterdir())
+    try:
+        found = main(words.split())
+    except SystemExit as end:
+        found = end.code
+    said = capsys.readouterr().err
+    assert found == status
+    assert message in said and said.count("\n") == 1 and "Traceback" not in said
+    assert sorted(path.name for path in folder.iterdir()) == before
+    assert all((folder / name).read_text() == "precious" for name in ("out.stl", "out.obj"))

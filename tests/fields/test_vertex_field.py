@@ -1,0 +1,147 @@
+"""Distance on surfaces as a result: values, gradients, contours, files, completed curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.surface_cases import band, flipped, positions, sphere, square
+from signedheat.io.surface_fields import load_vertex_field
+
+
+def field_on_sphere(subdivisions=4):
+    mesh = sphere(subdivisions)
+    return sh.SignedHeatSolver(mesh).distance(mesh.level_set(mesh.vertices[:, 2], 0.2))
+
+
+def test_values_between_vertices_are_linear():
+    mesh = square(9, 0.3)
+    phi = sh.VertexField(mesh, mesh.vertices @ np.array([2.0, -1.0, 0.0]))
+    curve = mesh.polyline([[-0.8, -0.7, 0], [0.3, 0.9, 0], [0.6, -0.2, 0]])
+    exact = positions(mesh, curve) @ np.array([2.0, -1.0, 0.0])
+    assert phi(curve) == pytest.approx(exact, abs=1e-14)
+    assert phi(positions(mesh, curve) + np.array([0, 0, 0.1])) == pytest.approx(exact, abs=1e-14)
+    assert np.abs(phi.gradient(curve) - [2, -1, 0]).max() < 1e-12
+    with pytest.raises(sh.OutsideError, match="face 9999"):
+        phi(sh.SurfacePoints([9999], [[1, 0, 0]]))
+
+
+def test_gradients_are_tangent_unit_and_grow_like_the_field():
+    phi = field_on_sphere()
+    mesh = phi.domain
+    gradient = phi.face_gradients
+    centers = mesh.vertices[mesh.faces].mean(axis=1)
+    assert np.abs(np.einsum("ij,ij->i", gradient, mesh.face_area_vectors)).max() < 1e-14
+    away = np.abs(centers[:, 2]) < 0.8
+    north = np.array([0, 0, 1]) - centers[:, 2:] * centers / (centers**2).sum(axis=1, keepdims=True)
+    north /= np.linalg.norm(north, axis=1, keepdims=True)
+    assert np.abs(gradient - north)[away].max() < 0.15
+    corners = mesh.vertices[mesh.faces]
+    step = corners[:, 1] - corners[:, 0]
+    rise = phi.values[mesh.faces[:, 1]] - phi.values[mesh.faces[:, 0]]
+    assert np.abs(np.einsum("ij,ij->i", gradient, step) - rise).max() < 1e-13
+
+
+def test_contours_close_and_round_trip_through_the_solver():
+    phi = field_on_sphere()
+    (curve,) = phi.contour(0.4)
+    assert curve.closed and np.abs(phi(curve) - 0.4).max() < 1e-14
+    again = sh.SignedHeatSolver(phi.domain).distance(curve)
+    assert np.abs(again.values - (phi.values - 0.4))[np.abs(phi.values) < 0.8].max() < 0.03
+    assert np.abs(phi(phi.contour(0.0)[0])).max() < 1e-14
+    with pytest.raises(sh.OutsideError, match="φ goes from"):
+        phi.contour(100.0)
+
+
+def test_contours_are_the_same_lines_when_faces_are_turned_over():
+    phi = field_on_sphere(3)
+    turned = sh.VertexField(flipped(phi.domain), phi.values)
+    (a,), (b,) = phi.contour(0.3), turned.contour(0.3)
+    assert b.closed and a.n_points == b.n_points
+    first = positions(phi.domain, a)
+    second = positions(turned.domain, b)
+    assert np.abs(first[np.lexsort(first.round(9).T)] - second[np.lexsort(second.round(9).T)]).max() < 1e-12
+    gradient = turned.gradient(b)
+    assert (np.einsum("ij,ij->i", b.normals, gradient) > 0).all()
+
+
+def test_unreached_parts_are_left_out_of_contours():
+    mesh = square(5)
+    two = sh.TriangleMesh(
+        np.concatenate([mesh.vertices, mesh.vertices + np.array([0, 0, 1])]),
+        np.concatenate([mesh.faces, mesh.faces + 25]),
+    )
+    with pytest.warns(sh.UnreachedWarning):
+        phi = sh.SignedHeatSolver(two).distance(two.path([10, 11, 12, 13, 14]))
+    assert np.isnan(phi.values[25:]).all() and phi.diagnostics.unreached.tolist() == list(range(25, 50))
+    for curve in phi.contour(0.1):
+        assert (positions(two, curve)[:, 2] == 0).all()
+
+
+@pytest.mark.parametrize("extension", ["ply", "vtp", "obj", "npz"])
+def test_fields_are_written_whole(extension, tmp_path):
+    phi = field_on_sphere(2)
+    path = tmp_path / f"phi.{extension}"
+    phi.save(path)
+    if extension == "npz":
+        back = load_vertex_field(path)
+        assert (back.values == phi.values).all() and (back.domain.faces == phi.domain.faces).all()
+        return
+    mesh = sh.read(path)
+    assert (mesh.vertices == phi.domain.vertices).all() and (mesh.faces == phi.domain.faces).all()
+    if extension == "obj":
+        lines = [line.split() for line in path.read_text().splitlines()]
+        assert [float(words[1]) for words in lines if words[0] == "vt"] == phi.values.tolist()
+    if extension == "ply":
+        import trimesh
+
+        data = trimesh.load(path, process=False).metadata["_ply_raw"]["vertex"]["data"]
+        assert np.array_equal(np.asarray(data["signed_distance"]).ravel(), phi.values)
+    if extension == "vtp":
+        pyvista = pytest.importorskip("pyvista")
+        assert (pyvista.read(path)["signed_distance"] == phi.values).all()
+
+
+def test_fields_on_other_surfaces_are_written_too(tmp_path):
+    polygons = sh.PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]], [[0, 1, 2, 3], [1, 4, 2]])
+    phi = sh.SignedHeatSolver(polygons).distance(polygons.path([1, 2]))
+    phi.save(tmp_path / "phi.npz")
+    back = load_vertex_field(tmp_path / "phi.npz")
+    assert (back.values == phi.values).all() and back.domain.n_polygons == 2
+    phi.save(tmp_path / "phi.ply")
+    assert sh.read(tmp_path / "phi.ply").n_polygons == 2
+
+
+def test_bad_names_and_damaged_files_are_refused(tmp_path):
+    phi = field_on_sphere(1)
+    with pytest.raises(sh.FileFormatError, match="use one of"):
+        phi.save(tmp_path / "phi.docx")
+    with pytest.raises(sh.FileFormatError, match="cannot be written"):
+        phi.save(tmp_path / "missing" / "phi.ply")
+    phi.save(tmp_path / "phi.npz")
+    whole = (tmp_path / "phi.npz").read_bytes()
+    (tmp_path / "half.npz").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(sh.FileFormatError):
+        load_vertex_field(tmp_path / "half.npz")
+
+
+def test_broken_circles_are_closed():
+    mesh = square(41, 0.2)
+    turn = np.linspace(0, 2 * np.pi, 120, endpoint=False)
+    circle = 0.6 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    broken = [mesh.polyline(circle[a:b]) for a, b in ((0, 20), (28, 55), (66, 80), (85, 113))]
+    whole = sh.close_curves(mesh, broken)
+    longest = max(whole, key=lambda curve: curve.n_points)
+    assert longest.closed
+    radius = np.linalg.norm(positions(mesh, longest), axis=1)
+    assert np.abs(radius - 0.6).max() < 0.05
+    assert sh.SignedHeatSolver(mesh).distance(longest).values[840] > 0  # to the left is inside
+
+
+def test_broken_rings_on_a_cylinder_are_closed():
+    ring = band(64, 12, twisted=False)
+    middle = [13 * i + 6 for i in range(64)]
+    broken = [ring.path(middle[:20]), ring.path(middle[26:50])]
+    (whole,) = sh.close_curves(ring, broken)
+    assert whole.closed and np.abs(positions(ring, whole)[:, 2]).max() < 0.02

@@ -1,0 +1,1 @@
+"""Shapes and cases with known distances, for the tests."""

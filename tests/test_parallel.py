@@ -1,0 +1,61 @@
+"""Long work on another thread: reports while it runs, and an end when the reports raise."""
+
+import time
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.grid_cases import box, sphere
+from signedheat.parallel import run_cancellable
+
+
+class Stop(Exception):
+    pass
+
+
+def stop():
+    raise Stop
+
+
+def test_what_the_report_raises_ends_the_wait():
+    begin = time.perf_counter()
+    with pytest.raises(Stop):
+        run_cancellable(lambda: time.sleep(20), stop)
+    assert time.perf_counter() - begin < 10
+
+
+def test_what_the_job_raises_comes_through():
+    for error in (ValueError, TimeoutError):
+        with pytest.raises(error):
+            run_cancellable(lambda error=error: (_ for _ in ()).throw(error("in the job")), lambda: None)
+
+
+def test_a_job_is_reported_on_until_it_ends():
+    calls = []
+    assert run_cancellable(lambda: time.sleep(0.6) or "done", lambda: calls.append(None)) == "done"
+    assert calls
+
+
+@pytest.mark.parametrize("seen", [lambda fraction, step: None, None])
+def test_sharpening_is_the_same_whoever_watches(seen):
+    mesh, field = sphere(2000), sh.signed_distance(sphere(2000), box(24))
+    on_surface = sh.SignedHeatSolver(mesh).distance(mesh.path(mesh.edges.vertices[0]))
+    for each in (field, on_surface):
+        np.testing.assert_array_equal(sh.sharpen(each, progress=seen).values, sh.sharpen(each).values)
+
+
+def test_sharpening_stops_when_asked_to(monkeypatch):
+    """However long the search for straight lines takes."""
+    monkeypatch.setattr("signedheat.operators.grid.closest_points.distance_to_zero_set", lambda *_: time.sleep(20))
+    calls = []
+
+    def progress(fraction, step):
+        calls.append(fraction)
+        if len(calls) > 1:
+            raise Stop
+
+    begin = time.perf_counter()
+    with pytest.raises(Stop):
+        sh.sharpen(sh.signed_distance(sphere(400), box(12)), progress=progress)
+    assert time.perf_counter() - begin < 10
