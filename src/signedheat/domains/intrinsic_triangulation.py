@@ -141,7 +141,7 @@ class IntrinsicTriangulation:
         positions[lost] = self.mesh.vertices[lost]
         return positions
 
-    def locate_points(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Points of the mesh (faces, barycentric coordinates) in the triangulation's own faces.
 
         Raises
@@ -169,11 +169,9 @@ class IntrinsicTriangulation:
         if isinstance(source, Sequence):
             return [self.transfer(part) for part in source]
         seen = segments_of(source, self.base, self.mesh.vertices)
-        return (
-            seen
-            if isinstance(source, CurveSegments)
-            else transfer_segments(seen, self.refinement, self.history, self.base)
-        )
+        if isinstance(source, CurveSegments):
+            return seen
+        return transfer_segments(seen, self.refinement, self.history, self.base)
 
     def __repr__(self) -> str:
         return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"
