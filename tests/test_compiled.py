@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from shapes import small_runs
 
+from shapes import small_runs
 from signedheat.compiled import compiled
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from shapes.strategies import in_space, meshes, surface_points
 
 import signedheat as sh
+from shapes.strategies import in_space, meshes, surface_points
 from signedheat.domains.segments import segments_of
 from signedheat.geometry.intrinsic.delaunay import flip_to_delaunay
 

@@ -13,8 +13,7 @@ from ..errors import SourceError
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..solver import SignedHeatSolver
-from ..visualization.slices import PICTURE_FORMATS
-from ..visualization.surfaces import save_surface
+from ..visualization import PICTURE_FORMATS, save_surface
 from .computing import prefix_errors
 from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
 from .progress import ProgressBar

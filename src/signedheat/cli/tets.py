@@ -15,7 +15,7 @@ from ..fields.tet_field import TetField
 from ..io import ensure_writable, read
 from ..io.tets import TET_FIELD_FORMATS
 from ..solver import SignedHeatSolver
-from ..visualization.slices import PICTURE_FORMATS, save_slices
+from ..visualization import PICTURE_FORMATS, save_slices
 from .computing import describe, prefix_errors
 from .options import Parser, Summary
 from .progress import ProgressBar

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,9 @@ def read_off(path: PathLike) -> Any:
     if not rows or len(rows[0]) < 2:
         raise FileFormatError(f"{path}: the numbers of vertices and faces are missing: is it truncated?")
     n_vertices, n_faces = numbers(rows[0][:2], path, "counts", int).tolist()
-    vertex_rows, face_rows = rows[1 : 1 + n_vertices], rows[1 + n_vertices : 1 + n_vertices + n_faces]
+    lines = iter(rows[1:])
+    vertex_rows = list(islice(records(lines, lambda row: 3), n_vertices))
+    face_rows = list(islice(records(lines, lambda row: 1 + corner_count(row[0])), n_faces))
     if len(vertex_rows) < n_vertices or len(face_rows) < n_faces:
         raise FileFormatError(
             f"{path}: {n_vertices} vertices and {n_faces} faces are announced, {len(vertex_rows)} and {len(face_rows)} "
@@ -40,6 +44,19 @@ def read_off(path: PathLike) -> Any:
         raise FileFormatError(f"{path}: a face has fewer corners than it says: is it truncated?")
     corners = [word for row, count in zip(face_rows, counts.tolist(), strict=True) for word in row[1 : 1 + count]]
     return assemble(vertices, numbers(corners, path, "vertex ids", int), np.asarray(counts))
+
+
+def records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
+    """Lines joined until each holds as many words as its beginning asks for; more words on its last line stay."""
+    for row in lines:
+        while len(row) < length(row) and (more := next(lines, None)) is not None:
+            row = row + more
+        yield row
+
+
+def corner_count(word: str) -> int:
+    """Number of corners of a face; 0 for what is no number, which is refused later."""
+    return int(word) if word.isdigit() else 0
 
 
 def write_off(shape: Any, path: PathLike) -> bytes:
