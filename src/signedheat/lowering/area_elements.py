@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
+from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..geometry.components import face_components, same_positions
@@ -110,6 +111,12 @@ def _(shape: TriangleMesh) -> AreaElements:
 
 
 @area_elements.register
+def _(shape: TetMesh) -> AreaElements:
+    """The boundary of the tets."""
+    return area_elements(shape.boundary)
+
+
+@area_elements.register
 def _(shape: PolygonMesh) -> AreaElements:
     """Fans around the centroids: their vector areas add up to the polygon's, planar and convex or not."""
     polygon = shape.corner_polygons
@@ -146,6 +153,11 @@ def extent(shape: Any) -> NDArray[np.float64]:
 @extent.register
 def _(shape: PointCloud) -> NDArray[np.float64]:
     return np.stack([shape.points.min(axis=0), shape.points.max(axis=0)])
+
+
+@extent.register
+def _(shape: TetMesh) -> NDArray[np.float64]:
+    return shape.bounds
 
 
 @extent.register

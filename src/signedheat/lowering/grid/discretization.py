@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...discretization import discretize
 from ...domains.grid import Grid
 from ...errors import MemoryLimitError, SourceError
+from ...memory import available_memory
 from ...operators.grid.multilevel import Level, collapse, diffuse_multilevel
 from ...operators.grid.readout import unit_vectors
 from ...operators.grid.stencil import divergence
@@ -26,6 +27,8 @@ SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the pieces into which faces are cut."""
 BYTES_PER_NODE = 46
 """Peak of a distance computation, measured."""
+BASE = 50_000_000
+"""What does not depend on the number of nodes: loaded libraries and compiled kernels."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
 
@@ -39,20 +42,25 @@ def memory_estimate(grid: Grid) -> int:
     True
     """
     per_node = BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS[grid.dimension]
-    return per_node * grid.n_nodes + 50_000_000
+    return per_node * grid.n_nodes + BASE
 
 
 def refuse_beyond_memory(grid: Grid) -> None:
     """Raise `MemoryLimitError` if the grid cannot fit, before anything is allocated."""
-    import os
+    available, needed = available_memory(), memory_estimate(grid)
+    if available is None or needed <= available:
+        return
+    spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting_spacing(grid, available)))
+    raise MemoryLimitError(
+        f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, and "
+        f"{available / 1e9:.1f} GB are free: choose a spacing of {spacing} or more, or a lower resolution"
+    )
 
-    available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else None
-    needed = memory_estimate(grid)
-    if available is not None and needed > available:
-        raise MemoryLimitError(
-            f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, and this machine "
-            f"has {available / 1e9:.1f} GB: choose a lower resolution"
-        )
+
+def fitting_spacing(grid: Grid, available: int) -> NDArray[np.float64]:
+    """(d,) the least spacing, in the proportions of the grid's own, at which a grid of its extent fits into memory."""
+    nodes = max((available - BASE) / (memory_estimate(grid) - BASE), 1e-12)
+    return grid.spacing * 1.01 * nodes ** (-1.0 / grid.dimension)
 
 
 @dataclass(frozen=True, eq=False)
