@@ -58,9 +58,13 @@ def refuse_beyond_memory(grid: Grid) -> None:
 
 
 def fitting_spacing(grid: Grid, available: int) -> NDArray[np.float64]:
-    """(d,) the least spacing, in the proportions of the grid's own, at which a grid of its extent fits into memory."""
-    nodes = max((available - BASE) / (memory_estimate(grid) - BASE), 1e-12)
-    return grid.spacing * 1.01 * nodes ** (-1.0 / grid.dimension)
+    """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
+    share = max((available - BASE) / (memory_estimate(grid) - BASE), 1e-12)
+    spacing = grid.spacing * share ** (-1.0 / grid.dimension)
+    per_node = (memory_estimate(grid) - BASE) / grid.n_nodes
+    while per_node * np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1) + BASE > max(available, 2 * BASE):
+        spacing *= 1.01
+    return spacing
 
 
 @dataclass(frozen=True, eq=False)
