@@ -50,25 +50,21 @@ class Integration(Protocol):
     weighted mean of zero over the source samples of each part. A part without samples is NaN.
     """
 
-    def solve(self, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+    def solve(self, divergence: Any, source: Any) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² with nothing imposed."""
 
-    def fit(self, divergence: Any, source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+    def fit(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
         """Impose levels at the samples, in the way that suits the domain best."""
 
-    def fit_exactly(self, divergence: Any, source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+    def fit_exactly(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
         """Impose levels at the samples, exactly (where the rows allow it)."""
 
-    def penalize(self, divergence: Any, source: SourceTerm, strength: float) -> NDArray[np.float64]:
+    def penalize(self, divergence: Any, source: Any, strength: float) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² + strength · Σ weight · φ(sample)²."""
 
 
-class Discretization(Protocol):
-    """A domain, as the three steps see it."""
-
-    @property
-    def integration(self) -> Integration:
-        """Step 3."""
+class Adaptable(Protocol):
+    """What becomes a discretisation when the sources are known."""
 
     def adapt(self, sources: Sequence[Any]) -> tuple[Discretization, Sequence[Any]]:
         """A discretisation that can hold these sources, and the sources as it knows them: most often itself and they.
@@ -76,10 +72,18 @@ class Discretization(Protocol):
         Isolated points and unoriented curves inside faces need edges and vertices of their own.
         """
 
+
+class Discretization(Adaptable, Protocol):
+    """A domain, as the three steps see it. Source terms that it is given are those that it has made itself."""
+
+    @property
+    def integration(self) -> Integration:
+        """Step 3."""
+
     def lower(self, sources: Sequence[Any], diffusion: float) -> SourceTerm:
         """Bring sources into this discretisation."""
 
-    def diffuse(self, source: SourceTerm) -> Any:
+    def diffuse(self, source: Any) -> Any:
         """Solve ``(M + tL) X = X₀``, right in direction however small X becomes."""
 
     def to_cells(self, vectors: Any) -> NDArray[Any]:
@@ -87,9 +91,6 @@ class Discretization(Protocol):
 
     def divergence(self, directions: NDArray[Any]) -> Any:
         """b, the right-hand side of ``C φ = b``."""
-
-    def field(self, values: NDArray[np.float64], source: SourceTerm, diagnostics: Diagnostics) -> Any:
-        """The result, as users see it."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ def diffuse(discretization: Discretization, source: SourceTerm) -> Any:
 def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) -> Iterable[Any]:
     """Step 1 for each of several sources; at once, where the discretisation can."""
     if hasattr(discretization, "diffuse_many"):
-        return discretization.diffuse_many(sources)
+        together: Iterable[Any] = discretization.diffuse_many(sources)
+        return together
     return (diffuse(discretization, source) for source in sources)
 
 
@@ -49,6 +50,7 @@ def integrate_many(
     """Step 3 for each of several sources; at once, where nothing is imposed and the discretisation can."""
     if isinstance(constraint, Free) and hasattr(discretization.integration, "solve_many"):
         divergences = [discretization.divergence(each) for each in directions]
-        return discretization.integration.solve_many(divergences, sources)
+        together: Iterable[NDArray[np.float64]] = discretization.integration.solve_many(divergences, sources)
+        return together
     each = zip(directions, sources, strict=True)
     return (integrate(discretization, direction, source, constraint) for direction, source in each)

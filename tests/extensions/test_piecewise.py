@@ -69,7 +69,7 @@ def test_loop_round_the_tube_is_cut_across_the_tube():
     assert 2 * np.pi * 0.6 < cut.height < 2 * np.pi * 1.4  # between the ways round the inner and the outer equator
     ring = np.arctan2(*mesh.vertices[cut.vertices, 1::-1].T)
     assert np.abs(ring).min() > 2 * np.pi / 64  # not at the source
-    assert np.allclose(np.linalg.norm(phi.gradient, axis=1), 1)
+    assert np.allclose(np.linalg.norm(phi.face_gradients, axis=1), 1)
 
 
 def test_source_is_cut_only_where_nothing_else_is_possible():
@@ -85,7 +85,7 @@ def test_gradient_is_one_and_source_is_zero():
     curve = arc(mesh)
     phi = sh.piecewise_distance(mesh, curve)
     spacing = mesh.edge_lengths.mean()
-    assert np.allclose(np.linalg.norm(phi.gradient, axis=1), 1)
+    assert np.allclose(np.linalg.norm(phi.face_gradients, axis=1), 1)
     assert np.abs(phi(curve)).max() < spacing
     assert abs(np.median(phi(curve))) < 0.1 * spacing
 
@@ -128,7 +128,7 @@ def test_reversal_changes_the_sign():
     curve = mesh.path(range(20), closed=True)
     forth, back = (sh.piecewise_distance(mesh, c, exact=True) for c in (curve, curve.reversed()))
     assert forth.diagnostics.notes["objective"] == pytest.approx(back.diagnostics.notes["objective"], rel=1e-9)
-    assert np.allclose(forth.gradient, -back.gradient)
+    assert np.allclose(forth.face_gradients, -back.face_gradients)
 
 
 def test_scale():
@@ -191,7 +191,7 @@ def test_intrinsic_triangulation_equals_the_mesh():
     split = intrinsic.split()
     assert split.domain.n_vertices == plain.split().domain.n_vertices
     with pytest.raises(sh.GeometryError, match="split"):
-        _ = intrinsic.gradient
+        _ = intrinsic.face_gradients
 
 
 def bad(mesh: sh.TriangleMesh) -> sh.TriangleMesh:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -143,6 +145,13 @@ class SurfacePoints:
 
     def __repr__(self) -> str:
         return f"SurfacePoints({self.n_points} points)"
+
+
+CurveOrPoints: TypeAlias = Curve | SurfacePoints
+"""What distance on a surface is measured to."""
+
+CurvesAndPoints: TypeAlias = CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
+"""One source or several; curves and points in a sequence of their own count as one."""
 
 
 def surface_points(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from .validation import frozen
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Dimension = TypeVar("Dimension", bound=int, default=int, covariant=True)
+else:
+    from typing import TypeVar
+
+    Dimension = TypeVar("Dimension", bound=int, covariant=True)
+
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Grid(Generic[Dimension]):
     """Nodes at ``origin + index * spacing``, in any number of dimensions.
 
     Parameters
@@ -50,6 +60,26 @@ class Grid:
     shape: tuple[int, ...]
     mask: NDArray[np.bool_] | None
 
+    @overload
+    def __init__(
+        self: Grid[Literal[3]],
+        origin: ArrayLike,
+        spacing: ArrayLike,
+        shape: tuple[int, int, int],
+        mask: ArrayLike | None = None,
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Grid[Literal[2]],
+        origin: ArrayLike,
+        spacing: ArrayLike,
+        shape: tuple[int, int],
+        mask: ArrayLike | None = None,
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Grid[int], origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None
+    ) -> None: ...
     def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None) -> None:
         corner = np.atleast_1d(np.array(origin, dtype=np.float64))
         counts = np.atleast_1d(np.asarray(shape))
@@ -71,12 +101,12 @@ class Grid:
 
     @classmethod
     def around(
-        cls,
+        cls: type[Grid[int]],
         bounds: ArrayLike,
         resolution: int = 128,
         padding: float | None = None,
         spacing: ArrayLike | None = None,
-    ) -> Grid:
+    ) -> Grid[int]:
         """A grid around the middle of a box, with room on every side.
 
         Parameters
@@ -130,7 +160,8 @@ class Grid:
     @property
     def upper(self) -> NDArray[np.float64]:
         """Position of the last node."""
-        return self.origin + self.spacing * (np.array(self.shape) - 1)
+        result: NDArray[np.float64] = self.origin + self.spacing * (np.array(self.shape) - 1)
+        return result
 
     @cached_property
     def axes(self) -> tuple[NDArray[np.float64], ...]:
@@ -146,8 +177,9 @@ class Grid:
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Which of the (n, d) points lie within the box of the nodes."""
-        points = np.asarray(points, dtype=np.float64)
-        return ((points >= self.origin) & (points <= self.upper)).all(axis=-1)
+        positions = np.asarray(points, dtype=np.float64)
+        inside: NDArray[np.bool_] = np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
+        return inside
 
     def __repr__(self) -> str:
         solid = "" if self.mask is None else f", {int(self.mask.sum())} solid nodes"

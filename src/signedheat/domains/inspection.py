@@ -274,7 +274,8 @@ def _components(n_nodes: int, one: NDArray[np.int64], other: NDArray[np.int64]) 
     from scipy.sparse.csgraph import connected_components
 
     graph = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(n_nodes, n_nodes))
-    return connected_components(graph.tocsr(), directed=False)[1]
+    result: NDArray[np.int64] = connected_components(graph.tocsr(), directed=False)[1]
+    return result
 
 
 def _n_components(n_nodes: int, one: NDArray[Any], other: NDArray[Any], nodes: NDArray[Any] | None = None) -> int:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 from numbers import Real
-from typing import Any
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,7 @@ from ..geometry.intrinsic.transfer import ConformingRefinement, transfer_segment
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.mollification import mollify
 from ..progress import Progress, Stopwatch
+from .curves import CurveOrPoints, CurvesAndPoints
 from .segments import segments_of, segments_of_each
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
@@ -139,7 +140,8 @@ class IntrinsicTriangulation:
         positions = np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[faces]])
         lost = np.flatnonzero(np.asarray(faces) < 0)
         positions[lost] = self.mesh.vertices[lost]
-        return positions
+        result: NDArray[np.float64] = positions
+        return result
 
     def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Points of the mesh (faces, barycentric coordinates) in the triangulation's own faces.
@@ -164,7 +166,13 @@ class IntrinsicTriangulation:
         starts = self.in_space(*self.refinement.pull_back(lines.faces, lines.starts))
         return lines.owners, starts, self.in_space(*self.refinement.pull_back(lines.faces, lines.ends))
 
-    def transfer(self, source: Any) -> Any:
+    @overload
+    def transfer(self, source: CurveOrPoints | CurveSegments) -> CurveSegments: ...
+    @overload
+    def transfer(self, source: Sequence[CurveOrPoints | CurveSegments]) -> list[CurveSegments]: ...
+    def transfer(
+        self, source: CurveOrPoints | CurveSegments | Sequence[CurveOrPoints | CurveSegments]
+    ) -> CurveSegments | list[CurveSegments]:
         """A source on the mesh, as these triangles see it."""
         if isinstance(source, Sequence):
             return [self.transfer(part) for part in source]
@@ -179,7 +187,7 @@ class IntrinsicTriangulation:
 
 def intrinsic_delaunay(
     mesh: TriangleMesh,
-    keep: Any = (),
+    keep: CurvesAndPoints = (),
     refine: bool = False,
     angle: float = 28.0,
     max_vertices: int | None = None,
@@ -233,8 +241,7 @@ def intrinsic_delaunay(
     >>> bool(abs(better.triangles.face_areas.sum() - 10) < 1e-12)
     True
     """
-    if not isinstance(mesh, TriangleMesh):
-        raise GeometryError(f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(mesh).__name__}")
+    mesh = triangle_mesh(mesh)
     if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
         raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}")
     if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):
@@ -261,6 +268,15 @@ def intrinsic_delaunay(
     history = History(refinement.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
     goal = angle if refine else 0.0
     return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, refinement, history)
+
+
+def triangle_mesh(domain: object) -> TriangleMesh:
+    """The domain, if it is a triangle mesh; others have no intrinsic triangulation."""
+    if not isinstance(domain, TriangleMesh):
+        raise GeometryError(
+            f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(domain).__name__}"
+        )
+    return domain
 
 
 def laid_out(mesh: TriangleMesh) -> tuple[IntrinsicMesh, float]:

@@ -36,7 +36,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     oriented = is_consistent(mesh)
     normals = None if oriented else gradients(mesh, values, crossed)
     curves = []
-    for order, backwards, closed in assemble_polylines(*on_edges.T, directed=oriented):
+    for order, backwards, closed in assemble_polylines(on_edges[:, 0], on_edges[:, 1], directed=oriented):
         first = np.where(backwards, sides[order, 1], sides[order, 0])
         last = np.where(backwards, sides[order, 0], sides[order, 1])[-1:]
         face = crossed[order]
@@ -70,7 +70,8 @@ def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.in
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
     of_corners = np.cross(normal[:, None], opposite)
     rise = values[mesh.faces[faces]]
-    return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
+    result: NDArray[np.float64] = np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
+    return result
 
 
 def region_boundary(mesh: Triangles, mask: NDArray[np.bool_]) -> list[Curve]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,9 +16,12 @@ from .surface import Surface
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
+if TYPE_CHECKING:
+    import trimesh  # noqa: F401  named in the base class
+
 
 @dataclass(frozen=True, eq=False)
-class PointCloud(Exchangeable, Surface):
+class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     """Points in space of any dimension, with or without normals and areas.
 
     Parameters
@@ -157,6 +161,6 @@ class PointCloud(Exchangeable, Surface):
         return f"PointCloud({self.n_points} points, {'with' if self.normals is not None else 'without'} normals)"
 
 
-def _same_length(values: NDArray, points: NDArray, name: str) -> None:
+def _same_length(values: NDArray[np.float64], points: NDArray[np.float64], name: str) -> None:
     if len(values) != len(points):
         raise GeometryError(f"there are {len(points)} points, but {len(values)} {name}")

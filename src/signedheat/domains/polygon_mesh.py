@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +18,12 @@ from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
+Polygons = Sequence[Sequence[int] | NDArray[np.int64]] | NDArray[np.int64]
+"""Vertex ids of each polygon."""
+
 
 @dataclass(frozen=True, eq=False)
-class PolygonMesh(Exchangeable, Surface):
+class PolygonMesh(Exchangeable[NoReturn], Surface):
     """Polygons in space.
 
     Parameters
@@ -46,7 +50,7 @@ class PolygonMesh(Exchangeable, Surface):
     corners: NDArray[np.int64]
     offsets: NDArray[np.int64]
 
-    def __init__(self, vertices: ArrayLike, polygons: Sequence[Sequence[int]]) -> None:
+    def __init__(self, vertices: ArrayLike, polygons: Polygons) -> None:
         positions = finite_rows(vertices, "vertices", 3)
         counts = np.fromiter((len(p) for p in polygons), dtype=np.int64, count=len(polygons))
         if len(counts) == 0:
@@ -127,7 +131,8 @@ class PolygonMesh(Exchangeable, Surface):
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the vertices of `triangulation`, from values at the vertices of the mesh."""
-        return self.refinement.prolongation @ values
+        refined: NDArray[np.float64] = self.refinement.prolongation @ values
+        return refined
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         check_mask(face_mask, self.n_polygons)

@@ -108,7 +108,8 @@ class Polyline:
     @cached_property
     def segment_lengths(self) -> NDArray[np.float64]:
         """(m,) lengths."""
-        return np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
+        result: NDArray[np.float64] = np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
+        return result
 
     @property
     def length(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import singledispatch
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,17 @@ from ..geometry.curve_segments import CurveSegments, given_directions
 from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import barycentric_in, locate_points, shared_faces, unique_points
-from .curves import Curve, SurfacePoints
+from .curves import Curve, CurveOrPoints, SurfacePoints
+
+Positions: TypeAlias = NDArray[np.float64] | None
 
 
 @singledispatch
 def segments_of(
-    source: Any, triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None, number: int = 0
+    source: CurveOrPoints | CurveSegments,
+    triangles: IntrinsicMesh,
+    positions: Positions = None,
+    number: int = 0,
 ) -> CurveSegments:
     """Cut a source into segments.
 
@@ -47,7 +52,9 @@ def segments_of(
 
 
 def segments_of_each(
-    sources: Sequence[Any], triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None
+    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]],
+    triangles: IntrinsicMesh,
+    positions: Positions = None,
 ) -> list[list[CurveSegments]]:
     """Each of several sources in segments; a sequence of curves and points counts as one source."""
     return [
@@ -60,12 +67,12 @@ def segments_of_each(
 
 
 @segments_of.register
-def _(source: CurveSegments, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
+def _(source: CurveSegments, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
     return source
 
 
 @segments_of.register
-def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
+def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
     located = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     none = np.empty(0, dtype=np.int64)
     return CurveSegments(
@@ -74,7 +81,7 @@ def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Any = None, nu
 
 
 @segments_of.register
-def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
+def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
     name = f"curve {number}"
     located = locate_points(triangles, source.faces, source.barycentric, f"{name}: point")
     start = np.arange(source.n_segments)

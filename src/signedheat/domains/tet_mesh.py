@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.box_tree import BoxTree
-from ..geometry.tet_faces import face_table
+from ..geometry.tet_faces import FaceTable, face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
 from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
 from .validation import element_ids, finite_rows, frozen
+
+if TYPE_CHECKING:
+    import meshio
+    import pyvista
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +85,13 @@ class TetMesh:
         return len(self.tets)
 
     @cached_property
-    def geometry(self) -> Any:
-        """Areas, volumes and the operators made of them: an `operators.tetrahedral.Tetrahedra`."""
+    def geometry(self) -> Tetrahedra:
+        """Areas, volumes and the operators made of them."""
         return Tetrahedra(self.vertices, self.tets)
 
     @cached_property
-    def faces(self) -> Any:
-        """The triangles between and around the tets: an `operators.tetrahedral.FaceTable`."""
+    def faces(self) -> FaceTable:
+        """The triangles between and around the tets."""
         return face_table(self.tets)
 
     @property
@@ -97,7 +102,8 @@ class TetMesh:
     @cached_property
     def tet_barycenters(self) -> NDArray[np.float64]:
         """(m, 3) centres."""
-        return self.vertices[self.tets].mean(axis=1)
+        result: NDArray[np.float64] = self.vertices[self.tets].mean(axis=1)
+        return result
 
     @cached_property
     def boundary(self) -> TriangleMesh:
@@ -113,11 +119,12 @@ class TetMesh:
         size = m + len(self.faces.vertices)
         ends = np.repeat(np.arange(m), 4), tet_faces + m
         graph = sparse.coo_matrix((np.ones(4 * m, dtype=np.int8), ends), shape=(size, size))
-        return sparse.csgraph.connected_components(graph, directed=False)[1][:m].astype(np.int64)
+        result: NDArray[np.int64] = sparse.csgraph.connected_components(graph, directed=False)[1][:m].astype(np.int64)
+        return result
 
     @cached_property
-    def search_tree(self) -> Any:
-        """A tree of the tets' boxes: an `operators.box_tree.BoxTree`."""
+    def search_tree(self) -> BoxTree:
+        """A tree of the tets' boxes."""
         corners = self.vertices[self.tets]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
@@ -132,7 +139,7 @@ class TetMesh:
         save_shape(self, path)
 
     @classmethod
-    def from_meshio(cls, mesh: Any) -> TetMesh:
+    def from_meshio(cls, mesh: meshio.Mesh) -> TetMesh:
         """The tets of a `meshio.Mesh`; cells of other kinds are left behind.
 
         Raises
@@ -146,21 +153,21 @@ class TetMesh:
             raise GeometryError(f"the mesh holds no tets, but {', '.join(kinds)}: convert it to tetrahedra first")
         return cls(mesh.points, np.concatenate(blocks))
 
-    def to_meshio(self, point_data: Any = None) -> Any:
+    def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
         """As a `meshio.Mesh`, with data at its vertices by name."""
         import meshio
 
         return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data)
 
     @classmethod
-    def from_pyvista(cls, grid: Any) -> TetMesh:
+    def from_pyvista(cls, grid: pyvista.UnstructuredGrid) -> TetMesh:
         """The tets of a `pyvista.UnstructuredGrid`; cells of other kinds are left behind."""
-        tets = grid.cells_dict.get(10)  # VTK_TETRA
-        if tets is None:
+        cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
+        if 10 not in cells:  # VTK_TETRA
             raise GeometryError(f"the grid holds no tets among its {grid.n_cells} cells: triangulate it first")
-        return cls(grid.points, tets.astype(np.int64))
+        return cls(grid.points, np.asarray(cells[10], dtype=np.int64))
 
-    def to_pyvista(self) -> Any:
+    def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As a `pyvista.UnstructuredGrid`."""
         import pyvista
 

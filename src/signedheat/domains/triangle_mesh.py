@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +14,12 @@ from .exchange import Exchangeable
 from .surface import Surface
 from .validation import element_ids, finite_rows
 
+if TYPE_CHECKING:
+    import trimesh  # noqa: F401  named in the base class
+
 
 @dataclass(frozen=True, eq=False)
-class TriangleMesh(Exchangeable, Surface):
+class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     """Triangles in space: manifold or not, orientable or not, closed or not.
 
     Parameters
@@ -75,13 +79,15 @@ class TriangleMesh(Exchangeable, Surface):
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
         """(m,) areas."""
-        return np.linalg.norm(self.face_area_vectors, axis=1)
+        areas: NDArray[np.float64] = np.linalg.norm(self.face_area_vectors, axis=1)
+        return areas
 
     @cached_property
     def edge_lengths(self) -> NDArray[np.float64]:
         """(e,) lengths, in the order of `edges`."""
         tail, head = self.edges.vertices.T
-        return np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
+        lengths: NDArray[np.float64] = np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
+        return lengths
 
     @property
     def triangulation(self) -> TriangleMesh:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from numbers import Real
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, SignedHeatError
 
+Scalar = TypeVar("Scalar", bound=np.generic)
 
-def frozen(array: NDArray[Any]) -> NDArray[Any]:
+
+def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
     """The array made contiguous and read-only, so that nothing derived from it can go stale."""
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
@@ -32,7 +34,7 @@ def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDA
     return frozen(array)
 
 
-def finite_number(value: Any, name: str, least: float = -np.inf) -> float:
+def finite_number(value: object, name: str, least: float = -np.inf) -> float:
     """`value` as a float, not NaN and not infinite, from `least` on.
 
     Examples
@@ -40,7 +42,7 @@ def finite_number(value: Any, name: str, least: float = -np.inf) -> float:
     >>> finite_number(2, "the distance", least=0)
     2.0
     """
-    if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:
+    if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
         raise SignedHeatError(f"{name} must be a number, not {value!r}")
     number = float(value)
     if not (np.isfinite(number) and number >= least):
@@ -49,7 +51,7 @@ def finite_number(value: Any, name: str, least: float = -np.inf) -> float:
     return number
 
 
-def positive_number(value: Any, name: str) -> float:
+def positive_number(value: object, name: str) -> float:
     """`value` as a float above zero, not NaN and not infinite."""
     number = finite_number(value, name)
     if number <= 0:

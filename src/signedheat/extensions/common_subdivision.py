@@ -113,7 +113,7 @@ def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
     return parts
 
 
-def positions(triangulation: IntrinsicTriangulation, places) -> NDArray[np.float64]:
+def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> NDArray[np.float64]:
     """(p, 3) where points of the triangulation lie in space."""
     found = triangulation.history.backward(places.faces, places.barycentric)
     return triangulation.in_space(*triangulation.refinement.pull_back(*found[:2]))

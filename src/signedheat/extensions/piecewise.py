@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from ..discretization import Diagnostics, discretize
+from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from ..domains.kinds import SurfaceDomain
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
@@ -27,10 +28,11 @@ from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in
 from ..linear import factorize
+from ..lowering.surface.discretization import SurfaceDiscretization
 from ..method import diffuse, normalize
 from ..operators.cotan import cotan_matrix
 from ..progress import Progress, Stopwatch
-from ..solver import SignedHeatSolver, as_list
+from ..solver import as_list
 from .intrinsic_piecewise import IntrinsicPiecewiseField
 from .jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 
@@ -40,7 +42,7 @@ SOURCE_WEIGHT = 100.0
 
 def piecewise_distance(
     domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation,
-    sources: Any,
+    sources: CurvesAndPoints,
     *,
     diffusion: float = 1.0,
     exact: bool = False,
@@ -109,15 +111,17 @@ def piecewise_distance(
         )
     if smoothing is not None:
         smoothing = positive_number(smoothing, "smoothing")
-    sources = as_list(sources)
+    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(sources)
     stopwatch = Stopwatch(progress, steps=4)
     with stopwatch("prepare"):
-        discretization = SignedHeatSolver(domain, diffusion).discretization
-        if not holds(discretization, sources):
-            domain = intrinsic_delaunay(domain.triangulation, keep=sources)
-            discretization = discretize(domain)
+        diffusion = positive_number(diffusion, "diffusion")
+        discretization = _lowered(domain)
+        if not holds(discretization, listed):
+            assert not isinstance(domain, IntrinsicTriangulation)  # which `holds` refuses
+            domain = intrinsic_delaunay(domain.triangulation, keep=listed)
+            discretization = _lowered(domain)
     with stopwatch("diffuse"):
-        discretization, groups = discretization.adapt(sources)
+        discretization, groups = discretization.adapt(listed)
         triangles = discretization.triangles
         source = discretization.lower(groups, diffusion)
         directions = normalize(discretization, diffuse(discretization, source))
@@ -131,7 +135,7 @@ def piecewise_distance(
         values = centered(triangles, pairs, slopes + solution.constants[:, None], parts)
     with stopwatch("finish"):
         if isinstance(domain, IntrinsicTriangulation):
-            phi = IntrinsicPiecewiseField(domain, domain, values, triangles)
+            phi: PiecewiseField = IntrinsicPiecewiseField(domain, domain, values, triangles)
         else:
             phi = PiecewiseField(domain, domain.triangulation, values, triangles)
         if smoothing is not None:
@@ -154,7 +158,13 @@ def piecewise_distance(
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
 
-def holds(discretization: Any, sources: Sequence[Any]) -> bool:
+def _lowered(domain: SurfaceDomain) -> SurfaceDiscretization:
+    lowered = discretize(domain)
+    assert isinstance(lowered, SurfaceDiscretization)
+    return lowered
+
+
+def holds(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> bool:
     """Whether all sources have edges to run along, and vertices to lie at, where they need them."""
     adapted = discretization.adapt(sources)[0].triangles
     fits = adapted.corner_vertices is discretization.triangles.corner_vertices
@@ -169,7 +179,8 @@ def holds(discretization: Any, sources: Sequence[Any]) -> bool:
 def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
     """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid."""
     centroid = triangles.corner_positions.mean(axis=1, keepdims=True)
-    return (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
+    result: NDArray[np.float64] = (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
+    return result
 
 
 def jump_problem(
@@ -202,7 +213,8 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> N
         along = part.edges >= 0
         touched[triangles.edges.vertices[part.edges[along]]] = True
         touched[triangles.corner_vertices[part.faces[~along]]] = True
-    return touched[triangles.edges.vertices].any(axis=1)
+    guarded: NDArray[np.bool_] = np.any(touched[triangles.edges.vertices], axis=1)
+    return guarded
 
 
 def centered(
@@ -232,7 +244,8 @@ def centered(
         here = here[np.argsort(height[here], kind="stable")]
         total = np.cumsum(weight[here])
         shift[k] = height[here[np.searchsorted(total, 0.5 * total[-1])]]
-    return values - shift[label][:, None]
+    result: NDArray[np.float64] = values - shift[label][:, None]
+    return result
 
 
 def smoothed(phi: PiecewiseField, width: float) -> NDArray[np.float64]:
@@ -259,4 +272,5 @@ def split_triangles(phi: PiecewiseField) -> tuple[IntrinsicMesh, NDArray[np.floa
     owner, vertices = phi.glued
     opened = replace(phi.triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=len(vertices))
     mean = np.bincount(owner, phi.values.ravel()) / np.bincount(owner)
-    return opened, mean, np.bincount(owner, np.repeat(phi.triangles.face_areas / 3.0, 3))
+    masses = np.asarray(np.bincount(owner, np.repeat(phi.triangles.face_areas / 3.0, 3)), dtype=np.float64)
+    return opened, mean, masses

@@ -5,13 +5,18 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import singledispatch
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..discretization import Diagnostics, Discretization
+from ..domains.grid import Dimension
 from ..errors import GeometryError, OutsideError
+from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
+from ..fields.to_field import Field
+from ..fields.vertex_field import VertexField
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
 from .sharpening_methods import Geodesic
@@ -31,8 +36,16 @@ class Method(Protocol):
         """New values at the unknowns from old ones, and notes for the diagnostics."""
 
 
-@singledispatch
-def sharpen(field: Any, **options: Any) -> Any:
+AnyField = TypeVar("AnyField", bound=VertexField | TetField)
+
+
+@overload
+def sharpen(field: GridField[Dimension], *, progress: Progress | None = None) -> GridField[Dimension]: ...
+@overload
+def sharpen(field: AnyField, method: Method | None = None, progress: Progress | None = None) -> AnyField: ...
+@overload
+def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
+def sharpen(field: Field, *arguments: Any, **options: Any) -> Field:
     """A field closer to the exact distance to its own zero set (Sec. 7.3).
 
     On grids: the distance of every node to the zero set of the field, second order, with the field's signs.
@@ -48,9 +61,10 @@ def sharpen(field: Any, **options: Any) -> Any:
     ----------
     field : GridField, VertexField or TetField
         What `signed_distance` or `SignedHeatSolver.distance` returned.
-    **options
-        `progress`, called as ``progress(fraction, step)``; what it raises cancels. On surfaces and tets also `method`:
-        `Geodesic` or `Convex`.
+    method : Geodesic or Convex, optional
+        On surfaces and tets only.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; what it raises cancels.
 
     Returns
     -------
@@ -76,11 +90,17 @@ def sharpen(field: Any, **options: Any) -> Any:
     >>> bool(np.abs(sharpened.values - (radius - 0.5)).max() < 0.01)
     True
     """
+    return sharpen_field(field, *arguments, **options)
+
+
+@singledispatch
+def sharpen_field(field: object, *arguments: object, **options: object) -> Field:
+    """Sharpening of each kind of field, registered where the kind is dealt with; `sharpen` is its public face."""
     raise TypeError(f"a {type(field).__name__} cannot be sharpened: pass a field that signed_distance returned")
 
 
 def sharpened(
-    field: Any,
+    field: VertexField | TetField,
     discretization: Discretization,
     elements: LinearElements,
     values: NDArray[np.float64],

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..discretization import Discretization
 from ..domains.validation import finite_number, positive_number
 from ..errors import OutsideError, SignedHeatError, SourceError
+from ..lowering.direct_integration import DirectIntegration
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
@@ -133,9 +134,11 @@ class Convex:
                 "other triangles: pass what SignedHeatSolver.distance returned for oriented curves or points, on "
                 "intrinsic_delaunay(mesh) if need be instead of with intrinsic=True"
             )
+        integration = discretization.integration
+        assert isinstance(integration, DirectIntegration)  # of surfaces and tets, whose elements these are
         sizes, total = elements.sizes, elements.sizes.sum()
         with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
-            factor = discretization.integration.anchored(source)
+            factor = integration.anchored(source)
             phi = np.nan_to_num(values)
             pull = elements.masses * np.sign(phi) / (np.ptp(phi) or 1.0)
             relaxed = slopes = elements.slopes(phi)
@@ -158,4 +161,5 @@ class Convex:
 
 def at_most_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rows longer than one cut to length one."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
+    result: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
+    return result

@@ -80,7 +80,7 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
     vertices, ids = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     leftover = Path("__tracked_surface.stl")  # fTetWild leaves it in the working directory
     keep = leftover.exists()
-    vertices, tets = pytetwild.tetrahedralize(
+    vertices, tets = pytetwild.tetrahedralize(  # type: ignore[attr-defined]
         np.concatenate([corners, vertices]),
         np.concatenate([faces, ids.reshape(-1, 3) + len(corners)]).astype(np.int32),
         edge_length_abs=spacing,

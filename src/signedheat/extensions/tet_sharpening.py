@@ -18,7 +18,8 @@ from ..geometry.tet_clipping import barycentric
 from ..geometry.visibility import tet_neighbors
 from ..lowering.tets.discretization import TetDiscretization
 from ..operators.linear_elements import LinearElements
-from .sharpening import Method, Progress, sharpen, sharpened
+from ..progress import Progress
+from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
 
 GRAZING = 1e-6
@@ -28,9 +29,10 @@ LARGEST_BEND = 1.0
 """The zero set is moved by at most this, over h, for the curvature of φ; creases know no curvature."""
 
 
-@sharpen.register
+@sharpen_field.register
 def _(field: TetField, method: Method | None = None, progress: Progress | None = None) -> TetField:
     lowered = discretize(field.mesh)
+    assert isinstance(lowered, TetDiscretization)
     elements = LinearElements.on_tets(field.mesh.geometry, lowered.unknowns, lowered.n_unknowns)
     new, diagnostics = sharpened(field, lowered, elements, field.values[lowered.vertices], method, progress)
     return replace(field, values=lowered.at_vertices(new), diagnostics=diagnostics)

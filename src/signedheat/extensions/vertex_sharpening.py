@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..discretization import discretize
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..errors import GeometryError
 from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import CurveSegments, interpolation_at
@@ -18,14 +19,15 @@ from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in, concatenated, incident_faces
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..operators.linear_elements import LinearElements
-from .sharpening import Method, Progress, sharpen, sharpened
+from ..progress import Progress
+from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
 
 HALO = 4.0
 """Distance from a source without sides, over h, within which zeros of φ may come of that source alone."""
 
 
-@sharpen.register
+@sharpen_field.register
 def _(field: VertexField, method: Method | None = None, progress: Progress | None = None) -> VertexField:
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
@@ -48,6 +50,7 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
         )
     if surface.restriction is None:
         return values.astype(np.float64)
+    assert not isinstance(field.domain, IntrinsicTriangulation)  # it has the vertices of its triangles
     values = field.domain.on_triangulation(field.values)
     if len(values) != n:
         values = np.full(n, np.nan)
@@ -101,7 +104,8 @@ def without_halos(
     own[line[(~beside[corners] | is_sided[corners]).any(axis=1)]] = False
     result = values.copy()
     result[corners[own[line]]] = np.nan
-    return result
+    answer: NDArray[np.float64] = result
+    return answer
 
 
 def distance_to_segments(

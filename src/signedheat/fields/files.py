@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from os import PathLike
-from typing import Any
 
 from ..slots import Slot
 
-save_field: Slot[[Any, str | PathLike[str]], None] = Slot("save_field")
+save_field: Slot[[object, str | PathLike[str]], None] = Slot("save_field")
 """Write a field of any kind in the format that the file's name ends with."""

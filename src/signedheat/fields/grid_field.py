@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import Any, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..discretization import Diagnostics
-from ..domains.grid import Grid
+from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
@@ -20,7 +20,7 @@ from .files import save_field
 
 
 @dataclass(frozen=True, eq=False)
-class GridField:
+class GridField(Generic[Dimension]):
     """Signed distance at the nodes of a grid.
 
     Parameters
@@ -51,7 +51,7 @@ class GridField:
     True
     """
 
-    grid: Grid
+    grid: Grid[Dimension]
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
 
@@ -104,6 +104,17 @@ class GridField:
         _, inside = self._into_box(points)
         return self._slopes(inside)
 
+    @property
+    def domain(self) -> Grid[Dimension]:
+        """The grid."""
+        return self.grid
+
+    @overload
+    def contour(self: GridField[Literal[3]], level: float = 0.0) -> TriangleMesh: ...
+    @overload
+    def contour(self: GridField[Literal[2]], level: float = 0.0) -> list[Polyline]: ...
+    @overload
+    def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]: ...
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]:
         """Where φ = level.
 
@@ -136,6 +147,12 @@ class GridField:
             return [Polyline(points, closed) for points, closed in lines]
         return TriangleMesh(*closed_surface(self.values, grid.origin, grid.spacing, level))
 
+    @overload
+    def offset(self: GridField[Literal[3]], distance: float) -> TriangleMesh: ...
+    @overload
+    def offset(self: GridField[Literal[2]], distance: float) -> list[Polyline]: ...
+    @overload
+    def offset(self, distance: float) -> TriangleMesh | list[Polyline]: ...
     def offset(self, distance: float) -> TriangleMesh | list[Polyline]:
         """What lies at a signed distance from the shape: `contour`, but refused where the grid is too small for it.
 
@@ -166,12 +183,11 @@ class GridField:
 
     def _wall_range(self) -> tuple[float, float]:
         """Least and greatest φ on the walls of the box."""
-        walls = [side for axis in range(self.grid.dimension) for side in self._walls(axis)]
-        values = np.concatenate([wall.ravel() for wall in walls])
+        values = np.concatenate([self._walls(axis).ravel() for axis in range(self.grid.dimension)])
         return float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
 
-    def _walls(self, axis: int) -> list[NDArray[np.float64]]:
-        return [self.values.take(end, axis=axis) for end in (0, -1)]
+    def _walls(self, axis: int) -> NDArray[np.float64]:
+        return self.values.take([0, -1], axis=axis)
 
     def _into_box(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         points = np.asarray(points, dtype=np.float64)
@@ -184,7 +200,8 @@ class GridField:
 
         index = ((points - self.grid.origin) / self.grid.spacing).T
         if self._known is None:
-            return map_coordinates(self.values, index, order=1, mode="nearest")
+            result: NDArray[np.float64] = map_coordinates(self.values, index, order=1, mode="nearest")
+            return result
         sums = map_coordinates(np.where(self._known, self.values, 0.0), index, order=1, mode="nearest")
         weights = map_coordinates(self._known.astype(np.float64), index, order=1, mode="nearest")
         return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from ..discretization import Diagnostics
-from ..domains.curves import SurfacePoints
+from ..domains.curves import Curve, SurfacePoints
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
@@ -79,14 +81,19 @@ class PiecewiseField:
         What happened on the way; see `signedheat.piecewise_distance`.
     """
 
-    domain: Any
-    surface: Any
+    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation
+    surface: TriangleMesh | IntrinsicTriangulation
     values: NDArray[np.float64]
     triangles: IntrinsicMesh = field(repr=False)
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
 
+    def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
+        """(n, 3) ∇φ in the triangles that points lie in; see `__call__`."""
+        places = locate_points(self.triangles, points.faces, points.barycentric)
+        return self.face_gradients[places.faces]
+
     @property
-    def gradient(self) -> NDArray[np.float64]:
+    def face_gradients(self) -> NDArray[np.float64]:
         """(m, 3) slope of φ in each triangle, in space."""
         a, b, c = (self.surface.vertices[self.surface.faces[:, k]] for k in range(3))
         first, second = b - a, c - a
@@ -96,7 +103,8 @@ class PiecewiseField:
         area = np.where(area > 0, area, np.inf)
         along_first = (g * rise_first - f * rise_second) / area
         along_second = (e * rise_second - f * rise_first) / area
-        return along_first[:, None] * first + along_second[:, None] * second
+        result: NDArray[np.float64] = along_first[:, None] * first + along_second[:, None] * second
+        return result
 
     def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
         """φ at points of the surface: on an edge or at a vertex, as seen from the face through which it is given.
@@ -107,7 +115,8 @@ class PiecewiseField:
             If a point names a face that does not exist.
         """
         places = locate_points(self.triangles, points.faces, points.barycentric)
-        return (self.values[places.faces] * places.barycentric).sum(axis=1)
+        result: NDArray[np.float64] = (self.values[places.faces] * places.barycentric).sum(axis=1)
+        return result
 
     @cached_property
     def jumps(self) -> NDArray[np.float64]:
@@ -159,7 +168,7 @@ class PiecewiseField:
             lines.append(Cut(vertices, self.surface.vertices[vertices], jumps, lengths[edges[chain]]))
         return sorted(lines, key=lambda line: -line.length)
 
-    def split(self) -> VertexField:
+    def split(self) -> VertexField[TriangleMesh | PolygonMesh]:
         """The same field on a mesh whose vertices are doubled along the cut, for viewers and for contours.
 
         Away from the cut, corners that meet take their mean. Faces keep their numbers.
@@ -181,7 +190,7 @@ class PiecewiseField:
         _, first = np.unique(owner, return_index=True)
         return owner, self.surface.faces.ravel()[first]
 
-    def contour(self, level: float = 0.0) -> list[Any]:
+    def contour(self, level: float = 0.0) -> list[Curve]:
         """The lines φ = level, as curves on the surface with higher values on their left; they end at the cut."""
         return self.split().contour(level)
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import Diagnostics
+from ..discretization import Diagnostics, SourceTerm
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
@@ -57,7 +56,7 @@ class TetField:
     mesh: TetMesh
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
-    source: Any = field(default=None, repr=False)
+    source: SourceTerm | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float64)
@@ -95,7 +94,8 @@ class TetField:
         if len(outside):
             slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
             values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
-        return values if points.ndim == 2 else values[0]
+        result: NDArray[np.float64] = values if points.ndim == 2 else values[0]
+        return result
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """∇φ at points in space: volume-weighted means at the vertices, interpolated.
@@ -113,7 +113,8 @@ class TetField:
             Gradients; of length about 1, since φ is a distance.
         """
         corners, weights, _ = self._place(_checked(points).reshape(-1, 3))
-        return np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
+        result: NDArray[np.float64] = np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
+        return result
 
     @property
     def tet_gradients(self) -> NDArray[np.float64]:
@@ -179,11 +180,11 @@ class TetField:
         return np.where(total[:, None] > 0, sums / np.where(total > 0, total, 1)[:, None], np.nan)
 
     @cached_property
-    def _planes(self) -> Any:
+    def _planes(self) -> Planes:
         return Planes.of(self.mesh)
 
     @cached_property
-    def _wall_tree(self) -> Any:
+    def _wall_tree(self) -> BoxTree:
         corners = self.mesh.vertices[self.mesh.boundary.faces]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 

@@ -23,11 +23,12 @@ from .grid_field import GridField
 from .tet_field import TetField
 from .vertex_field import VertexField
 
+Field = GridField | VertexField | TetField
+"""What a solver returns."""
+
 
 @singledispatch
-def to_field(
-    discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics
-) -> GridField | VertexField | TetField:
+def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> Field:
     """The field whose values a discretisation found, with what it has to tell added to the diagnostics."""
     raise TypeError(f"no field is known for {type(discretization).__name__}")
 

@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Generic, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import Diagnostics
+from ..discretization import Diagnostics, SourceTerm
 from ..domains.curves import Curve, SurfacePoints
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..domains.kinds import EmbeddedSurface, SurfaceDomain
 from ..domains.projection import closest_points
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_rows
 from ..errors import OutsideError
 from .files import save_field
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Surface = TypeVar("Surface", bound=SurfaceDomain, default=SurfaceDomain, covariant=True)
+else:
+    from typing import TypeVar
+
+    Surface = TypeVar("Surface", bound=SurfaceDomain, covariant=True)
+
+Embedded = TypeVar("Embedded", bound=EmbeddedSurface)
+
 
 @dataclass(frozen=True, eq=False)
-class VertexField:
+class VertexField(Generic[Surface]):
     """A scalar at every vertex of a surface.
 
     Attributes
@@ -47,10 +60,10 @@ class VertexField:
     [Curve(3 points, open, oriented)]
     """
 
-    domain: Any
+    domain: Surface
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
-    source: Any = field(default=None, repr=False)
+    source: SourceTerm | None = field(default=None, repr=False)
 
     def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
         """φ at points of the surface, linear between vertices.
@@ -65,7 +78,8 @@ class VertexField:
         (n,) float
         """
         mesh, values, faces, weights = self._at(points)
-        return np.einsum("ik,ik->i", weights, values[mesh.faces[faces]])
+        result: NDArray[np.float64] = np.einsum("ik,ik->i", weights, values[mesh.faces[faces]])
+        return result
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
         """(n, 3) ∇φ in the faces that points lie in; see `__call__`."""
@@ -78,7 +92,7 @@ class VertexField:
 
         Degenerate faces have no gradient: theirs is zero.
         """
-        field = self.restrict()
+        field = self._embedded
         mesh = field.domain.triangulation
         rise = field.domain.on_triangulation(field.values)[mesh.faces]
         corners = mesh.vertices[mesh.faces]
@@ -87,7 +101,8 @@ class VertexField:
         square = np.einsum("ij,ij->i", doubled, doubled)
         turned = np.cross(doubled[:, None], opposite)
         sums = np.einsum("ik,ikj->ij", rise, turned)
-        return sums / np.where(square > 0, square, np.inf)[:, None]
+        result: NDArray[np.float64] = sums / np.where(square > 0, square, np.inf)[:, None]
+        return result
 
     def contour(self, level: float = 0.0) -> list[Curve]:
         """Where φ takes a value.
@@ -107,14 +122,15 @@ class VertexField:
         OutsideError
             If φ takes the value nowhere.
         """
-        field = self.restrict()
+        field = self._embedded
         known = field.values[np.isfinite(field.values)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
         if not low <= level <= high:
             raise OutsideError(
                 f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}; choose a level between"
             )
-        return field.domain.level_set(field.values, level)
+        result: list[Curve] = field.domain.level_set(field.values, level)
+        return result
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the surface with φ at its vertices; the extension says the format.
@@ -132,17 +148,27 @@ class VertexField:
         FileFormatError
             If the format is unknown or the file cannot be written.
         """
-        save_field(self.restrict(), path)
+        save_field(self._embedded, path)
 
-    def restrict(self) -> VertexField:
+    @overload
+    def restrict(self: VertexField[IntrinsicTriangulation]) -> VertexField[TriangleMesh]: ...
+    @overload
+    def restrict(self: VertexField[Embedded]) -> VertexField[Embedded]: ...
+    def restrict(self) -> VertexField[EmbeddedSurface]:
         """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself."""
-        mesh = getattr(self.domain, "mesh", self.domain)
-        return self if mesh is self.domain else replace(self, domain=mesh, values=self.values[: mesh.n_vertices])
+        return self._embedded
+
+    @property
+    def _embedded(self) -> VertexField[EmbeddedSurface]:
+        if isinstance(self.domain, IntrinsicTriangulation):
+            mesh = self.domain.mesh
+            return VertexField(mesh, self.values[: mesh.n_vertices], self.diagnostics, self.source)
+        return cast("VertexField[EmbeddedSurface]", self)
 
     def _at(
         self, points: Curve | SurfacePoints | ArrayLike
     ) -> tuple[TriangleMesh, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-        field = self.restrict()
+        field = self._embedded
         mesh = field.domain.triangulation
         values = field.domain.on_triangulation(field.values)
         if isinstance(points, (Curve, SurfacePoints)):

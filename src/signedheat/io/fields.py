@@ -17,6 +17,7 @@ from ..errors import FileFormatError, GeometryError
 from ..fields.files import save_field as save_any_field
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
+from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
@@ -34,13 +35,15 @@ Parts = tuple[Any, ...]
 
 
 @save_any_field.provide
-def _(field: GridField | TetField | VertexField, path: PathLike) -> None:
+def _(field: object, path: PathLike) -> None:
     if isinstance(field, GridField):
         save_field(field, path)
     elif isinstance(field, TetField):
         save_tet_field(field, path)
-    else:
+    elif isinstance(field, VertexField):
         save_vertex_field(field, path)
+    else:
+        raise FileFormatError(f"{path}: a {type(field).__name__} is no field: pass what a solver returned")
 
 
 def save_field(field: GridField, path: PathLike) -> None:
@@ -89,7 +92,7 @@ def ensure_field_writable(path: PathLike) -> None:
         _openvdb(path)
 
 
-def load_field(path: PathLike) -> GridField | TetField | VertexField:
+def load_field(path: PathLike) -> Field:
     """Read a field that `save_field` wrote, exactly as it was: values and transform.
 
     Parameters
@@ -139,6 +142,7 @@ def _description(grid: Grid) -> dict[str, Any]:
 
 
 def _write_npz(field: GridField, path: Path) -> None:
+    mask: dict[str, Any] = {} if field.grid.mask is None else {"mask": field.grid.mask}
     with path.open("wb") as file:
         np.savez(
             file,
@@ -146,7 +150,7 @@ def _write_npz(field: GridField, path: Path) -> None:
             origin=field.grid.origin,
             spacing=field.grid.spacing,
             convention=np.array(CONVENTION),
-            **({} if field.grid.mask is None else {"mask": field.grid.mask}),
+            **mask,
         )
 
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import assemble, face_lists, points_of, refuse
+from .elements import SurfaceShape, assemble, face_lists, points_of, refuse
 from .files import PathLike, numbers, text
 
 
-def read_obj(path: PathLike) -> Any:
+def read_obj(path: PathLike) -> SurfaceShape:
     """The faces of an OBJ file, or its points where it has none; texture and faces' normals play no part."""
     lines = _lines_by_keyword(path)
     vertices = _coordinates(lines.get("v", []), path, "vertices")
@@ -37,7 +36,7 @@ def read_obj_lines(path: PathLike) -> tuple[NDArray[np.float64], list[NDArray[np
     return vertices, np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else []
 
 
-def write_obj(shape: Any, path: PathLike) -> bytes:
+def write_obj(shape: SurfaceShape, path: PathLike) -> bytes:
     """OBJ text; points become ``v`` lines, and ``vn`` lines where they have normals."""
     rows = ["v {!r} {!r} {!r}".format(*p) for p in points_of(shape).tolist()]
     if isinstance(shape, PointCloud) and shape.normals is not None:
@@ -46,7 +45,7 @@ def write_obj(shape: Any, path: PathLike) -> bytes:
     return ("\n".join(rows) + "\n").encode()
 
 
-def write_pc(shape: Any, path: PathLike) -> bytes:
+def write_pc(shape: SurfaceShape, path: PathLike) -> bytes:
     """Oriented points, as OBJ text."""
     if not isinstance(shape, PointCloud):
         raise refuse(shape, path, "points", ".obj or .ply")

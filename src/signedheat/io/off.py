@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import assemble, face_lists, points_of
+from .elements import SurfaceShape, assemble, face_lists, points_of
 from .files import PathLike, numbers, text
 
 
-def read_off(path: PathLike) -> Any:
+def read_off(path: PathLike) -> SurfaceShape:
     """The faces of an OFF file (also COFF, NOFF, STOFF and their like), or its points where it has none."""
     rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].split())]
     kind = rows[0][0].upper() if rows else ""
@@ -59,12 +58,12 @@ def corner_count(word: str) -> int:
     return int(word) if word.isdigit() else 0
 
 
-def write_off(shape: Any, path: PathLike) -> bytes:
+def write_off(shape: SurfaceShape, path: PathLike) -> bytes:
     """OFF text; oriented points as NOFF."""
     points, faces = points_of(shape), face_lists(shape)
-    oriented = isinstance(shape, PointCloud) and shape.normals is not None
-    columns = np.hstack([points, shape.normals]) if oriented else points
-    rows = ["NOFF" if oriented else "OFF", f"{len(points)} {len(faces)} 0"]
+    normals = shape.normals if isinstance(shape, PointCloud) else None
+    columns = points if normals is None else np.hstack([points, normals])
+    rows = ["OFF" if normals is None else "NOFF", f"{len(points)} {len(faces)} 0"]
     rows += [" ".join(map(repr, row)) for row in columns.tolist()]
     rows += [" ".join(map(str, [len(face), *face])) for face in faces]
     return ("\n".join(rows) + "\n").encode()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import assemble, faces_of, points_of
+from .elements import SurfaceShape, assemble, faces_of, points_of
 from .files import PathLike, contents, numbers
 
 _TYPES = {
@@ -38,7 +38,7 @@ class _Element:
     properties: dict[str, str | tuple[str, str]] = field(default_factory=dict)
 
 
-def read_ply(path: PathLike) -> Any:
+def read_ply(path: PathLike) -> SurfaceShape:
     """The faces of a PLY file, strips unrolled; or its points, with ``nx ny nz`` and ``area`` where they are given."""
     data = contents(path)
     form, elements, body = _header(data, path)
@@ -59,7 +59,7 @@ def read_ply(path: PathLike) -> Any:
     return PointCloud(vertices, normals, vertex.get("area"))
 
 
-def write_ply(shape: Any, path: PathLike) -> bytes:
+def write_ply(shape: SurfaceShape, path: PathLike) -> bytes:
     """Binary PLY in double precision."""
     names, columns = ["x", "y", "z"], [points_of(shape)]
     if isinstance(shape, PointCloud) and shape.normals is not None:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
-from .elements import refuse
+from .elements import SurfaceShape, refuse
 from .files import PathLike, contents, numbers
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -37,7 +35,7 @@ def read_stl(path: PathLike) -> TriangleMesh:
     return _indexed(corners.reshape(-1, 3))
 
 
-def write_stl(shape: Any, path: PathLike) -> bytes:
+def write_stl(shape: SurfaceShape, path: PathLike) -> bytes:
     """Binary STL, in single precision."""
     if not isinstance(shape, TriangleMesh):
         kinds = ".ply or .xyz" if isinstance(shape, PointCloud) else ".obj, .ply, .off or .vtp"
@@ -48,7 +46,8 @@ def write_stl(shape: Any, path: PathLike) -> bytes:
         raise FileFormatError(f"{path}: coordinates are too large for the single precision of STL: save it as .ply")
     lengths = np.maximum(2 * shape.face_areas, np.finfo(float).tiny)
     facets["normal"] = 2 * shape.face_area_vectors / lengths[:, None]
-    return b"signedheat".ljust(80) + np.uint32(shape.n_faces).astype("<u4").tobytes() + facets.tobytes()
+    result: bytes = b"signedheat".ljust(80) + np.uint32(shape.n_faces).astype("<u4").tobytes() + facets.tobytes()
+    return result
 
 
 def _text_corners(data: bytes, path: PathLike) -> NDArray[np.float64]:

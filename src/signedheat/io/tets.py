@@ -32,7 +32,7 @@ MODULES = {
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 
 
-def read_tets(path: PathLike) -> Any:
+def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     """Read a `TetMesh`; or, from a file without tets, the surface that it holds.
 
     Raises

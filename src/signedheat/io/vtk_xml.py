@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import assemble, faces_of, points_of
+from .elements import SurfaceShape, assemble, faces_of, points_of
 from .files import PathLike, contents, numbers
 
 _TYPES = {
@@ -61,8 +61,13 @@ def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray
     """Values (first scalar array), origin and spacing of image data."""
     root, arrays = _parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
-    extent = numbers(image.get("WholeExtent", "").split(), path, "extent", int)
-    if piece is None or len(extent) != 6 or piece.get("Extent", "").split() != image.get("WholeExtent", "").split():
+    extent = numbers(image.get("WholeExtent", "").split() if image is not None else [], path, "extent", int)
+    if (
+        image is None
+        or piece is None
+        or len(extent) != 6
+        or piece.get("Extent", "").split() != image.get("WholeExtent", "").split()
+    ):
         raise FileFormatError(f"{path}: the image is not in one piece: write it anew as a single .vti file")
     direction = image.get("Direction", "1 0 0 0 1 0 0 0 1")
     if numbers(direction.split(), path, "direction").tolist() != np.eye(3).ravel().tolist():
@@ -83,7 +88,7 @@ def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray
     return values.reshape(shape[:dimension], order="F"), origin[:dimension], spacing[:dimension]
 
 
-def write_vtp(shape: Any, path: PathLike) -> bytes:
+def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:
     """Polygons, or points with their normals as point data."""
     points, (corners, counts) = points_of(shape), faces_of(shape)
     writer = _Writer()
@@ -105,7 +110,7 @@ def write_vtp(shape: Any, path: PathLike) -> bytes:
     return writer.file("PolyData", f"<PolyData>{piece}</PolyData>")
 
 
-def read_vtp(path: PathLike) -> Any:
+def read_vtp(path: PathLike) -> SurfaceShape:
     """The polygons of all pieces, or the points where there is no polygon."""
     root, arrays = _parse(path, "PolyData")
     points, corners, counts, normals, areas, n_points = [], [], [], [], [], 0

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import refuse
+from .elements import SurfaceShape, refuse
 from .files import PathLike, numbers, text
 
 
@@ -29,7 +27,7 @@ def read_xyz(path: PathLike) -> PointCloud:
     return PointCloud(table[:, :3], table[:, 3:] if columns == 6 else None)
 
 
-def write_xyz(shape: Any, path: PathLike) -> bytes:
+def write_xyz(shape: SurfaceShape, path: PathLike) -> bytes:
     """A line for each point."""
     if not isinstance(shape, PointCloud):
         raise refuse(shape, path, "points", ".obj or .ply")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -54,13 +55,13 @@ class SurfaceDiscretization:
     restriction: NDArray[np.int64] | None = None
     transfer: Callable[[Any], Any] | None = None
     positions: NDArray[np.float64] | None = None
-    spacing: float | None = None
+    spacing: float = math.nan
     notes: Mapping[str, Any] = field(default_factory=dict)
     _heats: dict[float, VectorHeat] = field(default_factory=dict, repr=False)
     _turned: dict[bytes, SurfaceDiscretization] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        if self.spacing is None:
+        if math.isnan(self.spacing):
             lengths = np.empty(self.triangles.n_edges)
             lengths[self.triangles.edges.face_edges] = self.triangles.edge_lengths
             object.__setattr__(self, "spacing", 0.5 * float(lengths.mean()))
