@@ -14,7 +14,7 @@ from import_graph import circles, import_graph, upward_imports
 PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
-    {"errors", "parallel", "progress", "slots", "compiled"},
+    {"compiled", "errors", "memory", "parallel", "progress", "slots"},
     {"geometry"},
     {"linear"},
     {"operators"},
