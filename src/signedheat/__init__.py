@@ -1,7 +1,7 @@
 """Generalized signed distance to broken geometry, by the signed heat method."""
 
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
-from .discretization import Diagnostics
+from .diagnostics import Diagnostics
 from .domains.curves import Curve, SurfacePoints
 from .domains.digital_surface import DigitalSurface
 from .domains.grid import Grid

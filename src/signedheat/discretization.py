@@ -6,8 +6,8 @@ The method (`method.py`) runs once, on discretisations, and never learns what th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any, Protocol
 
@@ -107,28 +107,6 @@ class Levels:
 
     values: NDArray[np.float64]
     groups: NDArray[np.int64] | None = None
-
-
-@dataclass(frozen=True)
-class Diagnostics:
-    """What happened on the way to a field.
-
-    Attributes
-    ----------
-    timings : mapping of str to float
-        Seconds per step.
-    time : float
-        Diffusion time t, in squared units of length.
-    unreached : (k,) int
-        Unknowns to which no source is connected; φ is NaN there.
-    notes : mapping of str to object
-        Residuals, what was repaired, subdivided or cured: named by the step that met it.
-    """
-
-    timings: Mapping[str, float] = field(default_factory=dict)
-    time: float = float("nan")
-    unreached: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    notes: Mapping[str, Any] = field(default_factory=dict)
 
 
 @singledispatch

@@ -10,7 +10,8 @@ from operator import itemgetter
 from typing import Generic, Literal, TypeVar, overload
 
 from .constraints import Constraint, ZeroSet
-from .discretization import Adaptable, Diagnostics, discretize
+from .diagnostics import Diagnostics
+from .discretization import Adaptable, discretize
 from .domains.curves import CurvesAndPoints
 from .domains.grid import Dimension, Grid
 from .domains.intrinsic_triangulation import triangle_mesh

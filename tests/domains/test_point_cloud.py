@@ -6,6 +6,7 @@ from scipy.spatial import Delaunay
 
 import signedheat as sh
 from shapes import domain_cases as cases
+from signedheat.diagnostics import PointsLeftOut
 from signedheat.geometry.hole_filling import hole_fillings
 from signedheat.geometry.local_triangulations import local_triangulations
 
@@ -165,7 +166,7 @@ def test_points_that_coincide_get_the_same_distance_as_without_them():
     order = np.concatenate([np.arange(len(points)), np.repeat(np.arange(0, 200), 40)])
     double = sh.PointCloud(points[order])
     field = sh.SignedHeatSolver(double).distance(double.path(len(points) + 40 * ids[:5]))
-    assert field.diagnostics.notes["duplicate points"] == 8000
+    assert field.diagnostics.note(PointsLeftOut).duplicate_points == 8000
     again = sh.SignedHeatSolver(double).distance(double.path(ids, closed=True)).values
     assert again == pytest.approx(phi[order], abs=1e-9)
 
@@ -178,7 +179,9 @@ def test_outliers_get_no_distance_and_disturb_no_one():
         field = sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True))
     assert np.isnan(field.values[-3:]).all()
     assert cases.error(field.values[:-3], exact) < 2e-3
-    assert field.diagnostics.notes["points without triangles"].tolist() == [len(points) + k for k in range(3)]
+    assert field.diagnostics.note(PointsLeftOut).points_without_triangles.tolist() == [
+        len(points) + k for k in range(3)
+    ]
 
 
 def test_a_mobius_strip_of_points_is_like_one_of_triangles():

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import sharpen
+from ..diagnostics import SampledSource
 from ..domains.grid import Grid
 from ..errors import SignedHeatError
 from ..fields.grid_field import GridField
@@ -108,7 +109,8 @@ def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
 
 def hint(field: GridField) -> str:
     """A further line on sources that may have been given twice."""
-    cancelled = field.diagnostics.notes.get("area that cancels", 0.0)
+    note = field.diagnostics.note(SampledSource)
+    cancelled = note.area_cancelled if note else 0.0
     if cancelled < MOST:
         return ""
     return (
@@ -120,12 +122,13 @@ def hint(field: GridField) -> str:
 def describe(field: Any) -> dict[str, Any]:
     """A field in numbers, for ``--json``."""
     if isinstance(field, GridField):
+        note = field.diagnostics.note(SampledSource)
         where = {
             "origin": field.grid.origin.tolist(),
             "spacing": field.grid.spacing.tolist(),
             "shape": list(field.grid.shape),
-            "area_outside": field.diagnostics.notes.get("area outside the grid", 0.0),
-            "area_cancelled": field.diagnostics.notes.get("area that cancels", 0.0),
+            "area_outside": note.area_outside if note else 0.0,
+            "area_cancelled": note.area_cancelled if note else 0.0,
         }
     else:
         where = {"n_vertices": len(field.values)}

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..constraints import LevelValues, ZeroSet
+from ..diagnostics import LargeAngles
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
+from ..fields.vertex_field import VertexField
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..solver import SignedHeatSolver
@@ -76,10 +78,10 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     return surface, curves, field
 
 
-def advice(field: Any) -> str:
+def advice(field: VertexField) -> str:
     """What would make the result more accurate."""
-    share = field.diagnostics.notes.get("large angles", 0.0)
-    return f"; {share:.0%} of the angles exceed 120°: --intrinsic is more accurate" if share else ""
+    note = field.diagnostics.note(LargeAngles)
+    return f"; {note}: --intrinsic is more accurate" if note else ""
 
 
 def run(parser: Parser, arguments: Namespace) -> Summary:

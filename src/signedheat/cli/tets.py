@@ -53,15 +53,10 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         "output": arguments.output,
         **describe(field),
         "n_tets": mesh.n_tets,
-        "notes": {name: str(note) for name, note in field.diagnostics.notes.items()},
+        "notes": {name: v for note in field.diagnostics.notes for name, v in note.as_dict().items()},
     }
     text = f"{arguments.output}: {mesh.n_tets} tets, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
-    notes = field.diagnostics.notes.items()
-    told = (
-        f"{name.replace('_', ' ')}: {note:.3g}" if isinstance(note, float) else f"{name}: {note}"
-        for name, note in notes
-    )
-    return summary, "; ".join([text, *told])
+    return summary, "; ".join([text, *map(str, field.diagnostics.notes)])
 
 
 def on_grid(field: TetField) -> GridField:

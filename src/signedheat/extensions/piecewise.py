@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..discretization import Diagnostics, discretize
+from ..diagnostics import Diagnostics, Jumps
+from ..discretization import discretize
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ..domains.kinds import SurfaceDomain
@@ -80,10 +81,8 @@ def piecewise_distance(
     Returns
     -------
     PiecewiseField
-        Its median over the source is zero. ``diagnostics.notes`` has `objective`, `bound` (none is smaller),
-        `gap` (relative difference of the two), `rounds`, `continuous` (whether there is no cut), `largest_jump`,
-        `cut_length`, and `integration_error`, the root mean square of ∇φ̄ − Y, φ̄ being φ averaged at the vertices of
-        `PiecewiseField.split`.
+        Its median over the source is zero. ``diagnostics.note(Jumps)`` tells the objective, how far it may be
+        from the least, and what the jumps are: see `diagnostics.Jumps`.
 
     Raises
     ------
@@ -96,10 +95,11 @@ def piecewise_distance(
 
     Examples
     --------
+    >>> from signedheat.diagnostics import Jumps
     >>> from signedheat.samples import torus
     >>> mesh = torus(n_around=48, n_across=24)
     >>> phi = piecewise_distance(mesh, mesh.path(range(24), closed=True))  # round the tube: bounds nothing
-    >>> len(phi.cut), phi.diagnostics.notes["gap"] < 0.002
+    >>> len(phi.cut), phi.diagnostics.note(Jumps).gap < 0.002
     (1, True)
     >>> bool(phi.cut[0].height > 4)  # nearly the length of the way round, 2π
     True
@@ -144,17 +144,17 @@ def piecewise_distance(
     unreached = np.flatnonzero(np.isnan(phi.values[:, 0]))
     if len(unreached):
         warn_user(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning)
-    notes = {
-        "objective": solution.objective,
-        "bound": solution.bound,
-        "gap": solution.gap,
-        "rounds": solution.rounds,
-        "continuous": not phi.is_cut.any(),
-        "largest_jump": float(np.nanmax(np.abs(phi.jumps), initial=0.0)),
-        "cut_length": sum(line.length for line in phi.cut),
-        "integration_error": error,
-        **discretization.notes,
-    }
+    jumps = Jumps(
+        objective=solution.objective,
+        bound=solution.bound,
+        gap=solution.gap,
+        rounds=solution.rounds,
+        continuous=not phi.is_cut.any(),
+        largest_jump=float(np.nanmax(np.abs(phi.jumps), initial=0.0)),
+        cut_length=float(sum(line.length for line in phi.cut)),
+        integration_error=error,
+    )
+    notes = (jumps, *discretization.notes)
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
 

@@ -10,7 +10,8 @@ from typing import Any, Protocol, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization import Diagnostics, Discretization
+from ..diagnostics import Diagnostics, Note, SlopeErrors
+from ..discretization import Discretization
 from ..domains.grid import Dimension
 from ..errors import GeometryError, OutsideError
 from ..fields.grid_field import GridField
@@ -32,7 +33,7 @@ class Method(Protocol):
         values: NDArray[np.float64],
         source: Any,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """New values at the unknowns from old ones, and notes for the diagnostics."""
 
 
@@ -68,8 +69,8 @@ def sharpen(field: Field, *arguments: Any, **options: Any) -> Field:
 
     Returns
     -------
-    The same kind of field. On surfaces and tets ``diagnostics.notes`` gains `slope_error_before` and
-    `slope_error_after`, the root mean square of ``|∇φ| − 1`` over the domain, and notes of the method.
+    The same kind of field. On surfaces and tets ``diagnostics`` gains a note `diagnostics.SlopeErrors`,
+    the root mean squares of ``|∇φ| − 1`` over the domain, and notes of the method.
 
     Raises
     ------
@@ -123,6 +124,6 @@ def sharpened(
     if progress is not None:
         progress(1.0, "done")
     old = field.diagnostics
-    errors = {"slope_error_before": elements.slope_error(values), "slope_error_after": elements.slope_error(new)}
+    errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new))
     timings = {**old.timings, "sharpen": time.perf_counter() - begin}
-    return new, replace(old, timings=timings, notes={**old.notes, **errors, **notes})
+    return new, replace(old, timings=timings).noting(errors, *notes)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..diagnostics import ConvexRounds, Note
 from ..discretization import Discretization
 from ..domains.validation import finite_number, positive_number
 from ..errors import OutsideError, SignedHeatError, SourceError
@@ -58,7 +59,7 @@ class Geodesic:
         values: NDArray[np.float64],
         source: Any,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """|φ| measured anew; parts without a zero set keep what they have."""
         distance, notes = run_cancellable(
             lambda: straight_distance(discretization, values, source, self.tolerance),
@@ -77,7 +78,7 @@ class Geodesic:
 @singledispatch
 def straight_distance(
     discretization: Any, values: NDArray[np.float64], source: Any, tolerance: float
-) -> tuple[NDArray[np.float64], dict[str, Any]]:
+) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Distance of every unknown from where values vanish, inf where that is not connected; and notes."""
     raise TypeError(f"there are no straight lines on a {type(discretization).__name__}")
 
@@ -123,7 +124,7 @@ class Convex:
         values: NDArray[np.float64],
         source: Any,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """The maximiser, from φ⁰ on."""
         from threadpoolctl import threadpool_limits
 
@@ -156,7 +157,7 @@ class Convex:
                 number += 1
                 if progress is not None:
                     progress(number / self.max_rounds, "sharpen")
-        return np.where(np.isnan(values), np.nan, phi), {"rounds": number, "residual": float(residual)}
+        return np.where(np.isnan(values), np.nan, phi), (ConvexRounds(number, float(residual)),)
 
 
 def at_most_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..diagnostics import GeodesicWindows, Note
 from ..discretization import discretize
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..errors import GeometryError
@@ -61,13 +62,13 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
 @straight_distance.register
 def _(
     surface: SurfaceDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
-) -> tuple[NDArray[np.float64], dict[str, Any]]:
+) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Along the faces, from the line on which values vanish and from sources without sides."""
     parts = getattr(source, "parts", ())
     unsided = [part for part in parts if not part.oriented]
     if not unsided:
         distance, windows = distance_to_zero_line(surface.triangles, values, tolerance)
-        return distance, {"windows": windows}
+        return distance, (GeodesicWindows(int(windows)),)
     # They run along edges of triangles of their own, whose first vertices are those of the surface.
     near, windows = distance_to_segments(source.triangles, unsided, tolerance)
     near = near[: len(values)]
@@ -78,7 +79,7 @@ def _(
         lines = without_halos(surface.triangles, values, near < HALO * surface.spacing, sided[sided < len(values)])
         distance, more = distance_to_zero_line(surface.triangles, lines, tolerance)
         near, windows = np.minimum(near, distance), windows + more
-    return near, {"windows": windows}
+    return near, (GeodesicWindows(int(windows)),)
 
 
 def without_halos(

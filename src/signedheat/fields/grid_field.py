@@ -10,7 +10,7 @@ from typing import Any, Generic, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import Diagnostics
+from ..diagnostics import Diagnostics
 from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh

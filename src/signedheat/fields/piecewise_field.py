@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..discretization import Diagnostics
+from ..diagnostics import Diagnostics
 from ..domains.curves import Curve, SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh

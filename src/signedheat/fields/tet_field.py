@@ -9,7 +9,8 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import Diagnostics, SourceTerm
+from ..diagnostics import Diagnostics
+from ..discretization import SourceTerm
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization import Diagnostics
+from ..diagnostics import Diagnostics, SampledSource, TetsTurned
 from ..errors import UnreachedWarning, warn_user
 from ..lowering.grid.discretization import GridDiscretization
 from ..lowering.grid.masked import MaskedGridDiscretization
@@ -37,8 +37,7 @@ def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diag
 def _(
     discretization: GridDiscretization, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics
 ) -> GridField:
-    notes = {**diagnostics.notes, **_sampled(source)}
-    return GridField(discretization.grid, values, replace(diagnostics, notes=notes))
+    return GridField(discretization.grid, values, diagnostics.noting(_sampled(source)))
 
 
 @to_field.register
@@ -59,8 +58,8 @@ def _(
             "distance there is NaN",
             UnreachedWarning,
         )
-    notes = {**diagnostics.notes, **_sampled(source.whole)}
-    return GridField(grid, everywhere.reshape(grid.shape), replace(diagnostics, unreached=unreached, notes=notes))
+    told = replace(diagnostics, unreached=unreached).noting(_sampled(source.whole))
+    return GridField(grid, everywhere.reshape(grid.shape), told)
 
 
 @to_field.register
@@ -81,8 +80,8 @@ def _(
             f"{unreached[0]}: distance there is NaN. Put a source on every part, or join the parts",
             UnreachedWarning,
         )
-    notes = {**diagnostics.notes, **discretization.notes}
-    return VertexField(discretization.domain, values, replace(diagnostics, unreached=unreached, notes=notes), source)
+    told = replace(diagnostics, unreached=unreached).noting(*discretization.notes)
+    return VertexField(discretization.domain, values, told, source)
 
 
 @to_field.register
@@ -98,15 +97,10 @@ def _(
             "any source through faces: the distance there is NaN",
             UnreachedWarning,
         )
-    notes = {**diagnostics.notes, **source.notes}
-    if len(mesh.reoriented):
-        notes["tets turned"] = len(mesh.reoriented)
-    return TetField(mesh, at_vertices, replace(diagnostics, unreached=unreached, notes=notes), source)
+    turned = (TetsTurned(len(mesh.reoriented)),) if len(mesh.reoriented) else ()
+    told = replace(diagnostics, unreached=unreached).noting(*source.notes, *turned)
+    return TetField(mesh, at_vertices, told, source)
 
 
-def _sampled(source: GridSource) -> dict[str, float]:
-    return {
-        "samples": len(source.weights),
-        "area outside the grid": source.samples.outside,
-        "area that cancels": source.samples.cancelled,
-    }
+def _sampled(source: GridSource) -> SampledSource:
+    return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)

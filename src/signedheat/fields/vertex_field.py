@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Generic, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import Diagnostics, SourceTerm
+from ..diagnostics import Diagnostics
+from ..discretization import SourceTerm
 from ..domains.curves import Curve, SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.kinds import EmbeddedSurface, SurfaceDomain

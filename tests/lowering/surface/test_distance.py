@@ -9,6 +9,7 @@ from scipy import sparse
 import signedheat as sh
 from shapes.surface_cases import book, flipped, sphere, square
 from shapes.surfaces import FlatGluing
+from signedheat.diagnostics import EdgesLengthened
 from signedheat.linear import available_backends, whole
 from signedheat.lowering.surface.discretization import SurfaceDiscretization
 from signedheat.method import diffuse, integrate, normalize
@@ -299,7 +300,7 @@ def test_degenerate_triangles_are_mollified(collapse):
         faces = np.concatenate([faces, [[a, a, b], [c, c, c]]])
     broken = sh.TriangleMesh(points, faces)
     field = sh.SignedHeatSolver(broken).distance(broken.level_set(points[:, 0], -0.6))
-    assert field.diagnostics.notes["added to edge lengths"] > 0
+    assert field.diagnostics.note(EdgesLengthened).added_to_edge_lengths > 0
     far = np.linalg.norm(points - points[c], axis=1) > 0.6
     np.testing.assert_allclose(field.values[far], points[far, 0] + 0.6, atol=0.06)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...diagnostics import EdgesLengthened, LargeAngles, Note, VerticesAdded
 from ...discretization import discretize
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
@@ -46,7 +47,7 @@ class SurfaceDiscretization:
         own: for curves whose normals are given. By default what the domain's triangulation says.
     spacing : float, optional
         h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
-    notes : mapping
+    notes : tuple of Note
         What was repaired in making the triangles; passed on to the diagnostics of every field.
     """
 
@@ -56,7 +57,7 @@ class SurfaceDiscretization:
     transfer: Callable[[Any], Any] | None = None
     positions: NDArray[np.float64] | None = None
     spacing: float = math.nan
-    notes: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
     _heats: dict[float, VectorHeat] = field(default_factory=dict, repr=False)
     _turned: dict[bytes, SurfaceDiscretization] = field(default_factory=dict, repr=False)
 
@@ -113,7 +114,7 @@ class SurfaceDiscretization:
             triangles=triangles,
             restriction=np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction,
             transfer=None,
-            notes={**self.notes, "vertices added for sources": added},
+            notes=(*self.notes, VerticesAdded(added)),
             _heats={},
             _turned={},
         )
@@ -166,8 +167,9 @@ def _(domain: TriangleMesh) -> SurfaceDiscretization:
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
     triangles = IntrinsicMesh.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)
-    notes = {"added to edge lengths": added, "large angles": large_angles(triangles)}
-    return SurfaceDiscretization(domain, triangles, notes={name: note for name, note in notes.items() if note})
+    share = large_angles(triangles)
+    notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))
+    return SurfaceDiscretization(domain, triangles, notes=notes)
 
 
 def large_angles(triangles: IntrinsicMesh) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...diagnostics import IntrinsicTriangles
 from ...discretization import discretize
 from ...domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ...domains.triangle_mesh import TriangleMesh
@@ -53,7 +54,7 @@ def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDis
         "domain": triangulation,
         "transfer": triangulation.transfer,
         "spacing": spacing(triangles),
-        "notes": {"intrinsic triangulation": triangulation.summary},
+        "notes": (IntrinsicTriangles(triangulation.summary),),
         **options,
     }
     return SurfaceDiscretization(triangles=triangles, **options)

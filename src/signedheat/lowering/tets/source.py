@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...diagnostics import Note, OutsideMesh
 from ...domains.tet_mesh import TetMesh
 from ...errors import SourceError
 from ...geometry.directions import unit
@@ -44,7 +45,7 @@ class TetSource:
         Area of each patch.
     components, owners : (s,) int
         Connected component, and source, that each patch lies on.
-    notes : mapping
+    notes : tuple of Note
         What of the sources was lost outside the mesh.
     """
 
@@ -57,7 +58,7 @@ class TetSource:
     weights: NDArray[np.float64]
     components: NDArray[np.int64]
     source_ids: NDArray[np.int64]
-    notes: Mapping[str, Any]
+    notes: tuple[Note, ...]
 
 
 def tet_source(
@@ -88,7 +89,7 @@ def tet_source(
     SourceError
         If a source is of another kind, lies outside the mesh, has no normals, or cancels itself.
     """
-    cuts, components, notes, n_components, n_unknowns = [], [], {}, 0, int(unknowns.max()) + 1
+    cuts, components, outside, n_components, n_unknowns = [], [], np.zeros(len(sources)), 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):
         elements = area_elements(source)
         if elements.corners.shape[2] != 3:
@@ -101,9 +102,7 @@ def tet_source(
                 f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}: move it into "
                 "the mesh, or check that both have the same units"
             )
-        outside = 1 - polygons.areas.sum() / elements.weights.sum()
-        if outside > 1e-9:
-            notes[f"source {number} outside the mesh"] = f"{100 * outside:.3g} % of its area, left out"
+        outside[number] = 1 - polygons.areas.sum() / elements.weights.sum()
         spacing = max(spacing, elements.spacing)
         cuts.append(polygons)
         components.append(elements.components[polygons.parents] + n_components)
@@ -112,6 +111,7 @@ def tet_source(
     loads = sum(_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts)
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
         raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
+    leaving = np.flatnonzero(outside > 1e-9)
     patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
     rows, bends, weights, members = zip(*patches, strict=True)
     return TetSource(
@@ -124,7 +124,7 @@ def tet_source(
         weights=np.concatenate(weights),
         components=np.unique(np.concatenate(members), return_inverse=True)[1],
         source_ids=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
-        notes=notes,
+        notes=(OutsideMesh(leaving, outside[leaving]),) if len(leaving) else (),
     )
 
 
