@@ -45,7 +45,8 @@ def draw_shape(
         points = shape.points[:: max(1, shape.n_points // MOST_POINTS)]
         pixels = Camera.around(points, direction, up).pixels(points)
         near = np.argsort(pixels[:, 2])
-        axes.scatter(*pixels[near, :2].T, s=2, c=pixels[near, 2], cmap="Blues", linewidths=0)
+        depth = pixels[near, 2]
+        axes.scatter(*pixels[near, :2].T, s=4, c=depth, cmap="Blues", vmin=depth[0] - np.ptp(depth), linewidths=0)
         axes.set_aspect("equal")
         return
     mesh = triangulated(shape)
