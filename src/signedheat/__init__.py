@@ -21,6 +21,7 @@ from .errors import (
     SignedHeatError,
     SourceError,
     UnreachedWarning,
+    UnsupportedTypeError,
 )
 from .extensions import grid_sharpening as _grid_sharpening  # noqa: F401  registers it
 from .extensions import tet_sharpening as _tet_sharpening  # noqa: F401  registers it
@@ -89,6 +90,7 @@ __all__ = [
     "TetMesh",
     "TriangleMesh",
     "UnreachedWarning",
+    "UnsupportedTypeError",
     "VertexField",
     "ZeroSet",
     "close_curves",

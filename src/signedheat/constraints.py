@@ -110,8 +110,9 @@ class LevelValues:
             index = source.components
         else:
             raise ConstraintError(
-                f"{len(self.values)} level values were given for {n_sources} sources with {n_components} connected "
-                "components in all: give one value for each source, or one for each component"
+                f"{len(self.values)} level values were given for {n_sources} sources with {n_components} "
+                "connected components in all",
+                remedy="give one value for each source, or one for each component",
             )
         return integration.fit(divergence, source, Levels(np.array(self.values)[index]))
 

@@ -14,6 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import UnsupportedTypeError
+
 
 class SourceTerm(Protocol):
     """Sources lowered to one discretisation."""
@@ -112,7 +114,7 @@ class Levels:
 @singledispatch
 def discretize(domain: Any, **options: Any) -> Discretization:
     """Lower a domain to its discretisation; each kind of domain registers its own way."""
-    raise TypeError(
-        f"{type(domain).__name__} is not a domain: use TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, "
-        "TetMesh or Grid"
+    raise UnsupportedTypeError(
+        f"{type(domain).__name__} is not a domain",
+        remedy="use TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid",
     )

@@ -18,7 +18,7 @@ from .domains.intrinsic_triangulation import triangle_mesh
 from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources
 from .domains.tet_mesh import TetMesh
 from .domains.validation import positive_number
-from .errors import SourceError
+from .errors import SourceError, UnsupportedTypeError
 from .fields.grid_field import GridField
 from .fields.tet_field import TetField
 from .fields.to_field import Field, to_field
@@ -204,9 +204,9 @@ def checked(constraint: Constraint | None) -> Constraint:
     if constraint is None:
         return ZeroSet()
     if isinstance(constraint, type) or not hasattr(constraint, "integrate"):
-        raise TypeError(
-            f"{constraint!r} is not a constraint: pass Free(), ZeroSet(), EachComponent(), LevelValues(values) or "
-            "Soft(weight)"
+        raise UnsupportedTypeError(
+            f"{constraint!r} is not a constraint",
+            remedy="pass Free(), ZeroSet(), EachComponent(), LevelValues(values) or Soft(weight)",
         )
     return constraint
 
@@ -215,7 +215,10 @@ def as_list(sources: One | Sequence[One]) -> list[One]:
     """One source or several, as a list."""
     listed: list[One] = list(sources) if isinstance(sources, Sequence) else [sources]
     if not listed:
-        raise SourceError("there is no source: pass at least one curve, point or shape")
+        raise SourceError(
+            "there is no source",
+            remedy="pass at least one curve, point or shape",
+        )
     return listed
 
 

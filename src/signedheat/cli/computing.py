@@ -31,9 +31,9 @@ def prefix_errors(path: Any) -> Iterator[None]:
     try:
         yield
     except SignedHeatError as error:
-        if str(error).startswith(str(path)):
+        if error.path is not None:
             raise
-        raise type(error)(f"{path}: {error}") from error
+        raise error.at(path) from error
 
 
 def check_grid_options(parser: Parser, arguments: Namespace) -> None:

@@ -41,7 +41,11 @@ def run(arguments: Namespace) -> Summary:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileFormatError(f"{folder}: cannot be made a folder ({error.strerror}): name another") from error
+        raise FileFormatError(
+            f"cannot be made a folder ({error.strerror})",
+            remedy="name another",
+            path=folder,
+        ) from error
     files = {name: folder / name for name in ("duck.stl", "distance.vti", "offset.stl", "picture.png")}
     for path in files.values():
         ensure_writable(path, {path.suffix}, "a file")

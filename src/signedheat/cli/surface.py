@@ -70,7 +70,10 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     """The surface, the curves, and the distance."""
     surface = read_surface(arguments.mesh)
     if arguments.intrinsic and not isinstance(surface, TriangleMesh):
-        raise SourceError(f"{arguments.mesh}: --intrinsic is for triangle meshes; this is a {type(surface).__name__}")
+        raise SourceError(
+            f"--intrinsic is for triangle meshes; this is a {type(surface).__name__}",
+            path=arguments.mesh,
+        )
     curves = read_curves(arguments.curves, surface)
     with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
         solver = SignedHeatSolver(surface, arguments.diffusion, progress, arguments.intrinsic)
@@ -119,7 +122,10 @@ def read_surface(path: str) -> Any:
     """A file with something that curves can lie on."""
     surface = read(path)
     if not hasattr(surface, "triangulation"):
-        raise SourceError(f"{path}: curves lie on meshes, points and voxels, and this is a {type(surface).__name__}")
+        raise SourceError(
+            f"curves lie on meshes, points and voxels, and this is a {type(surface).__name__}",
+            path=path,
+        )
     return surface
 
 

@@ -37,7 +37,10 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     shape = read(arguments.shape)
     mesh = read(given) if given else None
     if mesh is not None and not isinstance(mesh, TetMesh):
-        raise GeometryError(f"{given} holds no tets, but a {type(mesh).__name__}: use a .mesh, .msh, .vtu or .ele file")
+        raise GeometryError(
+            f"{given} holds no tets, but a {type(mesh).__name__}",
+            remedy="use a .mesh, .msh, .vtu or .ele file",
+        )
     with prefix_errors(arguments.shape):
         if mesh is None:
             mesh = tetrahedralize(shape, resolution=arguments.resolution or RESOLUTION, padding=arguments.padding)

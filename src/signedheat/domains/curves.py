@@ -69,7 +69,8 @@ class Curve:
         ids, weights = surface_points(faces, barycentric, "curve")
         if len(ids) < 2:
             raise SourceError(
-                f"a curve needs at least two points, not {len(ids)}: use SurfacePoints for isolated points"
+                f"a curve needs at least two points, not {len(ids)}",
+                remedy="use SurfacePoints for isolated points",
             )
         object.__setattr__(self, "faces", ids)
         object.__setattr__(self, "barycentric", weights)
@@ -134,7 +135,10 @@ class SurfacePoints:
     def __init__(self, faces: ArrayLike, barycentric: ArrayLike) -> None:
         ids, weights = surface_points(faces, barycentric, "point source")
         if not len(ids):
-            raise SourceError("there is no point: pass at least one")
+            raise SourceError(
+                "there is no point",
+                remedy="pass at least one",
+            )
         object.__setattr__(self, "faces", ids)
         object.__setattr__(self, "barycentric", weights)
 
@@ -170,7 +174,8 @@ def surface_points(
     if len(wrong):
         raise SourceError(
             f"point {wrong[0]} of a {name} has barycentric coordinates {weights[wrong[0]].tolist()}: "
-            "they must be at least 0 and add up to 1"
+            "they must be at least 0 and add up to 1",
+            element=f"point {wrong[0]}",
         )
     return frozen(ids.astype(np.int64)), weights
 
@@ -180,4 +185,4 @@ def finite(values: ArrayLike, name: str) -> NDArray[np.float64]:
     try:
         return finite_rows(values, name, 3)
     except GeometryError as error:
-        raise SourceError(str(error)) from None
+        raise SourceError(error.cause, remedy=error.remedy, element=error.element) from None

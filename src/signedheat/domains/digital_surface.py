@@ -70,8 +70,8 @@ class DigitalSurface(Surface):
             raise GeometryError(f"a volume must be an array with 3 axes, not {array.ndim}")
         if array.dtype != bool and not (array.size and np.isin(array, (0, 1)).all()):
             raise GeometryError(
-                f"a volume must be boolean, or 0 and 1, not {array.dtype} with other values: "
-                "threshold it first, for instance volume > 0.5"
+                f"a volume must be boolean, or 0 and 1, not {array.dtype} with other values",
+                remedy="threshold it first, for instance volume > 0.5",
             )
         solid = array.astype(bool)
         if not solid.any():

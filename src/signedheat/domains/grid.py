@@ -136,7 +136,10 @@ class Grid(Generic[Dimension]):
             raise GeometryError(f"the padding must be a length, zero or more, not {padding}")
         room = 0.2 * longest if padding is None else float(padding)
         if not longest + 2 * room > 0:
-            raise GeometryError("the shape is a single point: give a padding or a grid")
+            raise GeometryError(
+                "the shape is a single point",
+                remedy="give a padding or a grid",
+            )
         if spacing is None:
             if int(resolution) != resolution or resolution < 2:
                 raise GeometryError(f"the resolution must be a whole number of at least 2 nodes, not {resolution}")

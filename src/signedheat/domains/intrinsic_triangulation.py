@@ -155,7 +155,10 @@ class IntrinsicTriangulation:
         faces = np.asarray(faces, dtype=np.int64)
         wrong = np.flatnonzero((faces < 0) | (faces >= self.mesh.n_faces))
         if len(wrong):
-            raise GeometryError(f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces")
+            raise GeometryError(
+                f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces",
+                element=f"point {wrong[0]}",
+            )
         below = self.refinement.push_forward(faces, barycentric, np.zeros((len(faces), 0, 3)))
         found, weights, _ = self.history.forward(below[0], np.maximum(below[1], 0.0))
         return found, weights / weights.sum(axis=1, keepdims=True)

@@ -77,7 +77,11 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             _same_length(directions, positions, "normals")
             lengths = np.abs(directions).max(axis=1)
             if not lengths.all():
-                raise GeometryError(f"the normal of point {int(np.argmin(lengths))} is zero: remove it or estimate it")
+                raise GeometryError(
+                    f"the normal of point {int(np.argmin(lengths))} is zero",
+                    remedy="remove it or estimate it",
+                    element=f"point {int(np.argmin(lengths))}",
+                )
             directions = directions / lengths[:, None]
             directions = frozen(directions / np.linalg.norm(directions, axis=1)[:, None])
         if areas is not None:

@@ -57,7 +57,10 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
             raise GeometryError("there are no polygons: the shape is empty")
         if (counts < 3).any():
             first = int(np.argmax(counts < 3))
-            raise GeometryError(f"polygon {first} has {counts[first]} corners, and needs at least 3")
+            raise GeometryError(
+                f"polygon {first} has {counts[first]} corners, and needs at least 3",
+                element=f"polygon {first}",
+            )
         corners = np.array(list(itertools.chain.from_iterable(polygons)))
         if not np.issubdtype(corners.dtype, np.integer):
             raise GeometryError(f"polygons must hold integer vertex ids, not {corners.dtype}")
@@ -66,7 +69,8 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         if len(outside):
             first = int(np.searchsorted(offsets, outside[0], side="right") - 1)
             raise GeometryError(
-                f"polygon {first} names vertex {corners[outside[0]]}, but vertex ids go from 0 to {len(positions) - 1}"
+                f"polygon {first} names vertex {corners[outside[0]]}, but vertex ids go from 0 to {len(positions) - 1}",
+                element=f"polygon {first}",
             )
         object.__setattr__(self, "vertices", positions)
         object.__setattr__(self, "corners", frozen(corners.astype(np.int64)))

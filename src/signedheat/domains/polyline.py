@@ -80,8 +80,8 @@ class Polyline:
         inside = np.asarray(mask)
         if inside.ndim != 2 or inside.dtype != np.bool_ or not inside.any():
             raise GeometryError(
-                f"a mask is a boolean image with something True in it, not {inside.dtype} of shape {inside.shape}: "
-                "compare the image with a threshold first"
+                f"a mask is a boolean image with something True in it, not {inside.dtype} of shape {inside.shape}",
+                remedy="compare the image with a threshold first",
             )
         steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), 2)
         padded = np.pad(inside, 1)

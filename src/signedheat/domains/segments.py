@@ -46,8 +46,9 @@ def segments_of(
         If the source does not fit the surface.
     """
     raise SourceError(
-        f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a Curve or SurfacePoints "
-        "(see the domain's path, polyline, level_set and points_at)"
+        f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a "
+        "Curve or SurfacePoints (see the domain's path, polyline, level_set and points_at)",
+        element=f"source {number}",
     )
 
 
@@ -111,6 +112,9 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
     vectors = np.where(along, 1j * ahead * np.abs(steps), vectors)
     if source.normals is not None and source.oriented:
         if positions is None:
-            raise SourceError(f"{name} has normals in space, but this surface has no positions: leave the normals out")
+            raise SourceError(
+                f"{name} has normals in space, but this surface has no positions",
+                remedy="leave the normals out",
+            )
         vectors = np.abs(steps) * given_directions(triangles, positions, faces, edges, source.normals[segment], name)
     return CurveSegments(located[first], ends, faces, edges, vectors, source.oriented)

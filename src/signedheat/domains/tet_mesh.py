@@ -150,7 +150,10 @@ class TetMesh:
         blocks = [block.data for block in mesh.cells if block.type == "tetra"]
         if not blocks:
             kinds = sorted({block.type for block in mesh.cells}) or ["no cells"]
-            raise GeometryError(f"the mesh holds no tets, but {', '.join(kinds)}: convert it to tetrahedra first")
+            raise GeometryError(
+                f"the mesh holds no tets, but {', '.join(kinds)}",
+                remedy="convert it to tetrahedra first",
+            )
         return cls(mesh.points, np.concatenate(blocks))
 
     def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
@@ -164,7 +167,10 @@ class TetMesh:
         """The tets of a `pyvista.UnstructuredGrid`; cells of other kinds are left behind."""
         cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
         if 10 not in cells:  # VTK_TETRA
-            raise GeometryError(f"the grid holds no tets among its {grid.n_cells} cells: triangulate it first")
+            raise GeometryError(
+                f"the grid holds no tets among its {grid.n_cells} cells",
+                remedy="triangulate it first",
+            )
         return cls(grid.points, np.asarray(cells[10], dtype=np.int64))
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:

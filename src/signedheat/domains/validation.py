@@ -29,7 +29,9 @@ def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDA
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         raise GeometryError(
-            f"{len(bad)} of {len(array)} {name} hold NaN or infinity, first number {bad[0]}: remove or repair them"
+            f"{len(bad)} of {len(array)} {name} hold NaN or infinity, first number {bad[0]}",
+            remedy="remove or repair them",
+            element=f"number {bad[0]}",
         )
     return frozen(array)
 
@@ -73,7 +75,8 @@ def element_ids(values: ArrayLike, name: str, corners: int, n_vertices: int) -> 
     if len(outside):
         first = outside[0]
         raise GeometryError(
-            f"{len(outside)} {name} name a vertex that does not exist; number {first} is {ids[first].tolist()}, "
-            f"but vertex ids go from 0 to {n_vertices - 1}"
+            f"{len(outside)} {name} name a vertex that does not exist; number {first} is "
+            f"{ids[first].tolist()}, but vertex ids go from 0 to {n_vertices - 1}",
+            element=f"number {first}",
         )
     return frozen(ids)

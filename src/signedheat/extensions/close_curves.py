@@ -60,4 +60,7 @@ def close_curves(
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:
     """Distance to curves that are not oriented, and to points, has no zero set but these."""
     if all(isinstance(curve, Curve | SurfacePoints) and not getattr(curve, "oriented", False) for curve in curves):
-        raise SourceError("curves without sides, and points, bound nothing that could be completed: orient the curves")
+        raise SourceError(
+            "curves without sides, and points, bound nothing that could be completed",
+            remedy="orient the curves",
+        )

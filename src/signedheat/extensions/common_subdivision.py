@@ -48,7 +48,10 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     True
     """
     if not isinstance(triangulation, IntrinsicTriangulation):
-        raise GeometryError(f"a {type(triangulation).__name__} is no IntrinsicTriangulation: see intrinsic_delaunay")
+        raise GeometryError(
+            f"a {type(triangulation).__name__} is no IntrinsicTriangulation",
+            remedy="see intrinsic_delaunay",
+        )
     triangles, n = triangulation.triangles, triangulation.n_vertices
     polygons, _, where = subdivided(triangulation)
     used = triangles.corner_vertices.ravel()

@@ -31,8 +31,8 @@ class IntrinsicPiecewiseField(PiecewiseField):
     def face_gradients(self) -> NDArray[np.float64]:
         """Of length one along the surface; triangles that are bent over edges of the mesh have none in space."""
         raise GeometryError(
-            "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each: use "
-            "split().face_gradients"
+            "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each",
+            remedy="use split().face_gradients",
         )
 
     def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:

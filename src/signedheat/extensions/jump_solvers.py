@@ -237,7 +237,8 @@ def minimize_exactly(problem: JumpProblem) -> JumpSolution:
         ):
             return solution
     raise SignedHeatError(
-        f"the linear program over {problem.n_faces} faces was not solved ({result.message}): leave out exact=True"
+        f"the linear program over {problem.n_faces} faces was not solved ({result.message})",
+        remedy="leave out exact=True",
     )
 
 

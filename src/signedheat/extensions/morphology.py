@@ -19,7 +19,7 @@ from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number
-from ..errors import SignedHeatError, SourceError
+from ..errors import SignedHeatError, SourceError, UnsupportedTypeError
 from ..fields.grid_field import GridField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
@@ -148,12 +148,15 @@ def shell(
     ------
     SignedHeatError
         If inner is not less than outer, one of them is not finite, or the wall is thinner than a cell.
-    TypeError
+    UnsupportedTypeError
         If the domain is not a grid.
     """
     inner, outer = finite_number(inner, "the inner distance"), finite_number(outer, "the outer distance")
     if not inner < outer:
-        raise SignedHeatError(f"a shell needs inner < outer, not {inner:g} and {outer:g}: swap them, or set them apart")
+        raise SignedHeatError(
+            f"a shell needs inner < outer, not {inner:g} and {outer:g}",
+            remedy="swap them, or set them apart",
+        )
     grid = _grid(_room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else domain)
     phi = _field(grid, shape).values
     return _wall(grid, np.maximum(inner - phi, phi - outer), outer - inner)
@@ -190,14 +193,17 @@ def thicken(
     ------
     SignedHeatError
         If a reach is negative or not finite, both are zero, or the wall is thinner than a cell.
-    TypeError
+    UnsupportedTypeError
         If the domain is not a grid.
     """
     above = finite_number(above, "the reach above", least=0)
     below = above if below is None else finite_number(below, "the reach below", least=0)
     reach = max(above, below)
     if reach == 0:
-        raise SignedHeatError("a sheet thickened by nothing has no inside: give a reach above zero")
+        raise SignedHeatError(
+            "a sheet thickened by nothing has no inside",
+            remedy="give a reach above zero",
+        )
     grid = _grid(_room(sheet, reach, resolution) if domain is None else domain)
     depth = _unsigned_distance(sheet, grid, reach) - reach
     if above != below:
@@ -227,7 +233,10 @@ def _room(shape: Sources, reach: float, resolution: int) -> Grid:
     """A grid around a shape, with room for offsets."""
     shapes: list[Source | Sequence[CurveOrPoints]] = as_list(shape)
     if any(isinstance(part, Curve) for part in shapes):
-        raise SourceError("a Curve lies on a surface: pass that surface as the domain")
+        raise SourceError(
+            "a Curve lies on a surface",
+            remedy="pass that surface as the domain",
+        )
     bounds = np.stack([extent(part) for part in shapes])
     longest = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
     return grid_around(shapes, resolution, padding=0.15 * longest + 1.05 * reach)
@@ -235,8 +244,9 @@ def _room(shape: Sources, reach: float, resolution: int) -> Grid:
 
 def _grid(domain: object) -> Grid[Literal[3]]:
     if not isinstance(domain, Grid):
-        raise TypeError(
-            f"walls are made on a Grid, not on a {type(domain).__name__}: leave the domain out, or pass one"
+        raise UnsupportedTypeError(
+            f"walls are made on a Grid, not on a {type(domain).__name__}",
+            remedy="leave the domain out, or pass one",
         )
     return cast("Grid[Literal[3]]", domain)
 
@@ -245,8 +255,8 @@ def _wall(grid: Grid[Literal[3]], depth: NDArray[np.float64], thickness: float) 
     cell = float(grid.spacing.max())
     if thickness < cell:
         raise SignedHeatError(
-            f"a wall of thickness {thickness:g} slips between nodes {cell:g} apart: raise the resolution to "
-            f"{int(np.ceil(max(grid.shape) * 2 * cell / thickness))}"
+            f"a wall of thickness {thickness:g} slips between nodes {cell:g} apart",
+            remedy=f"raise the resolution to {int(np.ceil(max(grid.shape) * 2 * cell / thickness))}",
         )
     return GridField(grid, depth).offset(0.0)
 
@@ -262,8 +272,9 @@ def _unsigned_distance(sheet: Shapes, grid: Grid, reach: float) -> NDArray[np.fl
     for part in as_list(sheet):
         if area_elements(part).corners.shape[1:] != (3, grid.dimension):
             raise SourceError(
-                f"a sheet has faces in the {grid.dimension} dimensions of the grid, and a {type(part).__name__} has "
-                "none: reconstruct a mesh first"
+                f"a sheet has faces in the {grid.dimension} dimensions of the grid, and a "
+                f"{type(part).__name__} has none",
+                remedy="reconstruct a mesh first",
             )
     corners = np.concatenate([area_elements(part).corners for part in as_list(sheet)])
     faces = np.arange(3 * len(corners)).reshape(-1, 3)

@@ -22,7 +22,7 @@ from ..domains.kinds import SurfaceDomain
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
-from ..errors import SourceError, UnreachedWarning, warn_user
+from ..errors import SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..fields.piecewise_field import PiecewiseField
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.face_pairs import FacePairs, face_pairs
@@ -88,7 +88,7 @@ def piecewise_distance(
     ------
     SourceError
         If a source does not fit the surface, or an unoriented curve was not kept by an intrinsic triangulation.
-    TypeError
+    UnsupportedTypeError
         If the domain is none of these.
     ValueError
         If `diffusion` or `smoothing` is not positive and finite.
@@ -105,7 +105,7 @@ def piecewise_distance(
     True
     """
     if not isinstance(domain, TriangleMesh | PolygonMesh | IntrinsicTriangulation):
-        raise TypeError(
+        raise UnsupportedTypeError(
             "piecewise distance needs a TriangleMesh, a PolygonMesh or an IntrinsicTriangulation, not a "
             f"{type(domain).__name__}"
         )
@@ -170,8 +170,8 @@ def holds(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints
     fits = adapted.corner_vertices is discretization.triangles.corner_vertices
     if not fits and isinstance(discretization.domain, IntrinsicTriangulation):
         raise SourceError(
-            "an unoriented curve runs across faces of the intrinsic triangulation: make it with "
-            "intrinsic_delaunay(mesh, keep=curve), or orient the curve"
+            "an unoriented curve runs across faces of the intrinsic triangulation",
+            remedy="make it with intrinsic_delaunay(mesh, keep=curve), or orient the curve",
         )
     return fits
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..diagnostics import Diagnostics, Note, SlopeErrors
 from ..discretization import Discretization
 from ..domains.grid import Dimension
-from ..errors import GeometryError, OutsideError
+from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
@@ -74,7 +74,7 @@ def sharpen(field: Field, *arguments: Any, **options: Any) -> Field:
 
     Raises
     ------
-    TypeError
+    UnsupportedTypeError
         If this kind of field cannot be sharpened, or not by this method.
     OutsideError
         If a field has one sign everywhere, or no value anywhere.
@@ -97,7 +97,10 @@ def sharpen(field: Field, *arguments: Any, **options: Any) -> Field:
 @singledispatch
 def sharpen_field(field: object, *arguments: object, **options: object) -> Field:
     """Sharpening of each kind of field, registered where the kind is dealt with; `sharpen` is its public face."""
-    raise TypeError(f"a {type(field).__name__} cannot be sharpened: pass a field that signed_distance returned")
+    raise UnsupportedTypeError(
+        f"a {type(field).__name__} cannot be sharpened",
+        remedy="pass a field that signed_distance returned",
+    )
 
 
 def sharpened(
@@ -111,12 +114,22 @@ def sharpened(
     """What fields on surfaces and on tets have in common: new values, and diagnostics that compare the slopes."""
     method = Geodesic() if method is None else method
     if isinstance(method, type) or not hasattr(method, "sharpened"):
-        raise TypeError(f"{method!r} is no method of sharpening: pass Geodesic() or Convex()")
+        raise UnsupportedTypeError(
+            f"{method!r} is no method of sharpening",
+            remedy="pass Geodesic() or Convex()",
+        )
     known = np.isfinite(values)
     if not known.any():
-        raise OutsideError("the field has no value anywhere: pass one that a source reaches")
+        raise OutsideError(
+            "the field has no value anywhere",
+            remedy="pass one that a source reaches",
+        )
     if not (known | np.isnan(values)).all():
-        raise GeometryError(f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}: compute it anew")
+        raise GeometryError(
+            f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}",
+            remedy="compute it anew",
+            element=f"vertex {np.flatnonzero(np.isinf(values))[0]}",
+        )
     begin = time.perf_counter()
     if progress is not None:
         progress(0.0, "sharpen")

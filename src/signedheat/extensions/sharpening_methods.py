@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..diagnostics import ConvexRounds, Note
 from ..discretization import Discretization
 from ..domains.validation import finite_number, positive_number
-from ..errors import OutsideError, SignedHeatError, SourceError
+from ..errors import OutsideError, SignedHeatError, SourceError, UnsupportedTypeError
 from ..lowering.direct_integration import DirectIntegration
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
@@ -67,8 +67,9 @@ class Geodesic:
         )
         if not np.isfinite(distance).any():
             raise OutsideError(
-                "the field has one sign everywhere, hence no zero set to measure from: add an offset to its values, or "
-                "use method=Convex(), which measures from the source that it was computed from"
+                "the field has one sign everywhere, hence no zero set to measure from",
+                remedy="add an offset to its values, or use method=Convex(), which measures from the source "
+                "that it was computed from",
             )
         distance = np.where(np.isfinite(distance), distance, np.abs(values))
         sides = values if getattr(source, "oriented", True) else np.ones_like(values)
@@ -80,7 +81,7 @@ def straight_distance(
     discretization: Any, values: NDArray[np.float64], source: Any, tolerance: float
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Distance of every unknown from where values vanish, inf where that is not connected; and notes."""
-    raise TypeError(f"there are no straight lines on a {type(discretization).__name__}")
+    raise UnsupportedTypeError(f"there are no straight lines on a {type(discretization).__name__}")
 
 
 @dataclass(frozen=True)
@@ -131,9 +132,10 @@ class Convex:
         rows = getattr(source, "rows", None)
         if rows is None or rows.shape[1] != len(values):
             raise SourceError(
-                "the convex method holds φ at the source, and this field comes without one, or from one that lies on "
-                "other triangles: pass what SignedHeatSolver.distance returned for oriented curves or points, on "
-                "intrinsic_delaunay(mesh) if need be instead of with intrinsic=True"
+                "the convex method holds φ at the source, and this field comes without one, or from one "
+                "that lies on other triangles",
+                remedy="pass what SignedHeatSolver.distance returned for oriented curves or points, on "
+                "intrinsic_delaunay(mesh) if need be instead of with intrinsic=True",
             )
         integration = discretization.integration
         assert isinstance(integration, DirectIntegration)  # of surfaces and tets, whose elements these are

@@ -73,7 +73,10 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
     import pytetwild
 
     if isinstance(shape, PointCloud):
-        raise GeometryError("fTetWild follows faces, and a point cloud has none: use tetrahedralize")
+        raise GeometryError(
+            "fTetWild follows faces, and a point cloud has none",
+            remedy="use tetrahedralize",
+        )
     lower, upper, spacing = _box_around(shape, resolution, padding)
     corners, faces = box_walls(lower, upper, np.ones(3, dtype=np.int64))
     triangles = area_elements(shape).corners

@@ -118,7 +118,10 @@ def sample_points(shape: Shape, spacing: float) -> NDArray[np.float64]:
 
 def _refuse_too_many(tets: float) -> None:
     if tets > MOST_TETS:
-        raise MemoryLimitError(f"the lattice would have over {tets:,.0f} tets: lower the resolution")
+        raise MemoryLimitError(
+            f"the lattice would have over {tets:,.0f} tets",
+            remedy="lower the resolution",
+        )
 
 
 def _octree(

@@ -12,7 +12,7 @@ from scipy import sparse
 from ..diagnostics import GeodesicWindows, Note
 from ..discretization import discretize
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
-from ..errors import GeometryError
+from ..errors import GeometryError, UnsupportedTypeError
 from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import CurveSegments, interpolation_at
 from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
@@ -32,7 +32,9 @@ HALO = 4.0
 def _(field: VertexField, method: Method | None = None, progress: Progress | None = None) -> VertexField:
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
-        raise TypeError(f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface")
+        raise UnsupportedTypeError(
+            f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface"
+        )
     elements = LinearElements.on_triangles(surface.triangles)
     new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), method, progress)
     values = new if surface.restriction is None else new[surface.restriction]
@@ -46,8 +48,8 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
     wanted = n if surface.restriction is None else len(surface.restriction)
     if values.shape != (wanted,) or not np.issubdtype(values.dtype, np.number):
         raise GeometryError(
-            f"the field has {values.dtype} values of shape {values.shape}, and its domain {wanted} vertices: give one "
-            "number for each"
+            f"the field has {values.dtype} values of shape {values.shape}, and its domain {wanted} vertices",
+            remedy="give one number for each",
         )
     if surface.restriction is None:
         return values.astype(np.float64)

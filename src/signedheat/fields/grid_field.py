@@ -172,8 +172,8 @@ class GridField(Generic[Dimension]):
         if bounded and walls[0] < distance < walls[1]:
             limit = walls[0] if walls[0] > 0 else walls[1]
             raise OutsideError(
-                f"what lies at distance {distance:g} leaves the grid, which holds distances up to {limit:g}: "
-                f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open"
+                f"what lies at distance {distance:g} leaves the grid, which holds distances up to {limit:g}",
+                remedy=f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open",
             )
         return self.contour(distance)
 

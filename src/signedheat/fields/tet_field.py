@@ -158,8 +158,8 @@ class TetField:
         if bounded and low < distance < high:
             limit = low if low > 0 else high
             raise OutsideError(
-                f"the surface at distance {distance:g} leaves the tet mesh, which holds distances up to {limit:g}: "
-                f"use a mesh that reaches more than {abs(distance):g} beyond the shape"
+                f"the surface at distance {distance:g} leaves the tet mesh, which holds distances up to {limit:g}",
+                remedy=f"use a mesh that reaches more than {abs(distance):g} beyond the shape",
             )
         return self.contour(distance)
 

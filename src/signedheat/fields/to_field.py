@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics, SampledSource, TetsTurned
-from ..errors import UnreachedWarning, warn_user
+from ..errors import UnreachedWarning, UnsupportedTypeError, warn_user
 from ..lowering.grid.discretization import GridDiscretization
 from ..lowering.grid.masked import MaskedGridDiscretization
 from ..lowering.grid.masked_source import MaskedSource
@@ -30,7 +30,7 @@ Field = GridField | VertexField | TetField
 @singledispatch
 def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> Field:
     """The field whose values a discretisation found, with what it has to tell added to the diagnostics."""
-    raise TypeError(f"no field is known for {type(discretization).__name__}")
+    raise UnsupportedTypeError(f"no field is known for {type(discretization).__name__}")
 
 
 @to_field.register

@@ -128,7 +128,8 @@ class VertexField(Generic[Surface]):
         low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
         if not low <= level <= high:
             raise OutsideError(
-                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}; choose a level between"
+                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}; choose a level between",
+                element=f"level {level:g}",
             )
         result: list[Curve] = field.domain.level_set(field.values, level)
         return result
@@ -177,7 +178,9 @@ class VertexField(Generic[Surface]):
             if len(outside):
                 raise OutsideError(
                     f"point {outside[0]} lies in face {points.faces[outside[0]]}, but face ids go from 0 to "
-                    f"{mesh.n_faces - 1}: was it made for another surface?"
+                    f"{mesh.n_faces - 1}",
+                    remedy="make it for this surface",
+                    element=f"point {outside[0]}",
                 )
             return mesh, values, points.faces, points.barycentric
         faces, weights, _ = closest_points(mesh, finite_rows(points, "points", 3))

@@ -84,8 +84,9 @@ def given_directions(
     flat = np.flatnonzero(length <= 1e-6 * scale)
     if len(flat):
         raise SourceError(
-            f"{name}: the normal {normals[flat[0]].tolist()} at face {faces[flat[0]]} does not lie along the surface: "
-            "give the direction, tangent to the surface, in which the distance grows"
+            f"{name}: the normal {normals[flat[0]].tolist()} at face {faces[flat[0]]} does not lie along the surface",
+            remedy="give the direction, tangent to the surface, in which the distance grows",
+            element=f"face {faces[flat[0]]}",
         )
     return directions / length
 

@@ -73,8 +73,9 @@ def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], lev
     low, high = float(known.min(initial=np.inf)), float(known.max(initial=-np.inf))
     if not low < 0 < high:
         raise OutsideError(
-            f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}: "
-            "choose another level or a larger grid"
+            f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}",
+            remedy="choose another level or a larger grid",
+            element=f"level {level:g}",
         )
     least = CLEARANCE * float(spacing.min())
     height[(height >= 0) & (height < least)] = least

@@ -56,8 +56,9 @@ def closed_level_set(
     if not used.any() or used.all():
         low, high = np.nanmin(values), np.nanmax(values)
         raise OutsideError(
-            f"level {level:g} is outside the values of the tet mesh, {low:g} to {high:g}: choose another level or a "
-            "larger mesh"
+            f"level {level:g} is outside the values of the tet mesh, {low:g} to {high:g}",
+            remedy="choose another level or a larger mesh",
+            element=f"level {level:g}",
         )
     keys, _ = _triangles(tets, used, mesh.n_vertices, _CUTS)
     faces = face_table(tets)

@@ -63,8 +63,9 @@ def locate_points(
     outside = np.flatnonzero((faces < 0) | (faces >= triangles.n_faces))
     if len(outside):
         raise SourceError(
-            f"{name} {outside[0]} lies in face {faces[outside[0]]}, but face ids go from 0 to {triangles.n_faces - 1}: "
-            "was it made for another mesh?"
+            f"{name} {outside[0]} lies in face {faces[outside[0]]}, but face ids go from 0 to {triangles.n_faces - 1}",
+            remedy="make it for this mesh",
+            element=f"face {faces[outside[0]]}",
         )
     inside = np.where(barycentric < SNAP, 0.0, barycentric)
     inside /= inside.sum(axis=1, keepdims=True)
@@ -109,8 +110,9 @@ def corners_at(
     outside = np.flatnonzero((vertices < 0) | (vertices >= n_vertices))
     if len(outside):
         raise SourceError(
-            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to {n_vertices - 1}: "
-            "was it made for another mesh?"
+            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to {n_vertices - 1}",
+            remedy="use ids of this mesh",
+            element=f"vertex {vertices[outside[0]]}",
         )
     wanted = np.zeros(n_vertices, dtype=bool)
     wanted[vertices] = True
@@ -120,7 +122,9 @@ def corners_at(
     alone = np.flatnonzero(first[vertices] < 0)
     if len(alone):
         raise SourceError(
-            f"{name} {alone[0]} is vertex {vertices[alone[0]]}, which no face has: choose a vertex of the surface"
+            f"{name} {alone[0]} is vertex {vertices[alone[0]]}, which no face has",
+            remedy="choose a vertex of the surface",
+            element=f"vertex {vertices[alone[0]]}",
         )
     return first[vertices]
 

@@ -126,7 +126,9 @@ def polylines_of_segments(
     bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
     if bad:
         raise FileFormatError(
-            f"{path}: segment {list(bad[0])} names a node that does not exist: there are {len(nodes)}"
+            f"segment {list(bad[0])} names a node that does not exist: there are {len(nodes)}",
+            element=f"segment {list(bad[0])}",
+            path=path,
         )
     if not len(segments):
         return []
@@ -174,7 +176,10 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         if isinstance(error, (FileFormatError, SourceError)):
             raise
-        raise FileFormatError(f"{path}: these are no curves with vertex ids and weights ({error!r})") from error
+        raise FileFormatError(
+            f"these are no curves with vertex ids and weights ({error!r})",
+            path=path,
+        ) from error
 
 
 def read_csv(path: PathLike, domain: EmbeddedSurface) -> list[Curve]:
@@ -200,7 +205,11 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
     positions = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     bad = [i for ids in lines + points for i in ids if not 0 <= i < len(positions)]
     if bad:
-        raise FileFormatError(f"{path}: vertex {bad[0] + 1} of an element does not exist: there are {len(positions)}")
+        raise FileFormatError(
+            f"vertex {bad[0] + 1} of an element does not exist: there are {len(positions)}",
+            element=f"vertex {bad[0] + 1}",
+            path=path,
+        )
     corners = domain.triangulation.vertices
     scale = 1e-6 * float(np.ptp(corners, axis=0).max())
     n = min(len(positions), len(corners))
@@ -224,7 +233,11 @@ def projected_nodes(domain: EmbeddedSurface, points: NDArray[np.float64]) -> lis
 
 def damaged(path: PathLike, number: int, words: list[str], reason: str) -> FileFormatError:
     """The error for a line that makes no sense."""
-    return FileFormatError(f"{path}: line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})")
+    return FileFormatError(
+        f"line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})",
+        element=f"line {number}",
+        path=path,
+    )
 
 
 def nodes_of(faces: NDArray[np.int64], weights: NDArray[np.float64], domain: EmbeddedSurface) -> list[Node]:

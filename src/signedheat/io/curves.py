@@ -83,9 +83,13 @@ def read_curves(path: PathLike, domain: EmbeddedSurface, strict: bool = False) -
         if strict:
             refuse_gaps(sources, domain.triangulation)
     except SourceError as error:
-        raise SourceError(f"{path}: {error}") from error
+        raise error.at(path) from error
     if not sources:
-        raise FileFormatError(f"{path}: there is no curve and no point: check that it is a file of curves")
+        raise FileFormatError(
+            "there is no curve and no point",
+            remedy="check that it is a file of curves",
+            path=path,
+        )
     return sources
 
 
@@ -99,8 +103,10 @@ def refuse_gaps(sources: Sequence[CurveOrPoints], mesh: TriangleMesh) -> None:
             apart = gaps(triangles, places, source.closed)
             if len(apart):
                 raise SourceError(
-                    f"curve {number}: points {apart[0]} and {(apart[0] + 1) % source.n_points} share no face, nor do "
-                    f"the ends of {len(apart) - 1} more segments: add points, or read without strict to join them"
+                    f"curve {number}: points {apart[0]} and {(apart[0] + 1) % source.n_points} share no face, "
+                    f"nor do the ends of {len(apart) - 1} more segments",
+                    remedy="add points, or read without strict to join them",
+                    element=f"curve {number}",
                 )
 
 
@@ -163,7 +169,10 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[NDArray[np
         ids = nodes[k].vertices
         shared = set.intersection(*(set(around.get(v, ())) for v in ids))
         if not shared:
-            raise SourceError(f"point {k} lies between vertices {list(ids)}, which no face has in common")
+            raise SourceError(
+                f"point {k} lies between vertices {list(ids)}, which no face has in common",
+                element=f"point {k}",
+            )
         faces[k] = min(shared)
         corners = mesh.faces[faces[k]].tolist()
         for v, w in zip(ids, nodes[k].weights, strict=True):
@@ -177,7 +186,8 @@ def groups_of(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> list[
     for number, curve in enumerate(curves):
         if not isinstance(curve, (Curve, SurfacePoints)):
             raise SourceError(
-                f"item {number} is a {type(curve).__name__}: files of curves hold Curve and SurfacePoints"
+                f"item {number} is a {type(curve).__name__}: files of curves hold Curve and SurfacePoints",
+                element=f"item {number}",
             )
         nodes = nodes_of(curve.faces, curve.barycentric, domain)
         if isinstance(curve, Curve):

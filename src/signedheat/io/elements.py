@@ -52,5 +52,7 @@ def face_lists(shape: SurfaceShape) -> Sequence[Sequence[int]]:
 def refuse(shape: object, path: PathLike, holds: str, instead: str) -> FileFormatError:
     """The error for a format that cannot hold a kind of shape."""
     return FileFormatError(
-        f"{path}: {extension(path)} files hold {holds}, not a {type(shape).__name__}: save it as {instead}"
+        f"{extension(path)} files hold {holds}, not a {type(shape).__name__}",
+        remedy=f"save it as {instead}",
+        path=path,
     )

@@ -43,7 +43,11 @@ def _(field: object, path: PathLike) -> None:
     elif isinstance(field, VertexField):
         save_vertex_field(field, path)
     else:
-        raise FileFormatError(f"{path}: a {type(field).__name__} is no field: pass what a solver returned")
+        raise FileFormatError(
+            f"a {type(field).__name__} is no field",
+            remedy="pass what a solver returned",
+            path=path,
+        )
 
 
 def save_field(field: GridField, path: PathLike) -> None:
@@ -65,9 +69,16 @@ def save_field(field: GridField, path: PathLike) -> None:
         If the format is unknown, has no room for the field's dimension, or the file cannot be written.
     """
     if not isinstance(field, GridField):
-        raise FileFormatError(f"{path}: a {type(field).__name__} is no field on a grid: it has formats of its own")
+        raise FileFormatError(
+            f"a {type(field).__name__} is no field on a grid: it has formats of its own",
+            path=path,
+        )
     if field.grid.dimension not in _DIMENSIONS.get(extension(path), (field.grid.dimension,)):
-        raise FileFormatError(f"{path}: the field has {field.grid.dimension} axes, too many or few: save it as .npz")
+        raise FileFormatError(
+            f"the field has {field.grid.dimension} axes, too many or few",
+            remedy="save it as .npz",
+            path=path,
+        )
     ensure_field_writable(path)
     write, _ = _FORMATS[extension(path)]
     if extension(path) == ".npy":
@@ -131,10 +142,13 @@ def load_field(path: PathLike) -> Field:
     try:
         values, origin, spacing, *mask = read(path)
         if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
-            raise FileFormatError(f"{path}: the values are no real numbers but {values.dtype}: it holds no field")
+            raise FileFormatError(
+                f"the values are no real numbers but {values.dtype}: it holds no field",
+                path=path,
+            )
         return GridField(Grid(origin, spacing, values.shape, *mask), np.ascontiguousarray(values))
     except GeometryError as error:
-        raise FileFormatError(f"{path}: {error}") from error
+        raise FileFormatError(error.cause, remedy=error.remedy, element=error.element, path=path) from error
 
 
 def _description(grid: Grid) -> dict[str, Any]:
@@ -160,11 +174,18 @@ def _read_npz(path: PathLike) -> Parts:
             solid = [file["mask"]] if "mask" in file else []
             return file["values"], file["origin"], file["spacing"], *solid
     except KeyError as error:
-        raise FileFormatError(f"{path}: {error}: a field has values, origin and spacing") from error
+        raise FileFormatError(
+            f"{error}: a field has values, origin and spacing",
+            path=path,
+        ) from error
     except FileFormatError:
         raise
     except Exception as error:
-        raise FileFormatError(f"{path}: it is no .npz file, or is truncated ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no .npz file, or is truncated ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
 
 
 def _write_npy(field: GridField, path: Path) -> None:
@@ -176,7 +197,11 @@ def _read_npy(path: PathLike) -> Parts:
     try:
         values = np.load(io.BytesIO(contents(path)), allow_pickle=False)
     except ValueError as error:
-        raise FileFormatError(f"{path}: it is no .npy file, or is truncated ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no .npy file, or is truncated ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     beside = Path(path).with_suffix(".json")
     try:
         about = json.loads(contents(beside))
@@ -184,7 +209,11 @@ def _read_npy(path: PathLike) -> Parts:
     except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, FileFormatError):
             raise
-        raise FileFormatError(f"{beside}: origin and spacing cannot be read ({error}): write them again") from error
+        raise FileFormatError(
+            f"origin and spacing cannot be read ({error})",
+            remedy="write them again",
+            path=beside,
+        ) from error
 
 
 def _write_vti(field: GridField, path: Path) -> None:
@@ -214,11 +243,19 @@ def _read_nrrd(path: PathLike) -> Parts:
     try:
         values, header = nrrd.read(str(path), index_order="F")
     except Exception as error:
-        raise FileFormatError(f"{path}: it is no NRRD file, or is truncated ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no NRRD file, or is truncated ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     directions = np.atleast_2d(header.get("space directions", np.diag(header.get("spacings", np.ones(values.ndim)))))
     spacing = np.diag(directions) if directions.shape == (values.ndim, values.ndim) else np.zeros(values.ndim)
     if not np.array_equal(directions, np.diag(spacing)):
-        raise FileFormatError(f"{path}: its axes are not x, y, z: resample the image along them")
+        raise FileFormatError(
+            "its axes are not x, y, z",
+            remedy="resample the image along them",
+            path=path,
+        )
     return values, np.asarray(header.get("space origin", np.zeros(values.ndim))), spacing
 
 
@@ -229,8 +266,9 @@ def _openvdb(path: PathLike) -> ModuleType:
         except ImportError:
             continue
     raise FileFormatError(
-        f"{path}: .vdb needs OpenVDB's Python module, which is not installed: conda install -c conda-forge openvdb, "
-        "or save as .vti"
+        ".vdb needs OpenVDB's Python module, which is not installed",
+        remedy="conda install -c conda-forge openvdb, or save as .vti",
+        path=path,
     )
 
 
@@ -263,7 +301,11 @@ def _read_vdb(path: PathLike) -> Parts:
         same = written.shape == spacing.shape and np.allclose(written, spacing, rtol=1e-9, atol=0)
         return values, origin, written if same else spacing
     except Exception as error:
-        raise FileFormatError(f"{path}: it cannot be read as a VDB volume ({error}): write it again") from error
+        raise FileFormatError(
+            f"it cannot be read as a VDB volume ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
 
 
 _FORMATS: dict[str, tuple[Callable[[GridField, Path], None], Callable[[PathLike], Parts]]] = {

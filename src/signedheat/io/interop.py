@@ -34,14 +34,20 @@ def to_trimesh(shape: SurfaceShape) -> Any:
     if isinstance(shape, PointCloud):
         return trimesh.PointCloud(np.array(shape.points))  # type: ignore[no-untyped-call]
     if isinstance(shape, PolygonMesh):
-        raise GeometryError("trimesh holds triangles only, and this is a PolygonMesh: use to_pyvista or to_meshio")
+        raise GeometryError(
+            "trimesh holds triangles only, and this is a PolygonMesh",
+            remedy="use to_pyvista or to_meshio",
+        )
     return trimesh.Trimesh(np.array(shape.vertices), np.array(shape.faces), process=False)
 
 
 def from_pyvista(kind: type, thing: Any) -> Any:
     """From a `pyvista.PolyData`; points with point data ``Normals`` have normals."""
     if getattr(thing, "n_strips", 0):
-        raise GeometryError("the mesh holds triangle strips: call its triangulate() first")
+        raise GeometryError(
+            "the mesh holds triangle strips",
+            remedy="call its triangulate() first",
+        )
     faces = np.asarray(thing.faces, dtype=np.int64)
     starts, at = [], 0
     while at < len(faces):
@@ -107,7 +113,11 @@ def _build(
         return PolygonMesh(points, np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else [])
     wrong = np.flatnonzero(counts != 3)
     if len(wrong):
-        raise GeometryError(f"face {wrong[0]} has {counts[wrong[0]]} corners, not 3: use PolygonMesh instead")
+        raise GeometryError(
+            f"face {wrong[0]} has {counts[wrong[0]]} corners, not 3",
+            remedy="use PolygonMesh instead",
+            element=f"face {wrong[0]}",
+        )
     return TriangleMesh(points, corners.reshape(-1, 3))
 
 

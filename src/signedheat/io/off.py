@@ -18,29 +18,46 @@ def read_off(path: PathLike) -> SurfaceShape:
     rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].split())]
     kind = rows[0][0].upper() if rows else ""
     if not kind.endswith("OFF") or "BINARY" in [word.upper() for word in rows[0]]:
-        raise FileFormatError(f"{path}: it does not begin with OFF as text: this is no file that can be read as OFF")
+        raise FileFormatError(
+            "it does not begin with OFF as text: this is no file that can be read as OFF",
+            path=path,
+        )
     rows[0] = rows[0][1:]
     rows = rows if rows[0] else rows[1:]
     if not rows or len(rows[0]) < 2:
-        raise FileFormatError(f"{path}: the numbers of vertices and faces are missing: is it truncated?")
+        raise FileFormatError(
+            "the numbers of vertices and faces are missing",
+            remedy="it may be truncated, so write or download it again",
+            path=path,
+        )
     n_vertices, n_faces = numbers(rows[0][:2], path, "counts", int).tolist()
     lines = iter(rows[1:])
     vertex_rows = list(islice(records(lines, lambda row: 3), n_vertices))
     face_rows = list(islice(records(lines, lambda row: 1 + corner_count(row[0])), n_faces))
     if len(vertex_rows) < n_vertices or len(face_rows) < n_faces:
         raise FileFormatError(
-            f"{path}: {n_vertices} vertices and {n_faces} faces are announced, {len(vertex_rows)} and {len(face_rows)} "
-            "are there: the file is truncated"
+            f"{n_vertices} vertices and {n_faces} faces are announced, {len(vertex_rows)} and "
+            f"{len(face_rows)} are there: the file is truncated",
+            remedy="write or download it again",
+            path=path,
         )
     if any(len(row) < 3 for row in vertex_rows):
-        raise FileFormatError(f"{path}: a vertex has fewer than 3 coordinates: is it truncated?")
+        raise FileFormatError(
+            "a vertex has fewer than 3 coordinates",
+            remedy="it may be truncated, so write or download it again",
+            path=path,
+        )
     vertices = numbers([row[:3] for row in vertex_rows], path, "vertices").reshape(-1, 3)
     if not n_faces:
         has_normals = "N" in kind[:-3] and all(len(row) >= 6 for row in vertex_rows)
         return PointCloud(vertices, numbers([r[3:6] for r in vertex_rows], path, "normals") if has_normals else None)
     counts = numbers([row[0] for row in face_rows], path, "numbers of corners", int)
     if any(len(row) <= count for row, count in zip(face_rows, counts.tolist(), strict=True)):
-        raise FileFormatError(f"{path}: a face has fewer corners than it says: is it truncated?")
+        raise FileFormatError(
+            "a face has fewer corners than it says",
+            remedy="it may be truncated, so write or download it again",
+            path=path,
+        )
     corners = [word for row, count in zip(face_rows, counts.tolist(), strict=True) for word in row[1 : 1 + count]]
     return assemble(vertices, numbers(corners, path, "vertex ids", int), np.asarray(counts))
 

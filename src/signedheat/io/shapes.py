@@ -91,7 +91,7 @@ def read(path: PathLike) -> Shape:
     try:
         return reader(path)
     except GeometryError as error:
-        raise GeometryError(f"{path}: {error}") from error
+        raise error.at(path) from error
 
 
 def save(shape: Shape, path: PathLike) -> None:

@@ -58,13 +58,24 @@ def load_vertex_field(path: PathLike) -> VertexField:
         else:
             domain = PointCloud(vertices, arrays.get("normals"))
     except KeyError as error:
-        raise FileFormatError(f"{path}: {error}: a field on a surface has values and vertices") from error
+        raise FileFormatError(
+            f"{error}: a field on a surface has values and vertices",
+            path=path,
+        ) from error
     except FileFormatError:
         raise
     except (ValueError, OSError, EOFError, BadZipFile) as error:
-        raise FileFormatError(f"{path}: it is no .npz file, or is damaged ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no .npz file, or is damaged ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     if values.shape != (len(vertices),):
-        raise FileFormatError(f"{path}: {values.shape} values for {len(vertices)} vertices: the file is damaged")
+        raise FileFormatError(
+            f"{values.shape} values for {len(vertices)} vertices: the file is damaged",
+            remedy="write or download it again",
+            path=path,
+        )
     return VertexField(domain, values)
 
 

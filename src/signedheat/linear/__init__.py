@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SignedHeatError
 from . import cholmod, pardiso
 from .cholmod import CholmodFactor
 from .matrices import upper_triangle, whole
@@ -67,7 +68,10 @@ def factorize(
     available = available_backends()
     name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
     if name not in available:
-        raise ValueError(f"the solver {name!r} is not available here: choose one of {', '.join(available)}")
+        raise SignedHeatError(
+            f"the solver {name!r} is not available here",
+            remedy=f"choose one of {', '.join(available)}",
+        )
     upper = upper_triangle(matrix)
     if name == "pardiso":
         return PardisoFactor(upper, None if reused else order)

@@ -134,7 +134,8 @@ def _(shape: PolygonMesh) -> AreaElements:
 def _(shape: PointCloud) -> AreaElements:
     if shape.normals is None:
         raise SourceError(
-            "the point cloud has no normals, which say what is inside: give them, or estimate and orient them first"
+            "the point cloud has no normals, which say what is inside",
+            remedy="give them, or estimate and orient them first",
         )
     areas = point_areas(shape.points) if shape.areas is None else shape.areas
     components = np.zeros(shape.n_points, dtype=np.int64)
@@ -220,7 +221,8 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         elements = area_elements(shape)
         if elements.corners.shape[2] != grid.dimension:
             raise SourceError(
-                f"source {owner} lives in {elements.corners.shape[2]} dimensions, and the grid in {grid.dimension}"
+                f"source {owner} lives in {elements.corners.shape[2]} dimensions, and the grid in {grid.dimension}",
+                element=f"source {owner}",
             )
         order = np.argsort(elements.components, kind="stable")
         corners = (elements.corners - grid.origin) / grid.spacing
@@ -246,13 +248,14 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         raise SourceError("the source has no area: every face is degenerate")
     if not len(joined[2]) or not joined[1].any():
         raise SourceError(
-            f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape: move or enlarge it"
+            f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape",
+            remedy="move or enlarge it",
         )
     left = float(np.linalg.norm(joined[1], axis=1).sum() / joined[2].sum())
     if left < ROUNDING:
         raise SourceError(
-            "the normals of the source cancel each other everywhere, so that nothing tells inside from outside: "
-            "remove or turn one of its coinciding sides"
+            "the normals of the source cancel each other everywhere, so that nothing tells inside from outside",
+            remedy="remove or turn one of its coinciding sides",
         )
     outside = max(0.0, 1.0 - inside / total)
     return AreaSamples(*joined, spacing=spacing, outside=outside, cancelled=max(0.0, 1.0 - left), nodes=nodes)

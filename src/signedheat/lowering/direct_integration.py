@@ -219,6 +219,7 @@ def _refuse_contradictions(rows: sparse.csr_matrix, levels: NDArray[np.float64],
     worst = int(gap.argmax())
     if np.ptp(levels) > 0 and gap[worst] > 1e-4 * (np.abs(levels).max() + np.ptp(values)):
         raise ConstraintError(
-            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: sources that meet or "
-            "cross need the same level"
+            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: "
+            "sources that meet or cross need the same level",
+            element=f"vertex {rows.indices[rows.indptr[worst]]}",
         )

@@ -52,8 +52,9 @@ def refuse_beyond_memory(grid: Grid) -> None:
         return
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting_spacing(grid, available)))
     raise MemoryLimitError(
-        f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, and "
-        f"{available / 1e9:.1f} GB are free: choose a spacing of {spacing} or more, or a lower resolution"
+        f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
+        f"and {available / 1e9:.1f} GB are free",
+        remedy=f"choose a spacing of {spacing} or more, or a lower resolution",
     )
 
 

@@ -54,7 +54,9 @@ class MaskedSource:
         lost = np.setdiff1d(whole.source_ids, whole.source_ids[kept])
         if len(lost):
             raise SourceError(
-                f"source {lost[0]} lies within solid nodes of the grid, where nothing reaches it: move it out of them"
+                f"source {lost[0]} lies within solid nodes of the grid, where nothing reaches it",
+                remedy="move it out of them",
+                element=f"source {lost[0]}",
             )
         weights, numbers = weights[kept] / total[kept, None], numbers[kept]
         row, corner = np.nonzero(weights)

@@ -93,14 +93,21 @@ def tet_source(
     for number, source in enumerate(sources):
         elements = area_elements(source)
         if elements.corners.shape[2] != 3:
-            raise SourceError(f"source {number} ({source!r}) does not lie in space of three dimensions, as tets do")
+            raise SourceError(
+                f"source {number} ({source!r}) does not lie in space of three dimensions, as tets do",
+                element=f"source {number}",
+            )
         if not elements.vectors.any():
-            raise SourceError(f"source {number} ({source!r}) has no area at all: its faces are degenerate")
+            raise SourceError(
+                f"source {number} ({source!r}) has no area at all: its faces are degenerate",
+                element=f"source {number}",
+            )
         polygons = _cut(mesh, planes, elements)
         if len(polygons.tets) == 0:
             raise SourceError(
-                f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}: move it into "
-                "the mesh, or check that both have the same units"
+                f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}",
+                remedy="move it into the mesh, or check that both have the same units",
+                element=f"source {number}",
             )
         outside[number] = 1 - polygons.areas.sum() / elements.weights.sum()
         spacing = max(spacing, elements.spacing)
@@ -110,7 +117,10 @@ def tet_source(
     time = diffusion * spacing**2
     loads = sum(_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts)
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
-        raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
+        raise SourceError(
+            "the normals of the source cancel each other everywhere",
+            remedy="turn one of its coinciding sides",
+        )
     leaving = np.flatnonzero(outside > 1e-9)
     patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
     rows, bends, weights, members = zip(*patches, strict=True)
