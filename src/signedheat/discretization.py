@@ -22,7 +22,7 @@ class SourceTerm(Protocol):
 
     @property
     def vectors(self) -> Any:
-        """X₀, the right-hand side of Eq. 12, in the discretisation's own layout."""
+        """X₀, the right-hand side of Eq. 12 (on surfaces Eq. 11, Eq. 19), in the discretisation's own layout."""
 
     @property
     def time(self) -> float:
@@ -30,7 +30,7 @@ class SourceTerm(Protocol):
 
     @property
     def interpolation(self) -> Any:
-        """A: sparse (s, n), row i interpolates φ at source sample i."""
+        """A of Eq. 14: sparse (s, n), row i interpolates φ at source sample i."""
 
     @property
     def weights(self) -> NDArray[np.float64]:
@@ -53,16 +53,16 @@ class Integration(Protocol):
     """
 
     def solve(self, divergence: Any, source: Any) -> NDArray[np.float64]:
-        """Minimise ∫|∇φ − Y|² with nothing imposed."""
+        """Minimise ∫|∇φ − Y|² (Eq. 2) with nothing imposed: ``C φ = b`` (Eq. 13)."""
 
     def fit(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels at the samples, in the way that suits the domain best."""
+        """Impose levels at the samples (Eq. 14), in the way that suits the domain best."""
 
     def fit_exactly(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels at the samples, exactly (where the rows allow it)."""
+        """Impose levels at the samples exactly (Eq. 14), as far as the rows of A do not contradict each other."""
 
     def penalize(self, divergence: Any, source: Any, strength: float) -> NDArray[np.float64]:
-        """Minimise ∫|∇φ − Y|² + strength · Σ weight · φ(sample)²."""
+        """Minimise ∫|∇φ − Y|² + strength · Σ weight · φ(sample)² (Sec. 7.1, Fig. 11)."""
 
 
 class Adaptable(Protocol):
@@ -86,13 +86,13 @@ class Discretization(Adaptable, Protocol):
         """Bring sources into this discretisation."""
 
     def diffuse(self, source: Any) -> Any:
-        """Solve ``(M + tL) X = X₀``, right in direction however small X becomes."""
+        """Solve ``(M + tL) X = X₀`` (Eq. 12); directions stay right however small X becomes."""
 
     def to_cells(self, vectors: Any) -> NDArray[Any]:
         """X at the cells on which ∇φ lives: complex numbers on surfaces, rows of components in space."""
 
     def divergence(self, directions: NDArray[Any]) -> Any:
-        """b, the right-hand side of ``C φ = b``."""
+        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
 
 
 @dataclass(frozen=True)

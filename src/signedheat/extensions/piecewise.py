@@ -1,4 +1,4 @@
-"""Signed distance to curves that bound no region: piecewise-continuous integration (Sec. 7.2, Eq. 16).
+"""Signed distance to curves that bound no region: piecewise-continuous integration (Sec. 7.2, Eq. 15, Eq. 16).
 
 In every face φ is linear with gradient exactly Y, so it is known up to one constant per face. Where Y is integrable
 the constants fit across edges; where it is not, φ jumps, and the jumps are gathered on a cut that is short and runs
@@ -54,7 +54,7 @@ def piecewise_distance(
 
     Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
     triangle is the diffused, normalised source normal Y; κ_e is the difference between the slopes along e that the two
-    faces want (Eqs. 15–16). Edges at the source weigh 100 times as much, so that the cut keeps away from it unless
+    faces want (Eq. 15, Eq. 16). Edges at the source weigh 100 times as much, so that the cut keeps away from it unless
     nothing else is possible. Curves that do bound a region have a field without a cut: it differs from that of
     `SignedHeatSolver.distance` by no more than ``integration_error / √λ`` in the mean square, λ the least positive
     eigenvalue of the Laplacian. Works on surfaces of any topology, orientable or not; curves whose parts are oriented
@@ -177,7 +177,7 @@ def holds(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints
 
 
 def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid."""
+    """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid (constraint of Eq. 16)."""
     centroid = triangles.corner_positions.mean(axis=1, keepdims=True)
     result: NDArray[np.float64] = (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
     return result
@@ -186,9 +186,10 @@ def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) 
 def jump_problem(
     triangles: IntrinsicMesh, pairs: FacePairs, slopes: NDArray[np.float64], guarded: NDArray[np.bool_]
 ) -> JumpProblem:
-    """Eq. 16; jumps across guarded edges beyond those that the curl forces are dearer.
+    """The objective of Eq. 16, with one constant per face as unknowns, and the curl κ of Eq. 15 in its weights.
 
-    κ |e| is the difference between the jumps at the two ends of e.
+    The jumps at the two ends of an edge e differ by κ |e|, whatever the constants are. What they jump beyond that costs
+    `SOURCE_WEIGHT` times as much across guarded edges.
     """
     offsets = pairs.ends(slopes)
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]

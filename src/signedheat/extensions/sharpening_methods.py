@@ -86,7 +86,7 @@ def straight_distance(
 
 @dataclass(frozen=True)
 class Convex:
-    """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 18).
+    """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 17, Eq. 18).
 
     Repairs wrong signs that a long diffusion left. Biased low, since a slope of at most one in every triangle or tet is
     a lower bound on distance: on fine meshes `Geodesic` is far more accurate, and on tets the bias is greater than the

@@ -110,7 +110,7 @@ def in_layout(
 
 
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
-    """(n, n_vertices) sparse: values at vertices → values at points."""
+    """(n, n_vertices) sparse: from values at vertices to values at points. The rows of A in Eq. 14."""
     weights = located.barycentric
     index = np.repeat(np.arange(len(located)), 3).reshape(-1, 3)
     used = weights > 0

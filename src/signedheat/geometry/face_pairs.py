@@ -39,7 +39,10 @@ class FacePairs:
     shares: NDArray[np.float64]
 
     def ends(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(p, 2) difference, first face less second, of (m, 3) corner values at the edge's tail and at its head."""
+        """(p, 2) difference, first face less second, of (m, 3) corner values at the edge's tail and at its head.
+
+        Of the values that a face field Y integrates to, the two differ by the edge's length times its curl (Eq. 15).
+        """
         flat = corner_values.ravel()
         at_tail, at_head = flat[self.tails], flat[self.heads]
         return np.stack([at_tail[:, 0] - at_tail[:, 1], at_head[:, 0] - at_head[:, 1]], axis=1)

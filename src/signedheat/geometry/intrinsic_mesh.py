@@ -111,7 +111,10 @@ class IntrinsicMesh:
 
     @cached_property
     def edge_directions(self) -> NDArray[np.complex128]:
-        """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout."""
+        """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout.
+
+        Two edges e, g of a face differ by the rotation ``conj(z_fe) z_fg``, which is r of Eq. 8.
+        """
         return np.where(self.edges.forward, 1.0, -1.0) * self.edge_vectors / self.edge_lengths
 
     @cached_property
@@ -146,16 +149,16 @@ class IntrinsicMesh:
         return join_faces(self.edges.face_edges, self.n_edges)
 
     def in_edge_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """(m, 3) or (m, 1) face-layout vectors as seen in the frame of each of the face's edges."""
+        """(m, 3) vectors in face layouts, (m, 3) or (m, 1), expressed in the frames of the faces' edges (Eq. 8)."""
         turned = np.conj(self.edge_directions) * vectors
         return np.where(self.reflected, np.conj(turned), turned)
 
     def in_face_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """(m, 3) the vectors of an (e,) edge array as seen in the layout of each face."""
+        """(m, 3) vectors at the edges of each face, from an (e,) array in edge frames to the face's layout (Eq. 8)."""
         of_face = vectors[self.edges.face_edges]
         return self.edge_directions * np.where(self.reflected, np.conj(of_face), of_face)
 
     def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """(m,) sum of the vectors of an (e,) edge array at the three edges of each face, in its layout."""
+        """(m,) sum of the vectors at the three edges of each face, in its layout: three times the average of Sec. 6."""
         vectors = np.ascontiguousarray(vectors)
         return gather(self.edges.face_edges, self.edge_directions, self.reflected, vectors)

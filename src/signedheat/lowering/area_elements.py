@@ -1,4 +1,4 @@
-"""Oriented area elements: what a shape in space is to the method, whatever it was made of.
+"""Oriented area elements: what a shape in space is to the method, whatever it was made of (Eq. 11 in space).
 
 Triangles, fans of polygons, segments of a polyline and oriented points are all simplices that carry a vector: their
 area times their normal. They are bisected until they are small beside a cell, and merged again per cell and connected

@@ -51,7 +51,7 @@ class DirectIntegration:
         return self.factorize(_grounded(self.stiffness, self._first_vertices))
 
     def solve(self, divergence: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
-        """Minimise ∫|∇φ − Y|² with nothing imposed."""
+        """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
         return self.solve_many([divergence], [source])[0]
 
     def solve_many(
@@ -62,11 +62,11 @@ class DirectIntegration:
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels exactly, but only where the source asks for it: see `SurfaceSource.pinned`."""
+        """Impose levels exactly (Eq. 14), but only where the source asks for it: see `SurfaceSource.pinned`."""
         return self._impose(divergence, source, levels, source.pinned)
 
     def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels exactly at every sample."""
+        """Impose levels exactly at every sample (Eq. 14)."""
         return self._impose(divergence, source, levels, np.ones(len(source.weights), dtype=bool))
 
     def _impose(
@@ -102,7 +102,7 @@ class DirectIntegration:
         return self._centered(fitted[:, 0], source)
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
-        """``(C + λ Aᵀ W A) φ = b``."""
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements of the samples."""
         rows = source.interpolation
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
 
@@ -117,7 +117,7 @@ class DirectIntegration:
     def _interpolate(
         self, rows: sparse.csr_matrix, forces: NDArray[np.float64], levels: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f``.
+        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f`` (Eq. 14).
 
         An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite however many rows repeat each other, and
         stiff springs leave two or three rounds to do. Every round starts from true residuals, which also mends what

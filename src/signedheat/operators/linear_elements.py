@@ -1,4 +1,4 @@
-"""Functions that are linear in every cell: all that the convex problem of Sec. 7.3 knows of a domain."""
+"""Functions that are linear in every cell: all that the convex problem of Eq. 17 and Eq. 18 needs of a domain."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ class LinearElements:
 
     @property
     def masses(self) -> NDArray[np.float64]:
-        """(n,) integral of the function that is one at an unknown and zero at the others."""
+        """(n,) integral of the function that is one at an unknown and zero at the others: A_i of Eq. 18."""
         share = np.repeat(self.sizes / self.corners.shape[1], self.corners.shape[1])
         return np.bincount(self.corners.ravel(), share, self.slope_matrix.shape[1])
 
     def slopes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, d) ∇φ in every cell."""
+        """(m, d) ∇φ in every cell, whose length Eq. 17 bounds by one."""
         return (self.slope_matrix @ values).reshape(len(self.sizes), -1)
 
     def divergence(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Operators on tetrahedra: Crouzeix–Raviart on faces for diffusion, P1 on vertices for integration (Sec. 8.1, App. B).
+"""Operators on tets: Crouzeix–Raviart on faces for diffusion, linear on vertices for integration (Sec. 8.1, App. B).
 
 Everything follows from the area vectors N_k of the face opposite corner k, pointing out of the tet T: the barycentric
 coordinate λ_k has gradient ``−N_k / (3|T|)``, the Crouzeix–Raviart function ``ψ_k = 1 − 3λ_k`` has ``N_k / |T|``.
@@ -90,26 +90,35 @@ class Tetrahedra:
         return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
 
     def face_mass(self, faces: FaceTable) -> NDArray[np.float64]:
-        """(f,) M of Eq. 12, lumped: a quarter of the volume at each face."""
+        """(f,) M of Eq. 12, lumped: a quarter of the volume at each face.
+
+        The consistent mass of Eq. 23 has 2/5 of the volume on its diagonal and −1/20 between two faces of a tet. These
+        quarters are its row sums; they are as accurate, and simpler.
+        """
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
         return np.bincount(faces.tet_faces.ravel(), weights=quarter, minlength=len(faces.vertices))
 
     def face_laplacian(self, faces: FaceTable) -> sparse.csr_matrix:
-        """(f, f) Crouzeix–Raviart Laplacian: L_ab = Σ_T N_a·N_b / |T|, which is −(3/2) |e| cot θ between two faces.
+        """(f, f) Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T|, −(3/2) |e| cot θ between two faces.
 
+        e is the edge that the two faces share, θ the dihedral angle of the tet there.
         The faces of flat tets are tied to each other besides: directions then pass through them unharmed.
         """
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
 
     def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
-        """(n, n) cotan Laplacian: C_ij = Σ_T N_i·N_j / (9|T|), which is −(1/6) |e| cot θ between two vertices.
+        """(n, n) cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|), −(1/6) |e| cot θ between two vertices.
 
+        e is the edge of the tet opposite edge ij, θ the dihedral angle there.
         The vertices of flat tets are tied to each other, loosely, besides, since some have no other tets.
         """
         return _assemble(self.area_vectors, self.stiffness_factors / 9, 1e-4 * self.ties, corners, n)
 
     def divergence(self, directions: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
-        """(n,) b of Eq. 13: ∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T for one vector Y per tet."""
+        """(n,) b of Eq. 13 for one vector Y per tet: the divergence of Eq. 22, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``.
+
+        Eq. 22 is printed without the ⅓, and with the opposite sign, as the paper's Laplacian is negative semidefinite.
+        """
         parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.weights / -3)[:, None]
         return np.bincount(corners.ravel(), weights=parts.ravel(), minlength=n)
 

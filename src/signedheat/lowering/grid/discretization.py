@@ -82,10 +82,12 @@ class GridDiscretization:
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
+        """X₀ and the rows that interpolate φ on the source: Eq. 11 in space, area vectors spread to the nodes."""
         samples = sample_on_grid(sources, self.grid, SAMPLE_SIZE)
         return GridSource(samples, self.grid, diffusion)
 
     def diffuse(self, source: GridSource) -> list[Level]:
+        """Solve ``(1 − tΔ) X = X₀`` (Eq. 12): in flat space each component of X diffuses by itself."""
         return diffuse_multilevel(source.vectors, source.time_on, source.finest)
 
     def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
@@ -94,6 +96,7 @@ class GridDiscretization:
         return np.moveaxis(directions.reshape(dimension, *self.grid.shape), 0, -1)
 
     def divergence(self, directions: NDArray[np.floating]) -> NDArray[np.float64]:
+        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return divergence(directions, self.grid.spacing)
 
 

@@ -64,7 +64,7 @@ class FreeNodes:
 
     @cached_property
     def laplacian(self) -> sparse.csr_matrix:
-        """C: positive semidefinite, with no flux through walls and into solid nodes."""
+        """C, Eq. 10 on a grid: positive semidefinite, with no flux through the box or into solid nodes."""
         n, weights = len(self.ids), np.repeat(self.grid.spacing**-2.0, 2)
         there = self.neighbors >= 0
         rows, sides = np.nonzero(there)
@@ -72,7 +72,7 @@ class FreeNodes:
         return sparse.csr_matrix(sparse.diags_array(there @ weights) - parts)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) −∇·Y, each face between two free nodes taking the mean of theirs, and all others nothing."""
+        """(n,) −∇·Y, which is b of Eq. 13. The flux between two free nodes is the mean of theirs, any other zero."""
         result = np.zeros(len(directions))
         for axis, step in enumerate(self.grid.spacing):
             for side, sign in ((2 * axis, 1.0), (2 * axis + 1, -1.0)):

@@ -31,14 +31,16 @@ class GridIntegration:
     grid: Grid
 
     def solve(self, divergence: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
         phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
         phi -= np.average(source.at_samples(phi), weights=source.weights)
         return phi
 
     def fit(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
-        """Subtract from φ the mean of its error at the samples, weighted by how well each is seen from a node.
+        """Subtract from φ a smooth function that takes its error at the samples (in place of Eq. 14).
 
-        The weights are the samples' areas, diffused as the normals are.
+        At a node it is the mean of the errors of all samples, weighted by area and nearness: errors and areas are
+        diffused as the normals were, and divided.
         """
         phi = self.solve(divergence, source)
         excess = deviation(source.at_samples(phi), source, levels)
@@ -46,15 +48,16 @@ class GridIntegration:
         return phi
 
     def penalize(self, divergence: NDArray[np.float64], source: GridSource, strength: float) -> NDArray[np.float64]:
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples."""
         levels = Levels(np.zeros(len(source.weights)))
         zero = np.zeros(len(source.weights))
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
     def fit_exactly(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
-        """Augmented Lagrangian, then the least correction at the nodes around the samples that leaves no deviation.
+        """Solve Eq. 14 by an augmented Lagrangian, then the least correction at the nodes around the samples.
 
         The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
-        small, and met directly. Rows that contradict each other are met in the mean.
+        small, and corrected directly. Rows that contradict each other are met in the least-squares sense.
         """
         strength = STIFFNESS / float(self.grid.spacing.mean())
         phi = self.fit(divergence.copy(), source, levels)

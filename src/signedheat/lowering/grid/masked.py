@@ -72,7 +72,7 @@ class MaskedGridDiscretization:
         return MaskedSource.of(whole, self.nodes)
 
     def diffuse(self, source: MaskedSource) -> NDArray[np.float64]:
-        """Solve ``(1 − tΔ) X = X₀`` and turn X where the way from the source is bent.
+        """Solve ``(1 − tΔ) X = X₀`` (Eq. 12) and turn X where the shortest way from the source is bent.
 
         In flat space diffusion carries vectors along without turning them. Where the straight line to the source passes
         solid nodes, or leads past the end of a source that a wall ends, the way to it is bent, and has the direction in
@@ -95,7 +95,7 @@ class MaskedGridDiscretization:
         return np.where(straight[:, None], vectors, side[:, None] * falling)
 
     def solve_heat(self, time: float, loads: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
-        """``(1 − tΔ)⁻¹`` of columns, in stages."""
+        """``(1 − tΔ)⁻¹`` (Eq. 12) of columns, in stages that each begin where the one before underflows."""
         matrix = self._heat_matrix(time)
         return solve_in_stages(matrix, self._solver(matrix, time), loads)
 
@@ -133,7 +133,7 @@ class MaskedGridDiscretization:
         return vectors
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """b, the right-hand side of ``C φ = b``."""
+        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return self.nodes.divergence(directions)
 
 
@@ -144,7 +144,7 @@ class MaskedIntegration(DirectIntegration):
     diffusing: MaskedGridDiscretization | None = None
 
     def fit(self, divergence: NDArray[np.float64], source: MaskedSource, levels: Levels) -> NDArray[np.float64]:
-        """Subtract from φ the mean of its error at the samples, weighted by area and by the heat that each sends."""
+        """Subtract from φ the mean of its errors at the samples, weighted by area and heat (in place of Eq. 14)."""
         phi = self.solve(divergence, source)
         excess = deviation(source.interpolation @ phi, source, levels)
         if not excess.any():

@@ -74,7 +74,7 @@ class SurfaceDiscretization:
 
     @cached_property
     def stiffness(self) -> sparse.csr_matrix:
-        """Upper triangle of C, on the vertices of the triangles."""
+        """Upper triangle of C (Eq. 10), on the vertices of the triangles."""
         return cotan_matrix(self.triangles)
 
     @cached_property
@@ -120,11 +120,11 @@ class SurfaceDiscretization:
         )
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
-        """X₀ and the rows that interpolate φ along the sources."""
+        """X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
         return surface_source(self.triangles, sources, diffusion, self.spacing)
 
     def diffuse(self, source: Any) -> list[NDArray[np.complex128]]:
-        """Solve ``(M + tL) X = X₀``; one vector per edge, in stages (see `VectorHeat`)."""
+        """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per edge, in stages (see `VectorHeat`)."""
         return self.diffuse_many([source])[0]
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
@@ -145,7 +145,7 @@ class SurfaceDiscretization:
         return vectors
 
     def divergence(self, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """b, the right-hand side of ``C φ = b``."""
+        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return divergence(self.triangles, directions)
 
     def reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:

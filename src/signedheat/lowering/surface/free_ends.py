@@ -1,4 +1,4 @@
-"""The round end of an unoriented curve (App. A.2)."""
+"""The round end of an unoriented curve (App. A.2, arcs of type C; Eq. 19 over a part of the circle)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sources on surfaces, lowered to X₀ of Eq. 12 and to the rows that interpolate φ on them."""
+"""Sources on surfaces, lowered to X₀ of Eq. 12 (Eq. 11, Eq. 19) and to the rows A of Eq. 14 that interpolate φ."""
 
 from __future__ import annotations
 
@@ -145,10 +145,10 @@ def surface_source(
 
 
 def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> csr_array:
-    """Eq. 11 without the value of ψ_e: i(b − a), on the edge that it runs along or in thirds on those of its face.
+    """Eq. 11 without its factor ψ_e(m): i(b − a) for a segment ab, to its edge or in thirds to the edges of its face.
 
-    One third is the mean of ψ_e over a face; it gives both kinds of pieces of one curve the same weight. (The
-    published code adds the whole vector to each of the three edges.)
+    One third is the mean of ψ_e over a face; it gives segments along edges and segments inside faces of one curve the
+    same weight. (The published code adds the whole vector to each of the three edges.)
     """
     sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
     for part in parts:
@@ -159,7 +159,7 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
 
 
 def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
-    """App. A.2: each side of a curve along edges points away from it, and round its free ends.
+    """App. A.2, from Eq. 11 and Eq. 19: vectors away from curves along edges, on both sides and at free ends.
 
     A face beside edge ij gets i(p_j − p_i), ij in its own order, on its other two edges; on ij itself the sides cancel.
     """

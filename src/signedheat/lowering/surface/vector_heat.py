@@ -20,7 +20,7 @@ _FAINT = 2.0**-900  # of the largest X: below, what underflows in the factor or 
 
 @dataclass(frozen=True, eq=False)
 class VectorHeat:
-    """``(M + tL) X = X₀`` on the edges of triangles.
+    """Solver of ``(M + tL) X = X₀`` (Eq. 12) on the edges of triangles.
 
     X falls like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. What lies
     beyond is solved for again: X restricted to the faint edges satisfies the same equation with a right-hand side

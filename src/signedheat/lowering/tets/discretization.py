@@ -96,11 +96,11 @@ class TetDiscretization:
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> TetSource:
-        """X₀ and the rows that average φ over the sources."""
+        """X₀ (Sec. 8.1; Eq. 11 in space) and the rows that average φ over the sources (Eq. 14)."""
         return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
 
     def diffuse(self, source: TetSource) -> NDArray[np.float64]:
-        """Solve ``(M + tL) X = X₀``: one vector per face, averaged in the tets."""
+        """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per face, averaged in the tets (App. B.2)."""
         if self._is_convex:
             return self._in_tets(self._stages(source.time, source.vectors))[0]
         loads = np.concatenate([source.vectors, source.strengths[:, None]], axis=1)
@@ -167,6 +167,7 @@ class TetDiscretization:
         return IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
 
     def _heat_matrix(self, time: float) -> sparse.csr_matrix:
+        """M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
         matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass(self.mesh.faces)
         matrix.setdiag(matrix.diagonal() + mass)
         return matrix
@@ -188,7 +189,7 @@ class TetDiscretization:
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """b, the right-hand side of ``C φ = b``."""
+        """b, the right-hand side of ``C φ = b`` (Eq. 13, Eq. 22)."""
         return self.mesh.geometry.divergence(directions, self.unknowns, self.n_unknowns)
 
     @cached_property

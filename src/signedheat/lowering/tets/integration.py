@@ -39,7 +39,10 @@ class TetIntegration(DirectIntegration):
     gradients: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.zeros_like
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups."""
+        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups; see Eq. 14.
+
+        S is the diagonal matrix of the `springs`, in place of the multipliers of Eq. 14.
+        """
         rows = source.interpolation
         springs, factor = self.springs(source), self.anchored(source)
         pull = sparse.csr_matrix(rows.T @ sparse.diags_array(springs))
@@ -60,12 +63,12 @@ class TetIntegration(DirectIntegration):
         return self._centered(fitted, source)
 
     def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels at the samples, exactly."""
+        """Impose levels at the samples exactly (Eq. 14)."""
         bend = self._bend(self.factor.solve(divergence), source)
         return super().fit_exactly(divergence, source, replace(levels, values=levels.values - bend))
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
-        """``(C + λ Aᵀ W A) φ = b``, with φ on the source for A φ."""
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), where A φ is corrected for the curvature of φ."""
         free = super().penalize(divergence, source, strength)
         pull = source.interpolation.T @ (strength * source.weights * self._bend(free, source))
         return super().penalize(divergence - pull, source, strength)

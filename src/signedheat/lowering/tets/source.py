@@ -1,4 +1,4 @@
-"""Shapes in space, lowered to a tet mesh: X₀ of Eq. 12, and the rows that average φ over the source."""
+"""Shapes in space, lowered to a tet mesh: X₀ of Eq. 12 (Sec. 8.1), and the rows A of Eq. 14 that average φ on them."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class CoarseGuess:
 def diffuse_multilevel(
     sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = ROUNDS
 ) -> list[Level]:
-    """Solve ``(1 − tΔ) X = B`` on every level, from `finest` (0: the grid of the sources) to the coarsest.
+    """Solve ``(1 − tΔ) X = B``, Eq. 12 on a grid, on every level from `finest` (0: the sources' grid) to the coarsest.
 
     Parameters
     ----------

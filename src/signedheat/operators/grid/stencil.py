@@ -22,7 +22,7 @@ SLAB = 16
 
 
 def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(*shape) −∇·Y, each face between two nodes taking the mean of theirs, and the walls nothing.
+    """(*shape) −∇·Y, which is b of Eq. 13. The flux between two nodes is the mean of theirs, that through walls zero.
 
     Examples
     --------
@@ -38,7 +38,7 @@ def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -
 
 
 def laplacian(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
-    """C φ: the positive semidefinite Laplacian with no flux through the walls."""
+    """C φ, Eq. 10 on a grid: the positive semidefinite Laplacian of 2d + 1 points, with no flux through the walls."""
     result = np.zeros_like(values)
     for axis, h in enumerate(spacing):
         rise = np.diff(values, axis=axis) / h**2
@@ -52,7 +52,7 @@ def laplacian(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDAr
 def solve_poisson(
     right_hand_side: NDArray[np.float64], spacing: NDArray[np.float64], overwrite: bool = False
 ) -> NDArray[np.float64]:
-    """φ of mean zero with C φ = b, by the cosine transform that diagonalises C.
+    """φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform that diagonalises C.
 
     Examples
     --------

@@ -25,7 +25,7 @@ def diffuse_by_sweeps(
     rounds: int,
     given: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j`` with no flux through the walls.
+    """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, with no flux through the walls.
 
     Parameters
     ----------
