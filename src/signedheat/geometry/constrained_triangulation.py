@@ -1,4 +1,4 @@
-"""Cut one triangle along straight segments: a small constrained triangulation of points in the plane."""
+"""A constrained triangulation of one triangle: points inside it, and straight segments that must become edges."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def turn(a: Point, b: Point, c: Point) -> float:
 
 
 def arrange(points: list[Point], segments: Sequence[tuple[int, int]]) -> list[list[int]]:
-    """Cut segments where they cross or pass through points; crossings are appended to `points`.
+    """Subdivide segments where they cross each other or pass through points.
 
-    Returns the chain of points along each segment, from its start to its end.
+    Crossings are appended to `points`. Returns the points along each segment, from its start to its end.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def arrange(points: list[Point], segments: Sequence[tuple[int, int]]) -> list[li
 
 
 def cross(points: list[Point], a: int, b: int, c: int, d: int) -> None:
-    """Append the point at which two segments cross, unless a point is there already."""
+    """Append the crossing of segments ab and cd to `points`, unless there is a point already."""
     p, q, r, s = points[a], points[b], points[c], points[d]
     left, right = turn(r, s, p), turn(r, s, q)
     if left * right >= 0 or turn(p, q, r) * turn(p, q, s) >= 0:
@@ -60,7 +60,7 @@ def cross(points: list[Point], a: int, b: int, c: int, d: int) -> None:
 def triangulate(
     points: Sequence[Point], sides: Sequence[Sequence[int]], segments: Sequence[tuple[int, int]]
 ) -> list[tuple[int, int, int]]:
-    """Triangles between points in a triangle such that no segment crosses one of them.
+    """Triangulate points in a triangle so that every given segment is an edge.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def triangulate(
     sides : three sequences of int
         Points on each side, from its tail to its head, without the corners.
     segments : sequence of pairs
-        They meet only at points and have none inside them.
+        Pairs of points. Segments meet at points only, and no point lies in the interior of one.
 
     Examples
     --------
@@ -93,17 +93,17 @@ def triangulate(
 
 
 def rotated(u: int, v: int, w: int) -> tuple[int, int, int]:
-    """A triangle told from its least corner on."""
+    """The corners of a triangle in the same cyclic order, the smallest id first."""
     return min((u, v, w), (v, w, u), (w, u, v))
 
 
 def add(apex: dict[tuple[int, int], int], u: int, v: int, w: int) -> None:
-    """Add a triangle, known to each of its directed edges by the corner opposite."""
+    """Add a triangle: `apex` maps each of its directed edges to the opposite corner."""
     apex[u, v], apex[v, w], apex[w, u] = w, u, v
 
 
 def split_edge(apex: dict[tuple[int, int], int], u: int, v: int, i: int) -> None:
-    """Put a point on an edge, in the triangles on both of its sides."""
+    """Insert point i on an edge, splitting the triangles on both sides of it."""
     for a, b in ((u, v), (v, u)):
         if (a, b) in apex:
             w = apex.pop((a, b))
@@ -112,7 +112,7 @@ def split_edge(apex: dict[tuple[int, int], int], u: int, v: int, i: int) -> None
 
 
 def insert(points: Sequence[Point], apex: dict[tuple[int, int], int], i: int) -> None:
-    """Put a point into the triangle that has it, or on its edge."""
+    """Insert point i into the triangle that contains it, or on the edge that it lies on."""
     x = points[i]
     best, where = -float("inf"), (0, 0, 0)
     for (u, v), w in apex.items():
@@ -131,7 +131,7 @@ def insert(points: Sequence[Point], apex: dict[tuple[int, int], int], i: int) ->
 
 
 def force(points: Sequence[Point], apex: dict[tuple[int, int], int], a: int, b: int) -> None:
-    """Flip the edges that cross a segment until it is an edge itself (Sloan 1993)."""
+    """Flip the edges that cross segment ab until it is an edge itself (Sloan 1993)."""
     if (a, b) in apex or (b, a) in apex:
         return
     p, q = points[a], points[b]
