@@ -1,4 +1,4 @@
-"""Sparse factorisations: one file per back end, one chooser."""
+"""Sparse linear solvers: one module per factorisation back end, a function that chooses one, and Krylov methods."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Factor(Protocol):
 
 
 def available_backends() -> list[str]:
-    """Names of the back ends that this machine has, best first."""
+    """Names of the back ends available on this machine, fastest first."""
     return [
         *(["pardiso"] if pardiso.is_available() else []),
         *(["cholmod"] if cholmod.is_available() else []),
@@ -46,18 +46,23 @@ def factorize(
     Parameters
     ----------
     matrix : (n, n) sparse, float64 or complex128
-        Only the diagonal and what is above it are read.
+        Only the upper triangle, diagonal included, is read.
     backend : str, optional
         One of `available_backends`; by default the environment variable ``SIGNEDHEAT_BACKEND``, or else the best.
     order : (n,) int, optional
-        Fill-reducing elimination order, where one is known: ``order[k]`` is the unknown eliminated k-th.
+        Fill-reducing elimination order, if one is known: ``order[k]`` is the unknown eliminated k-th.
     reused : bool
-        Whether many solutions are wanted. PARDISO then finds an order of its own, for which it solves on all cores.
+        Whether many systems will be solved. PARDISO then finds an order of its own, with which it solves on all cores.
+
+    Returns
+    -------
+    Factor
+        Solves ``matrix @ x = rhs``.
 
     Raises
     ------
     FactorizationError
-        If the matrix is not positive definite, or memory does not suffice.
+        If the matrix is not positive definite, or the factor does not fit into memory.
 
     Examples
     --------

@@ -1,7 +1,6 @@
 """Conjugate gradients preconditioned by an incomplete Cholesky factor without fill, IC(0).
 
-For systems too large to factorise. The factor takes as much memory as half the matrix, so everything here grows
-linearly, but for the number of iterations.
+For systems too large to factorise. The factor takes as much memory as half the matrix; time per iteration is linear.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from scipy import sparse
 from ..compiled import compiled
 
 SMALLEST = 1e-290
-"""Unknowns below this have lost bits to underflow and stop nothing."""
+"""Unknowns below this have lost bits to underflow, and are left out of the stopping criterion."""
 
 MOST_ITERATIONS = 5000
 
@@ -27,11 +26,11 @@ class IncompleteCholesky:
     Attributes
     ----------
     order : (k,) int
-        Unknowns to solve for; the others stay zero.
+        Unknowns to solve for, in this order; the others stay zero.
     indptr, indices : int arrays
-        Rows of the strictly lower triangle, in that order.
+        Sparsity pattern (CSR) of the strictly lower triangle, rows and columns in that order.
     diagonal, lower : float arrays
-        The matrix.
+        Diagonal and strictly lower triangle of the matrix.
     pivots, factor : float arrays
         Inverse diagonal and strictly lower triangle of the factor.
     n : int
@@ -49,7 +48,7 @@ class IncompleteCholesky:
 
     @classmethod
     def of(cls, matrix: sparse.csr_matrix, order: NDArray[np.int64]) -> IncompleteCholesky:
-        """Factorise; where a pivot would not be positive, with a larger diagonal (Manteuffel 1980).
+        """Factorise; if a pivot is not positive, again with a larger diagonal (Manteuffel 1980).
 
         Examples
         --------
@@ -68,11 +67,12 @@ class IncompleteCholesky:
             shift = max(1e-3, 2 * shift)
 
     def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> NDArray[np.float64]:
-        """Solve for one right-hand side (n,) or several (n, k), as one system.
+        """Solve by conjugate gradients for one right-hand side (n,) or several (n, k), as one block-diagonal system.
 
-        Stops once ``‖r‖ ≤ relative · ‖b‖``, or once ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row: the second
-        keeps solutions right that fall by hundreds of orders of magnitude. In `order` by distance from where b is not
-        zero, errors travel outward with the solution and shrink with it.
+        Stops once ``‖r‖ ≤ relative · ‖b‖``, or once ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row. The second
+        criterion keeps the relative accuracy of solutions that decay by hundreds of orders of magnitude. For these,
+        `order` should be by distance from the nonzeros of b: errors then propagate outward with the solution, and decay
+        with it.
         """
         b = np.asarray(rhs, dtype=np.float64)
         x = np.zeros((self.n, b[0].size))
@@ -95,7 +95,7 @@ class IncompleteCholesky:
 
 
 def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The unknowns that the seeds reach through the matrix, by graph distance from them.
+    """The unknowns that are connected to the seeds in the graph of the matrix, in order of distance from them.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def _breadth_first(indptr, indices, data, seeds):
 
 @compiled
 def _lower_triangle(indptr, indices, data, order, n):
-    """Diagonal and strictly lower triangle, rows and columns in `order`, columns sorted."""
+    """Diagonal and strictly lower triangle (CSR), rows and columns in `order`, columns sorted."""
     place = np.full(n, -1, dtype=np.int64)
     for i in range(len(order)):
         place[order[i]] = i
@@ -167,7 +167,7 @@ def _lower_triangle(indptr, indices, data, order, n):
 
 @compiled
 def _factorize(indptr, indices, factor, pivots):
-    """IC(0) in place; `pivots` becomes the inverse diagonal. False where a pivot is not clearly positive."""
+    """IC(0) in place; `pivots` becomes the inverse diagonal. Returns False if a pivot is not clearly positive."""
     for i in range(len(pivots)):
         own = pivots[i]
         rest = own
@@ -195,7 +195,7 @@ def _factorize(indptr, indices, factor, pivots):
 
 @compiled
 def _precondition(indptr, indices, factor, pivots, r, z):
-    """z = (L Lᵀ)⁻¹ r, row by row down and up."""
+    """``z = (L Lᵀ)⁻¹ r``, by forward and back substitution."""
     n, width = r.shape
     for i in range(n):
         for c in range(width):

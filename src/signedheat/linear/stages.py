@@ -1,4 +1,4 @@
-"""Solutions that fall out of the range of floating-point numbers, in stages that each begin anew."""
+"""Underflow-safe solves: solutions that leave the range of floating-point numbers, in stages with a scale each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 FAINT = 1e-250
-"""Rows below this fraction of the largest are computed anew, before they underflow."""
+"""Unknowns below this fraction of the largest are solved for again in the next stage, before they underflow."""
 
 
 def solve_in_stages(
@@ -17,24 +17,25 @@ def solve_in_stages(
     solve: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     loads: NDArray[np.float64],
 ) -> list[tuple[NDArray[np.float64], float]]:
-    """Solve ``A x = loads`` for columns that decay exponentially away from where the loads are.
+    """Solve ``A x = loads`` for columns that decay exponentially away from the nonzeros of the loads.
 
-    On the faint rows x satisfies the same equation with a right-hand side along their border. Scaled up, that is the
-    next right-hand side.
+    Where x is faint it satisfies the same equation, with a right-hand side along the border of the faint region that
+    the known x outside determines. Scaled up, that is the right-hand side of the next stage.
 
     Parameters
     ----------
     matrix : (n, n) sparse
         A, whole.
     solve : callable
-        Solves for (n, k) right-hand sides.
+        Solves ``A x = b`` for (n, k) right-hand sides.
     loads : (n, k) float
         Right-hand sides, not all zero.
 
     Returns
     -------
     list of (values (n, k), logarithm)
-        x is the values times the exponential of the logarithm; NaN nearer than where a stage begins.
+        One pair per stage: x is the values times the exponential of the logarithm. Values are NaN between the source
+        and the border at which the stage begins.
 
     Examples
     --------

@@ -57,7 +57,7 @@ def _local_entries(triangles: IntrinsicMesh, time: float, faces: NDArray[np.int6
 
 
 def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
-    """Blocks ``B_feᵀ B_fg``, where the columns of B_fe are the axes of the edge's frame in the face."""
+    """The real matrix of blocks ``B_feᵀ B_fg``; the columns of B_fe are the axes of the edge's frame in the face."""
     edge, z = triangles.edges.face_edges, triangles.edge_directions
     rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
     second = np.where(triangles.reflected, -1j, 1j) * z
