@@ -15,33 +15,32 @@ from .validation import finite_rows, frozen
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve on a surface, from point to point; φ > 0 to its left if it is oriented.
+    """A polyline on a surface; φ > 0 to its left if it is oriented.
 
-    Left is a quarter turn counter-clockwise from the curve's direction, as seen with the face normal towards you. A
-    segment along an edge has the left of the first face at that edge. Points given on an edge or at a vertex are
-    recognised whatever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive
-    points that share no face are joined by a shortest line across the faces between them; consecutive points that
-    coincide are harmless.
+    Left is the direction of the curve turned by 90° counter-clockwise, as seen with the face normal towards you. For a
+    segment along an edge it is left in the first face at that edge. Points on an edge or at a vertex are recognised as
+    such whichever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive points
+    that share no face are joined by a geodesic path; consecutive points may coincide.
 
     Parameters
     ----------
     faces : (n,) int
-        Face that each point lies in; any face that has the point will do.
+        Face that each point lies in; any face that contains the point.
     barycentric : (n, 3) float
-        Where in that face.
+        Barycentric coordinates in that face.
     closed : bool
         Whether the last point is joined to the first.
     oriented : bool
-        Whether the curve has two sides; an unoriented curve has distance like |φ|.
+        Whether the curve has a positive and a negative side; distance to an unoriented curve is unsigned.
     normals : (segments, 3) float, optional
         Direction in space in which φ grows across each segment. Needed where left has no meaning: on surfaces whose
-        faces are not consistently oriented. Only their part along the surface counts, and not their length.
+        faces are not consistently oriented. Normals are projected on the surface; their lengths are ignored.
 
     Raises
     ------
     SourceError
         If there are fewer than two points, a number is NaN or infinite, coordinates are not barycentric, or the number
-        of normals is not that of the segments. Face ids are checked when the curve meets its surface.
+        of normals is not that of the segments. Face ids are checked when the curve is used on its surface.
 
     Examples
     --------
@@ -96,7 +95,7 @@ class Curve:
         return self.n_points if self.closed else self.n_points - 1
 
     def reversed(self) -> Curve:
-        """The same curve run the other way: left and right change places, normals stay what they are."""
+        """The curve in opposite direction: left and right are exchanged; given normals stay the same."""
         normals = None
         if self.normals is not None:
             normals = np.roll(self.normals[::-1], -1, axis=0) if self.closed else self.normals[::-1]
@@ -114,9 +113,9 @@ class SurfacePoints:
     Parameters
     ----------
     faces : (n,) int
-        Face that each point lies in; any face that has the point will do.
+        Face that each point lies in; any face that contains the point.
     barycentric : (n, 3) float
-        Where in that face.
+        Barycentric coordinates in that face.
 
     Raises
     ------
@@ -161,7 +160,7 @@ CurvesAndPoints: TypeAlias = CurveOrPoints | Sequence[CurveOrPoints | Sequence[C
 def surface_points(
     faces: ArrayLike, barycentric: ArrayLike, name: str
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Frozen face ids and barycentric coordinates, checked as far as they can be without the surface."""
+    """Read-only face ids and barycentric coordinates, checked as far as possible without the surface."""
     ids = np.atleast_1d(np.asarray(faces))
     if ids.size == 0:
         return frozen(np.empty(0, dtype=np.int64)), frozen(np.empty((0, 3)))
@@ -181,7 +180,7 @@ def surface_points(
 
 
 def finite(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    """(n, 3) finite numbers, or a `SourceError`."""
+    """`values` as (n, 3) finite numbers; raises `SourceError` otherwise."""
     try:
         return finite_rows(values, name, 3)
     except GeometryError as error:

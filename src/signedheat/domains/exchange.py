@@ -1,4 +1,4 @@
-"""What all shapes share: files, and the objects of other packages."""
+"""Saving of shapes, and conversion from and to the objects of other packages."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ if TYPE_CHECKING:
 
 Kind = TypeVar("Kind", bound="Exchangeable[Any]")
 Trimesh = TypeVar("Trimesh")
-"""What trimesh makes of a kind of shape."""
+"""The type of trimesh that corresponds to a kind of shape."""
 
 save_shape: Slot[[object, str | PathLike[str]], None] = Slot("save_shape")
-"""Write a shape in the format that the file's name ends with."""
+"""Write a shape in the format given by the extension of the file."""
 shape_from: Slot[[str, type[object], object], Any] = Slot("shape_from")
-"""A shape of a given type from an object of a package, named first."""
+"""Arguments: name of a package, type of a shape, object of that package. Returns the shape."""
 shape_to: Slot[[str, object], Any] = Slot("shape_to")
-"""An object of a package, named first, from a shape."""
+"""Arguments: name of a package, shape. Returns an object of that package."""
 
 
 class Exchangeable(Generic[Trimesh]):
-    """A shape that can be saved, and turned into what trimesh, PyVista and meshio use.
+    """A shape that can be saved, and converted from and to objects of trimesh, PyVista and meshio.
 
-    Vertices and faces keep their number and order. Each package is optional, imported when it is asked for.
+    Vertices and faces keep their number and order. Each package is optional, and imported when it is needed.
     """
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format that its name ends with: see `signedheat.save`."""
+        """Write to a file, in the format given by its extension: see `signedheat.save`."""
         save_shape(self, path)
 
     @classmethod

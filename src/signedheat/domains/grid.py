@@ -36,15 +36,15 @@ class Grid(Generic[Dimension]):
     shape : (d,) int
         Number of nodes along each axis. Arrays on the grid are indexed ``[i, j, k]`` ↔ x, y, z.
     mask : (*shape) bool, optional
-        Solid nodes: True where no way leads through. Distance is measured around the boxes of one cell that have them
-        at their centres, from node to node along the axes: a wall is tight where its nodes are joined by sides, or, in
-        the plane, by corners.
+        Solid nodes: True where distance must not pass. Each is a box of one cell around the node, and distance is
+        measured around these boxes. Neighbouring free nodes along an axis are connected, diagonal ones are not: a wall
+        is tight if its nodes are connected along the axes, or, in the plane, diagonally.
 
     Raises
     ------
     GeometryError
         If the spacing is not positive and finite, an axis has fewer than two nodes, or the mask is not boolean, has
-        another shape or leaves no node.
+        another shape or leaves no node free.
 
     Examples
     --------
@@ -107,23 +107,23 @@ class Grid(Generic[Dimension]):
         padding: float | None = None,
         spacing: ArrayLike | None = None,
     ) -> Grid[int]:
-        """A grid around the middle of a box, with room on every side.
+        """A grid centred on a box, with padding on every side.
 
         Parameters
         ----------
         bounds : (2, d) float
-            Lower and upper corner, as the `bounds` of any shape.
+            Lower and upper corner of the box, such as the `bounds` of a shape.
         resolution : int
-            Nodes along the longest side, all axes with the same spacing.
+            Number of nodes along the longest side; all axes have the same spacing.
         padding : float, optional
-            Room on every side, or a little more; a fifth of the longest side by default.
+            Least distance between the box and the boundary of the grid; a fifth of the longest side by default.
         spacing : (d,) float or float, optional
-            Distance between nodes; the resolution then plays no part.
+            Distance between nodes; if given, the resolution is ignored.
 
         Raises
         ------
         GeometryError
-            If the box has no extent and there is no padding, or resolution, padding or spacing make no sense.
+            If the box has no extent and there is no padding, or resolution, padding or spacing are out of range.
 
         Examples
         --------
@@ -162,24 +162,24 @@ class Grid(Generic[Dimension]):
 
     @property
     def upper(self) -> NDArray[np.float64]:
-        """Position of the last node."""
+        """(d,) position of the last node."""
         result: NDArray[np.float64] = self.origin + self.spacing * (np.array(self.shape) - 1)
         return result
 
     @cached_property
     def axes(self) -> tuple[NDArray[np.float64], ...]:
-        """Node coordinates along each axis."""
+        """Coordinates of the nodes along each axis."""
         return tuple(
             frozen(o + s * np.arange(n)) for o, s, n in zip(self.origin, self.spacing, self.shape, strict=True)
         )
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """(*shape, d) node positions; made anew at each call, since they take d times the memory of a field."""
+        """(*shape, d) node positions; not cached, since they take d times the memory of a field."""
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the (n, d) points lie within the box of the nodes."""
+        """(n,) whether each of the (n, d) points lies within the bounding box of the nodes."""
         positions = np.asarray(points, dtype=np.float64)
         inside: NDArray[np.bool_] = np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
         return inside

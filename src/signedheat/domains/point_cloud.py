@@ -1,4 +1,4 @@
-"""Point clouds: as a domain, and, with normals, as a shape in space."""
+"""Point clouds, as domains, and, with normals, as sources in space."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     normals : (n, d) float, optional
         Directions pointing out of the shape; normalised here. A zero normal is an error.
     areas : (n,) float, optional
-        Surface area that each point stands for. Estimated from neighbours where needed and absent.
+        Surface area that each point represents. If absent, estimated from neighbours when needed.
     n_neighbors : int
-        Size of the neighbourhoods in which tangent planes are estimated and triangles made, where distance is measured
-        on the cloud.
+        Size of the neighbourhoods in which tangent planes are fitted and triangles made, when distance is measured on
+        the cloud.
 
     Raises
     ------
@@ -44,10 +44,10 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     Notes
     -----
-    As a domain, a cloud needs no normals, and normals need not agree: triangles on the points are oriented alike, each
-    connected part to the side to which most of its normals point, or else outward. Left of a curve is told from that
-    side, unless the curve brings its own normals. Points that coincide count once; points that fit into no triangle,
-    such as outliers, get no distance.
+    As a domain, a cloud needs no normals, and its normals need not be consistent: triangles on the points are oriented
+    consistently, each connected component to the side to which most of its normals point, or outward if there are none.
+    The left of a curve is as seen from that side, unless the curve has normals of its own. Points that coincide count
+    once; points without a triangle, such as outliers, get NaN.
 
     Examples
     --------
@@ -109,7 +109,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def representatives(self) -> NDArray[np.int64]:
-        """(n,) first point at the same place as each point, to a ten-millionth of the size of the cloud."""
+        """(n,) first point that coincides with each point, within a ten-millionth of the size of the cloud."""
         lower, upper = self.bounds
         cell = 1e-7 * max(float((upper - lower).max()), np.finfo(float).tiny)
         cells = np.rint((self.points - lower) / cell)
@@ -122,7 +122,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def _distinct(self) -> tuple[NDArray[np.int64], LocalTriangulations]:
-        """Ids of the distinct points, and triangles on them."""
+        """Ids of the distinct points, and their local triangulations."""
         if self.points.shape[1] != 3:
             raise GeometryError(
                 f"distance is measured on point clouds in space: points need 3 coordinates, not {self.points.shape[1]}"
@@ -141,12 +141,12 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to; of points that coincide, the first is their vertex."""
+        """The triangles that curves refer to; of points that coincide, the first is the vertex."""
         ids, found = self._distinct
         return TriangleMesh(self.points, ids[found.faces])
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of `triangulation`, which are the points."""
+        """Values at the vertices of `triangulation`, which are the points: the same."""
         return values
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Polygon meshes: faces with any number of corners, nonconvex and mildly nonplanar ones included."""
+"""Polygon meshes: faces with any number of corners, which may be nonconvex and mildly nonplanar."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) lower and upper corner of the box around the polygons; vertices of no polygon do not count."""
+        """(2, 3) lower and upper corner of the bounding box of the polygons, without unreferenced vertices."""
         corners = self.vertices[self.corners]
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
@@ -117,19 +117,19 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @cached_property
     def polygon_area_vectors(self) -> NDArray[np.float64]:
-        """(p, 3) vector areas: exact for every polygon, planar or not."""
+        """(p, 3) vector areas, which depend on the boundary of the polygon only, planar or not."""
         center = self.polygon_centroids[self.corner_polygons]
         a, b = self.vertices[self.corners] - center, self.vertices[self.next_corners] - center
         return 0.5 * np.add.reduceat(np.cross(a, b), self.offsets[:-1], axis=0)
 
     @cached_property
     def refinement(self) -> VirtualRefinement:
-        """The polygons as triangles, most often by a virtual vertex in each."""
+        """The polygons as triangles, usually by a virtual vertex in each polygon with more than three corners."""
         return virtual_refinement(self.vertices, self.corners, self.offsets)
 
     @cached_property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to; polygon after polygon, virtual vertices after the mesh's own."""
+        """The triangles that curves refer to, polygon after polygon; virtual vertices follow those of the mesh."""
         refinement = self.refinement
         return TriangleMesh(np.concatenate([self.vertices, refinement.virtual_vertices]), refinement.faces)
 

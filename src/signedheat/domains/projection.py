@@ -1,4 +1,4 @@
-"""Polylines in space, brought onto a surface."""
+"""Projection of polylines in space on a surface."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .curves import Curve, finite
 def projected_curve(
     mesh: Triangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
 ) -> Curve:
-    """The curve through the closest points of a mesh, with shortest lines across faces between them."""
+    """The curve through the closest points on a mesh, joined by geodesic paths."""
     points = finite(points, "points of the polyline")
     if len(points) < 2:
         raise SourceError(
@@ -49,7 +49,7 @@ def projected_curve(
 def closest_points(
     mesh: Triangles, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Face, barycentric coordinates and distance of the point of a mesh closest to each point."""
+    """Face, barycentric coordinates and distance of the closest point on a mesh, for each of (n, 3) points."""
     corners = mesh.vertices[mesh.faces]
     tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
     faces, weights = nearest_on_triangles(corners, tree, np.ascontiguousarray(points))

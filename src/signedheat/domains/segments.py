@@ -1,4 +1,4 @@
-"""Curves and points cut into the segments that a set of triangles sees of them."""
+"""Curves and points as segments on an intrinsic mesh, each in one face or along one edge."""
 
 from __future__ import annotations
 
@@ -31,14 +31,19 @@ def segments_of(
     Parameters
     ----------
     source : Curve, SurfacePoints or CurveSegments
-        Face ids refer to `triangles`. Points of a curve that share no face are joined by a shortest line.
+        Face ids refer to `triangles`. Consecutive points of a curve that share no face are joined by a geodesic path.
     triangles : IntrinsicMesh
         The surface.
     positions : (n_vertices, 3) or (m, 3, 3) float, optional
-        Vertices in space, or the corners of each face where faces lie in planes of their own, for curves whose normals
-        are given.
+        Positions in space of vertices, or of the corners of each face if every face lies in a plane of its own; needed
+        for curves with given normals.
     number : int
-        Which of the sources this is, for messages.
+        Index of the source, for messages.
+
+    Returns
+    -------
+    CurveSegments
+        A `CurveSegments` is returned as it is.
 
     Raises
     ------
@@ -57,7 +62,7 @@ def segments_of_each(
     triangles: IntrinsicMesh,
     positions: Positions = None,
 ) -> list[list[CurveSegments]]:
-    """Each of several sources in segments; a sequence of curves and points counts as one source."""
+    """The segments of several sources; a sequence of curves and points among them counts as one source."""
     return [
         [
             segments_of(item, triangles, positions, number)

@@ -33,13 +33,13 @@ class TetMesh:
     vertices : (n, 3) float
         Positions; vertices that no tet uses are allowed.
     tets : (m, 4) int
-        Vertex ids. Seen from the first corner the other three run clockwise when the volume is positive; tets given
-        inside out are turned (their last two corners swapped) and listed in `reoriented`. Flat tets are allowed.
+        Vertex ids. As seen from the first corner the other three run clockwise if the volume is positive; tets with
+        negative volume are turned (their last two corners swapped) and listed in `reoriented`. Flat tets are allowed.
 
     Attributes
     ----------
     reoriented : (k,) int
-        Tets that were given inside out.
+        Tets that were given with negative volume.
 
     Raises
     ------
@@ -86,12 +86,12 @@ class TetMesh:
 
     @cached_property
     def geometry(self) -> Tetrahedra:
-        """Areas, volumes and the operators made of them."""
+        """Areas, volumes and operators of the tets."""
         return Tetrahedra(self.vertices, self.tets)
 
     @cached_property
     def faces(self) -> FaceTable:
-        """The triangles between and around the tets."""
+        """The triangular faces of the tets."""
         return face_table(self.tets)
 
     @property
@@ -101,18 +101,18 @@ class TetMesh:
 
     @cached_property
     def tet_barycenters(self) -> NDArray[np.float64]:
-        """(m, 3) centres."""
+        """(m, 3) barycentres."""
         result: NDArray[np.float64] = self.vertices[self.tets].mean(axis=1)
         return result
 
     @cached_property
     def boundary(self) -> TriangleMesh:
-        """The faces of a single tet, facing outward, on the vertices of this mesh."""
+        """The faces with a single tet, oriented outward, on the vertices of this mesh."""
         return TriangleMesh(self.vertices, self.faces.vertices[self.faces.tet_counts == 1])
 
     @cached_property
     def parts(self) -> NDArray[np.int64]:
-        """(m,) part of the mesh that each tet belongs to; tets of one part are connected through faces."""
+        """(m,) connected component of each tet, through shared faces."""
         from scipy import sparse
 
         m, tet_faces = self.n_tets, self.faces.tet_faces.ravel()
@@ -124,13 +124,13 @@ class TetMesh:
 
     @cached_property
     def search_tree(self) -> BoxTree:
-        """A tree of the tets' boxes."""
+        """Tree of the bounding boxes of the tets."""
         corners = self.vertices[self.tets]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) least and greatest coordinates of the vertices that tets use."""
+        """(2, 3) lower and upper corner of the bounding box of the tets, without unreferenced vertices."""
         used = self.vertices[np.unique(self.tets)]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
@@ -140,12 +140,12 @@ class TetMesh:
 
     @classmethod
     def from_meshio(cls, mesh: meshio.Mesh) -> TetMesh:
-        """The tets of a `meshio.Mesh`; cells of other kinds are left behind.
+        """From the tets of a `meshio.Mesh`; cells of other kinds are ignored.
 
         Raises
         ------
         GeometryError
-            If it holds no tets.
+            If it has no tets.
         """
         blocks = [block.data for block in mesh.cells if block.type == "tetra"]
         if not blocks:
@@ -157,14 +157,14 @@ class TetMesh:
         return cls(mesh.points, np.concatenate(blocks))
 
     def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
-        """As a `meshio.Mesh`, with data at its vertices by name."""
+        """As a `meshio.Mesh`, with `point_data`, arrays at the vertices by name."""
         import meshio
 
         return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data)
 
     @classmethod
     def from_pyvista(cls, grid: pyvista.UnstructuredGrid) -> TetMesh:
-        """The tets of a `pyvista.UnstructuredGrid`; cells of other kinds are left behind."""
+        """From the tets of a `pyvista.UnstructuredGrid`; cells of other kinds are ignored."""
         cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
         if 10 not in cells:  # VTK_TETRA
             raise GeometryError(

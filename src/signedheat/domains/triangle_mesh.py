@@ -1,4 +1,4 @@
-"""Triangle meshes: as a domain on which distance is measured, and as a shape in space to which it is."""
+"""Triangle meshes, as domains on which distance is measured, and as sources in space."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     vertices : (n, 3) float
         Positions; vertices that no face uses are allowed.
     faces : (m, 3) int
-        Vertex ids. A face's normal points to you when its corners run counter-clockwise as you see it.
+        Vertex ids. The normal of a face points to the side from which its corners run counter-clockwise.
 
     Raises
     ------
@@ -61,7 +61,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) lower and upper corner of the box around the faces; vertices of no face do not count."""
+        """(2, 3) lower and upper corner of the bounding box of the faces, without unreferenced vertices."""
         corners = self.vertices[self.faces.ravel()]
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
@@ -91,11 +91,11 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to: here the mesh itself."""
+        """The triangles that curves refer to: the mesh itself."""
         return self
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of `triangulation`, from values at the vertices of the domain: here the same."""
+        """Values at the vertices of `triangulation`, from values at the vertices of the domain: the same."""
         return values
 
     def __repr__(self) -> str:

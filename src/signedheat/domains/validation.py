@@ -1,4 +1,4 @@
-"""Checks shared by all domains: arrays come in any shape and leave frozen, or not at all."""
+"""Checks of arguments that all domains share; arrays are returned read-only."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """The array made contiguous and read-only, so that nothing derived from it can go stale."""
+    """The array, contiguous and read-only, so that quantities derived from it stay valid."""
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
     return array
 
 
 def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDArray[np.float64]:
-    """`values` as a frozen float64 array of shape (n, columns) without NaN or infinity."""
+    """`values` as a read-only float64 array of shape (n, columns), without NaN or infinity."""
     array = np.array(values, dtype=np.float64)
     if array.ndim != 2 or (columns is not None and array.shape[1] != columns):
         wanted = f"(n, {columns})" if columns is not None else "(n, d)"
@@ -37,7 +37,7 @@ def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDA
 
 
 def finite_number(value: object, name: str, least: float = -np.inf) -> float:
-    """`value` as a float, not NaN and not infinite, from `least` on.
+    """`value` as a finite float, at least `least`.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def finite_number(value: object, name: str, least: float = -np.inf) -> float:
 
 
 def positive_number(value: object, name: str) -> float:
-    """`value` as a float above zero, not NaN and not infinite."""
+    """`value` as a finite positive float."""
     number = finite_number(value, name)
     if number <= 0:
         raise SignedHeatError(f"{name} must be positive and finite, not {number:g}")
@@ -62,7 +62,7 @@ def positive_number(value: object, name: str) -> float:
 
 
 def element_ids(values: ArrayLike, name: str, corners: int, n_vertices: int) -> NDArray[np.int64]:
-    """`values` as a frozen int64 array of shape (m, corners), every id within 0 … n_vertices − 1."""
+    """`values` as a read-only int64 array of shape (m, corners), with all ids within 0 … n_vertices − 1."""
     array = np.asarray(values)
     if array.size == 0:
         raise GeometryError(f"there are no {name}: the shape is empty")
