@@ -1,1 +1,1 @@
-"""How each kind of domain becomes a discretisation."""
+"""Lowering: from domains and sources to the discretisations that the method runs on."""

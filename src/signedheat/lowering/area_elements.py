@@ -1,8 +1,8 @@
 """Oriented area elements: what a shape in space is to the method, whatever it was made of (Eq. 11 in space).
 
-Triangles, fans of polygons, segments of a polyline and oriented points are all simplices that carry a vector: their
-area times their normal. They are bisected until they are small beside a cell, and merged again per cell and connected
-component, so that neither huge nor millions of tiny faces cost more than the cells they pass through.
+Triangles, fans of polygons, segments of a polyline and oriented points are all simplices with a vector: area times
+normal. They are bisected until they are no larger than a cell, and merged again per cell and connected component, so
+that neither huge faces nor millions of tiny ones cost more than the cells that they pass through.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from .grid.binning import merge_in_cells
 NEIGHBOURS = 8
 """Neighbours from which the area of an oriented point is estimated."""
 ROUNDING = 1e-9
-"""Where less of the area than this is left of normals that cancel, the rest is rounding."""
+"""Where normals cancel up to less than this fraction of the area, what is left is rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
 class AreaElements:
-    """Simplices with vectors.
+    """Simplices with area vectors.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class AreaElements:
     components : (m,) int
         Connected component of the shape, from 0.
     spacing : float
-        Mean distance between elements that bisection cannot bring closer: 0 where there is a surface between them.
+        Mean distance between points of a cloud; 0 for simplices, which can be sampled as densely as needed.
     """
 
     corners: NDArray[np.float64]
@@ -70,17 +70,17 @@ class AreaSamples:
         Sum of area times unit normal.
     weights : (s,) float
         Sum of areas.
-    components, owners : (s,) int
+    components, source_ids : (s,) int
         Connected component, and source, that each sample belongs to.
     spacing : float
         h_source: the largest of the sources' mean spacings.
     outside : float
         Fraction of the area that lies outside the grid.
     cancelled : float
-        Fraction of the area inside whose normals cancel others of the same cell and component: sheets thinner than a
-        cell, and faces given twice with opposite orientations.
+        Fraction of the area inside the grid whose normals cancel with others of the same cell and component: sheets
+        thinner than a cell, and faces given twice with opposite orientations.
     nodes : NodeSources
-        The vectors brought to the nodes, up to a common factor.
+        X₀: the vectors spread to the nodes by linear interpolation, up to a common factor.
     """
 
     positions: NDArray[np.float64]
@@ -96,7 +96,7 @@ class AreaSamples:
 
 @singledispatch
 def area_elements(shape: Any) -> AreaElements:
-    """Lower a shape in space to simplices with vectors."""
+    """Lower a shape in space or in the plane to simplices with area vectors; further kinds of shapes register here."""
     raise SourceError(
         f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
         f"Polyline, not to a {type(shape).__name__}"
@@ -118,7 +118,7 @@ def _(shape: TetMesh) -> AreaElements:
 
 @area_elements.register
 def _(shape: PolygonMesh) -> AreaElements:
-    """Fans around the centroids: their vector areas add up to the polygon's, planar and convex or not."""
+    """Fans around centroids, whose area vectors add up to that of the polygon, planar and convex or not."""
     polygon = shape.corner_polygons
     fans = np.stack([shape.corners, shape.next_corners], axis=1)
     corners = np.concatenate([shape.polygon_centroids[polygon][:, None], shape.vertices[fans]], axis=1)
@@ -139,14 +139,14 @@ def _(shape: PointCloud) -> AreaElements:
         )
     areas = point_areas(shape.points) if shape.areas is None else shape.areas
     components = np.zeros(shape.n_points, dtype=np.int64)
-    sides = shape.points.shape[1] - 1  # on a line a point is a whole boundary, with no gap to the next
+    sides = shape.points.shape[1] - 1  # dimension of the boundary; on a line single points bound, and have no spacing
     spacing = float(np.mean(areas)) ** (1.0 / sides) if sides else 0.0
     return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
 
 
 @singledispatch
 def extent(shape: Any) -> NDArray[np.float64]:
-    """(2, d) least and greatest coordinates of a shape."""
+    """(2, d) lower and upper corner of the bounding box of a shape."""
     corners = area_elements(shape).corners
     return np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
 
@@ -182,9 +182,9 @@ def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = 
 
 
 def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> NDArray[np.float64]:
-    """(n,) area that each point stands for: that of the disk which reaches its k-th neighbour, divided by k.
+    """(n,) area that each point represents: that of the disk around it up to its k-th neighbour, divided by k.
 
-    Points that coincide share one place. In d dimensions the disk is a ball of dimension d − 1.
+    Points that coincide share the area of one. In d dimensions the disk is a ball of dimension d − 1.
     """
     from scipy.spatial import cKDTree
 
@@ -204,12 +204,12 @@ def connected_components(vertices: NDArray[np.float64], faces: NDArray[np.int64]
 
 
 def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSamples:
-    """Bisect the elements of shapes until no edge is longer than `size` cells, and merge them per cell and component.
+    """Bisect the elements of shapes until no edge is longer than `size` cells; merge them per cell and component.
 
     Raises
     ------
     SourceError
-        If a shape cannot be used on this grid, or nothing of any lies within it.
+        If a shape cannot be used on this grid, no part of any lies within it, or their normals cancel.
     """
     steps = np.zeros(4)
     steps[4 - grid.dimension :] = grid.spacing

@@ -24,17 +24,17 @@ from .masked import MaskedGridDiscretization
 from .source import GridSource
 
 SAMPLE_SIZE = 1.0
-"""Longest edge, in cells, of the pieces into which faces are cut."""
+"""Longest edge, in cells, of the simplices into which faces are bisected."""
 BYTES_PER_NODE = 46
-"""Peak of a distance computation, measured."""
+"""Measured peak memory of a distance computation."""
 BASE = 50_000_000
-"""What does not depend on the number of nodes: loaded libraries and compiled kernels."""
+"""The part that does not depend on the number of nodes: loaded libraries and compiled kernels."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
 
 
 def memory_estimate(grid: Grid) -> int:
-    """Bytes that a distance computation on the grid takes at its peak.
+    """Estimated peak memory of a distance computation on the grid, in bytes.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def memory_estimate(grid: Grid) -> int:
 
 
 def refuse_beyond_memory(grid: Grid) -> None:
-    """Raise `MemoryLimitError` if the grid cannot fit, before anything is allocated."""
+    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing."""
     available, needed = available_memory(), memory_estimate(grid)
     if available is None or needed <= available:
         return

@@ -1,4 +1,4 @@
-"""Step 3 on a grid: the cosine transform inverts C, and constraints are corrections of what it gives."""
+"""Step 3 on a grid: C is inverted by the cosine transform, and constraints are corrections of that solution."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .source import GridSource
 TOLERANCE = 1e-6
 """Relative residual at which conjugate gradients stop."""
 STIFFNESS = 10.0
-"""Penalty within the augmented Lagrangian, in 1/h."""
+"""Penalty of the augmented Lagrangian, in 1/h."""
 MULTIPLIER_STEPS = 5
 """Steps of the augmented Lagrangian."""
 
@@ -76,7 +76,7 @@ class GridIntegration:
         multipliers: NDArray[np.float64],
         start: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the deviations from the levels."""
+        """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the `deviation` of φ from the levels."""
         volume = float(np.prod(self.grid.spacing))
         rows, weights = source.interpolation, source.weights / volume
         free = Levels(np.zeros_like(levels.values), levels.groups)
@@ -88,7 +88,7 @@ class GridIntegration:
             pull = strength * deviation(rows @ phi.ravel(), source, free)
             return laplacian(phi, self.grid.spacing) + spread(pull)
 
-        # the constant, of which C knows nothing, costs what the penalty makes of it
+        # constants are in the kernel of C; their cost is that of the penalty alone
         constant = strength * float(weights.sum()) / self.grid.n_nodes
 
         def precondition(residual: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -100,7 +100,7 @@ class GridIntegration:
 
 
 def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
-    """Values at the samples, less their level and, where there are groups, less their group's mean."""
+    """(s,) values at the samples minus their levels; with groups, also minus the mean of the group."""
     excess = values - levels.values
     if levels.groups is not None:
         sums = np.bincount(levels.groups, source.weights * excess)
@@ -110,9 +110,9 @@ def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -
 
 
 def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(*grid.shape) mean of values given at the samples, weighted by area and nearness: as the normals are diffused.
+    """(*grid.shape) mean of values at the samples, weighted by area and by heat: diffused as the normals are.
 
-    It varies slowly, so the finest level of the hierarchy is left out.
+    It varies slowly, so the finest level of the hierarchy is skipped.
     """
     largest = np.abs(values).max()
     if largest == 0.0:
@@ -131,7 +131,7 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
 
 
 def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
-    """(nodes,) smallest change that takes these values at the samples, in the sense of least squares."""
+    """(n_nodes,) grid function of least norm that interpolates these values at the samples, in least squares."""
     from scipy.sparse.linalg import lsqr
 
     touched = np.unique(source.interpolation.indices)
@@ -147,7 +147,7 @@ def conjugate_gradients(
     start: NDArray[np.float64],
     limit: int = 500,
 ) -> NDArray[np.float64]:
-    """Solve a symmetric positive semidefinite system whose right-hand side it can reach.
+    """Preconditioned conjugate gradients for a consistent symmetric positive semidefinite system.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Surfaces of every kind, as intrinsic mesh."""
+"""Surfaces of every kind as a discretisation: one vector per edge, one value per vertex of an intrinsic mesh."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ from .vector_heat import VectorHeat
 
 @dataclass(frozen=True, eq=False)
 class SurfaceDiscretization:
-    """A surface as the three steps see it.
+    """The discretisation of a surface.
 
     Parameters
     ----------
-    domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
-        What fields are reported on.
+    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
+        The domain of the fields returned.
     triangles : IntrinsicMesh
-        What the method runs on.
+        The triangles that the method runs on.
     restriction : (n,) int, optional
-        Vertex of the triangles that stands for each vertex of the domain, where they are not the same.
+        Vertex of the triangles for each vertex of the domain, if they are not the same.
     transfer : callable, optional
-        Takes a source on the domain to the same source on the triangles, where their faces are not the domain's.
+        Maps a source on the domain to the same source on the triangles, if their faces are not those of the domain.
     positions : (n_vertices, 3) or (m, 3, 3) float, optional
-        Where in space vertices lie, or the corners of each face, up to translation, where faces lie in planes of their
-        own: for curves whose normals are given. By default what the domain's triangulation says.
+        Positions in space of the vertices, or of the corners of each face (up to translation) if every face lies in a
+        plane of its own; needed for curves with given normals. By default those of the domain's triangulation.
     spacing : float, optional
         h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
     notes : tuple of Note
-        What was repaired in making the triangles; passed on to the diagnostics of every field.
+        Repairs made in building the triangles; they are added to the diagnostics of every field.
     """
 
     domain: Any
@@ -83,7 +83,7 @@ class SurfaceDiscretization:
         return elimination_order(self.stiffness)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Unoriented curves and points inside faces get edges and vertices; nonmanifold edges are told from where."""
+        """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
         if self.transfer is not None:
             sources = [self.transfer(source) for source in sources]
         positions = self.positions
@@ -96,7 +96,7 @@ class SurfaceDiscretization:
         return surface._turned_to(triangles), groups
 
     def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """The same triangles with other first faces at nonmanifold edges; step 3 does not see them."""
+        """The same surface with other first faces at nonmanifold edges; shares all of step 3, which ignores them."""
         if triangles is self.triangles:
             return self
         key = triangles.first_halfedges.tobytes()
@@ -107,7 +107,7 @@ class SurfaceDiscretization:
         return self._turned[key]
 
     def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """The same surface in more triangles, whose first vertices are those of this."""
+        """The same surface with refined triangles, whose first vertices are the present ones."""
         added = triangles.n_vertices - self.triangles.n_vertices
         return replace(
             self,
@@ -128,7 +128,7 @@ class SurfaceDiscretization:
         return self.diffuse_many([source])[0]
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
-        """Solve for several sources of the same t at once."""
+        """Solve Eq. 12 for several sources with the same t at once."""
         heat = self._heats.get(sources[0].time)
         if heat is None:
             self._heats.clear()
@@ -137,7 +137,10 @@ class SurfaceDiscretization:
         return heat.solve([source.vectors for source in sources])
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
-        """X at the faces, as complex numbers in their layouts: each face from the last stage that covers it."""
+        """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout.
+
+        Each face takes it from the last stage in which all of its edges are known.
+        """
         vectors = self.triangles.sum_in_faces(stages[0])
         for stage in stages[1:]:
             later = self.triangles.sum_in_faces(stage)
@@ -149,7 +152,7 @@ class SurfaceDiscretization:
         return divergence(self.triangles, directions)
 
     def reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
-        """(n_vertices,) whether a vertex has a face on a part that holds vectors. Vectors only pass along edges."""
+        """(n_vertices,) whether a vertex has a face in a component with sources. Vectors diffuse across edges only."""
         parts = self.triangles.face_components
         if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
@@ -173,6 +176,6 @@ def _(domain: TriangleMesh) -> SurfaceDiscretization:
 
 
 def large_angles(triangles: IntrinsicMesh) -> float:
-    """Share of angles above 120°; 0 below 1 %. Where they are many, step 1 may turn directions far from the source."""
+    """Fraction of angles above 120°, or 0 if below 1 %. Many of them make directions far from the source inaccurate."""
     share = float((triangles.corner_cotangents < -(3**-0.5)).mean())
     return share if share >= 0.01 else 0.0

@@ -14,9 +14,9 @@ from .discretization import SurfaceDiscretization
 
 @discretize.register
 def _(domain: PointCloud) -> SurfaceDiscretization:
-    """φ lives at the points; points that coincide share one unknown.
+    """The values of φ are at the points; points that coincide share one unknown.
 
-    h is the mean distance between neighbouring points: triangles between samples say nothing of the surface below it.
+    h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
     """
     mesh = domain.triangulation
     used = np.zeros(domain.n_points, dtype=bool)

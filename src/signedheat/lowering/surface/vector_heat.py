@@ -1,4 +1,4 @@
-"""Step 1 on intrinsic mesh: one factorisation, and right-hand sides carried as far as they have to go."""
+"""Step 1 on an intrinsic mesh: one factorisation, with restarts where the solution would underflow."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ...geometry.triangle_kernels import extremes
 from ...linear import Factor, factorize
 from ...operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
 
-_FAINT = 2.0**-900  # of the largest X: below, what underflows in the factor or on the way may be missing
+_FAINT = 2.0**-900  # relative to the largest X; smaller values may be wrong, because intermediate ones underflow
 
 
 @dataclass(frozen=True, eq=False)
 class VectorHeat:
     """Solver of ``(M + tL) X = X₀`` (Eq. 12) on the edges of triangles.
 
-    X falls like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. What lies
-    beyond is solved for again: X restricted to the faint edges satisfies the same equation with a right-hand side
-    along their border, where X is still known well. Scaled up, that is the next right-hand side for the same factor,
-    and the result is exact, not another front of waves.
+    X decays like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. Farther out
+    it is solved for again: restricted to the faint edges, X satisfies the same equation with a right-hand side along
+    their border, where X is still accurate. Scaled up, that is the next right-hand side for the same factor. The result
+    is the exact solution of the original system, not that of a new source at the border.
 
     Parameters
     ----------
@@ -43,19 +43,19 @@ class VectorHeat:
 
     @cached_property
     def factor(self) -> Factor:
-        """Its factor."""
+        """The factor of M + tL."""
         matrix = vector_heat_matrix(self.triangles, self.time)
-        parts = np.arange(matrix.shape[0] // self.triangles.n_edges)  # real and imaginary, or both in one
+        parts = np.arange(matrix.shape[0] // self.triangles.n_edges)  # real and imaginary part, or one complex number
         return factorize(matrix, order=(len(parts) * self.order[:, None] + parts).ravel(), reused=True)
 
     @cached_property
     def _smallest_mass(self) -> float:
-        """|X| is at most |X₀| divided by it."""
+        """Least entry of M: |X| is at most |X₀| divided by it."""
         mass = np.bincount(self.triangles.edges.face_edges.ravel(), np.repeat(self.triangles.face_areas / 3.0, 3))
         return float(mass.min())
 
     def solve(self, sources: Sequence[csr_array]) -> list[list[NDArray[np.complex128]]]:
-        """X for each X₀, in stages: each is known up to a factor of its own, and NaN nearer than where it begins."""
+        """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border."""
         starts = np.zeros((len(sources), self.triangles.n_edges), dtype=np.complex128)
         for source, start in zip(sources, starts, strict=True):
             self._raise(source.indices, source.data, start)
@@ -97,7 +97,7 @@ class VectorHeat:
     def _raise(
         self, edges: NDArray[np.integer], vectors: NDArray[np.complex128], start: NDArray[np.complex128]
     ) -> None:
-        """Put vectors into zeros, scaled by a power of two, so that the largest X is about one."""
+        """Write vectors into `start`, scaled by a power of two so that the largest X will be about one."""
         largest = _size(vectors).max(initial=0.0)
         if largest > 0:
             steps = int(np.frexp(self._smallest_mass)[1] - np.frexp(largest)[1])
@@ -112,5 +112,5 @@ class VectorHeat:
 
 
 def _size(vectors: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Largest component of each vector: its square would underflow."""
+    """Maximum norm of each vector, since the square of its length would underflow."""
     return np.maximum(np.abs(vectors.real), np.abs(vectors.imag))

@@ -23,7 +23,7 @@ from .integration import TetIntegration
 from .source import TetSource, tet_source
 
 DIRECT_FACES = 20_000
-"""Up to this number of faces step 1 is factorised: that grows like n², conjugate gradients like n⁴ᐟ³."""
+"""Up to this number of faces step 1 is factorised, in O(n²) time; conjugate gradients take O(n⁴ᐟ³)."""
 
 DIRECT_VERTICES = 40_000
 """Up to this number of vertices step 3 is factorised."""
@@ -32,19 +32,19 @@ DIRECTION_ERROR = 1e-3
 """Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
 
 SPRINGS = 30.0
-"""Strength with which levels are imposed, over one edge length."""
+"""Strength of the springs that impose levels, times the mean edge length."""
 
 
 @dataclass(frozen=True, eq=False)
 class TetDiscretization:
-    """A tet mesh as the three steps see it.
+    """The discretisation of a tet mesh.
 
     Parameters
     ----------
     mesh : TetMesh
         The domain.
     direct : bool
-        Whether to factorise the system of step 1; it is solved by conjugate gradients otherwise.
+        Whether to factorise the system of step 1, instead of solving it by conjugate gradients.
     """
 
     mesh: TetMesh
@@ -58,17 +58,17 @@ class TetDiscretization:
 
     @cached_property
     def spacing(self) -> float:
-        """h: mean distance between the barycentres of two faces of a tet, a third of the edge between their corners."""
+        """h: mean distance between the barycentres of two faces of a tet, which is a third of an edge length."""
         corners = self.mesh.vertices[self.mesh.tets]
         pairs = [corners[:, a] - corners[:, b] for a in range(4) for b in range(a)]
         return float(np.mean([np.linalg.norm(edge, axis=1).mean() for edge in pairs])) / 3
 
     @cached_property
     def unknowns(self) -> NDArray[np.int64]:
-        """(m, 4) unknown of φ at each corner.
+        """(m, 4) unknown of φ at each corner of each tet.
 
-        Heat flows through faces. Parts of the mesh that touch in an edge or a vertex alone are separate domains, and a
-        vertex that they share is an unknown in each.
+        Heat flows through faces only. Parts of the mesh that meet in an edge or a vertex only are separate domains, and
+        a vertex of several parts has one unknown for each.
         """
         parts = self.mesh.parts
         keys = self.mesh.tets * (parts.max() + 1) + parts[:, None]
@@ -92,7 +92,7 @@ class TetDiscretization:
         return self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
-        """Tets hold sources in any position."""
+        """The discretisation itself: sources need not conform to the tets."""
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> TetSource:
@@ -107,16 +107,16 @@ class TetDiscretization:
         return self._bend(*self._in_tets(self._stages(source.time, loads)), source)
 
     def _stages(self, time: float, loads: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
-        """X at the faces, in stages: it leaves the range of floating-point numbers a few hundred faces away."""
+        """X at the faces, in stages, since it underflows a few hundred faces away from the source."""
         matrix = self._heat_matrix(time)
         return solve_in_stages(matrix, lambda forces: self._solve(matrix, time, forces), loads)
 
     def _in_tets(
         self, stages: list[tuple[NDArray[np.float64], float]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Means of X, multiples of the gradient of its last column, and logarithms of the factors of both.
+        """Means of X in the tets, positive multiples of the gradient of its last column, and logarithms of its scale.
 
-        They are those of the last stage that knows all four faces of a tet.
+        Each tet takes them from the last stage in which all its four faces are known.
         """
         tet_faces = self.mesh.faces.tet_faces
         means, gradients, factors = None, None, np.full(self.mesh.n_tets, -np.inf)
@@ -137,11 +137,12 @@ class TetDiscretization:
         factors: NDArray[np.float64],
         source: TetSource,
     ) -> NDArray[np.float64]:
-        """X at the tets, turned where it has come round a corner.
+        """X at the tets, turned where it has diffused around a corner.
 
-        In flat space diffusion carries vectors along without turning them. Where the straight line to the source leaves
-        the domain, the shortest way to it is bent, and its direction is that in which undirected heat falls
-        (Crane et al. 2013). The side it is on is the one from which that heat has come.
+        In flat space diffusion transports vectors without turning them. Where the straight line to the source leaves
+        the domain, the shortest path is bent; the direction of X is then minus the gradient of the diffused scalar heat
+        (Crane et al. 2013), and its sign that of the side of the source from which this heat has come, found by
+        steepest ascent.
         """
         from scipy.spatial import cKDTree
 
@@ -177,7 +178,7 @@ class TetDiscretization:
         return self.mesh.geometry.face_laplacian(self.mesh.faces)
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """X at the tets, where it is already."""
+        """X at the tets: `diffuse` has averaged it already."""
         return vectors
 
     @cached_property
@@ -194,13 +195,13 @@ class TetDiscretization:
 
     @cached_property
     def vertices(self) -> NDArray[np.int64]:
-        """(n,) vertex of the mesh at which each unknown is."""
+        """(n,) vertex of the mesh that each unknown belongs to."""
         vertices = np.empty(self.n_unknowns, dtype=np.int64)
         vertices[self.unknowns] = self.mesh.tets
         return vertices
 
     def at_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of the mesh: means where parts of it touch, NaN where nothing is known."""
+        """(n_vertices,) values at the vertices: means over the unknowns of each, NaN where none has a value."""
         known = np.flatnonzero(~np.isnan(values))
         vertices, n = self.vertices[known], self.mesh.n_vertices
         counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[known], n)
@@ -208,7 +209,7 @@ class TetDiscretization:
 
 
 def from_first(matrix: sparse.csr_matrix) -> IncompleteCholesky:
-    """Conjugate gradients on a matrix given by its upper triangle, in the order of its own graph from unknown 0."""
+    """Incomplete factor of a matrix given by its upper triangle, ordered by graph distance from its first unknowns."""
     full = whole(matrix)
     _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
     return IncompleteCholesky.of(full, outward_order(full, first))

@@ -1,4 +1,4 @@
-"""Step 3 on tets: levels are imposed by springs where the source cuts through tets."""
+"""Step 3 on tets, with levels imposed by springs where the source does not conform to the mesh."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from ...discretization import Levels, SourceTerm
 from ..direct_integration import DirectIntegration
 
 PIN = 1e6
-"""Stiffness at vertices that the source passes through, times the largest diagonal entry of C."""
+"""Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
 
 
 @dataclass(frozen=True, eq=False)
 class TetIntegration(DirectIntegration):
-    """As for surfaces, but for `fit`, and for the level that φ, linear on tets, is to have on a curved source.
+    """As `DirectIntegration`, but `fit` imposes levels by springs, and levels are corrected for the curvature of φ.
 
-    A function that is linear on tets cannot be level on a curved surface that cuts through them, but by being flat
-    around it. Springs of a strength that suits the tets leave less error on the source, and everywhere, than exact
-    levels do. Vertices on the source are pinned.
+    A function that is linear on tets can be constant on a curved surface that crosses them only by being constant
+    around it. Springs of a strength adapted to the tets leave a smaller error than exact constraints, on the source and
+    everywhere. At vertices on the source the springs are stiff.
 
-    Nor should it have the level there that the distance has: the linear interpolant of a curved function lies off it.
-    By how much, the gradients at the corners tell to second order, once there is a first φ.
+    The level at samples is corrected as well, because the linear interpolant of a curved function differs from it. The
+    difference is known to second order from the gradients at the corners, once there is a first φ.
 
     Parameters
     ----------
     strength : float
-        Of the springs, in 1/length.
+        Strength of the springs, in 1/length.
     gradients : callable
-        From φ at the unknowns, (n, 3) gradients there.
+        From φ at the unknowns to (n, 3) gradients there.
     """
 
     strength: float = 0.0
@@ -77,10 +77,10 @@ class TetIntegration(DirectIntegration):
         return super()._at_samples(values, source) + self._bend(values, source)
 
     def _bend(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
-        """(s,) how far φ lies above its interpolant on the source."""
+        """(s,) φ minus its linear interpolant, on the source: the quadratic correction."""
         return source.bends @ self.gradients(np.nan_to_num(values)).ravel()
 
     def springs(self, source: SourceTerm) -> NDArray[np.float64]:
-        """(s,) stiff at vertices, soft inside tets."""
+        """(s,) stiffness of the springs: stiff for samples at vertices, soft for those inside tets."""
         at_vertex = np.diff(source.interpolation.indptr) == 1
         return np.where(at_vertex, PIN * self.stiffness.diagonal().max(), self.strength * source.weights)
