@@ -1,4 +1,4 @@
-"""How fields reach files, without a word about formats here."""
+"""Writing of fields, provided by `signedheat.io`."""
 
 from __future__ import annotations
 
@@ -7,4 +7,4 @@ from os import PathLike
 from ..slots import Slot
 
 save_field: Slot[[object, str | PathLike[str]], None] = Slot("save_field")
-"""Write a field of any kind in the format that the file's name ends with."""
+"""Write a field of any kind in the format given by the extension of the file."""

@@ -1,4 +1,4 @@
-"""From the unknowns of a discretisation to the field that users see, one function for each kind of discretisation."""
+"""From the unknowns of a discretisation to a field on its domain, one function for each kind of discretisation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Field = GridField | VertexField | TetField
 
 @singledispatch
 def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> Field:
-    """The field whose values a discretisation found, with what it has to tell added to the diagnostics."""
+    """The field with the values of a discretisation's unknowns, and with its notes added to the diagnostics."""
     raise UnsupportedTypeError(f"no field is known for {type(discretization).__name__}")
 
 
@@ -69,7 +69,7 @@ def _(
     source: SurfaceSource,
     diagnostics: Diagnostics,
 ) -> VertexField:
-    """φ at the vertices of the domain; NaN where nothing was diffused, beyond single vertices for instance."""
+    """φ at the vertices of the domain; NaN where diffusion did not reach, such as behind a single shared vertex."""
     values = np.where(discretization.reached_by(source.vectors), values, np.nan)
     if discretization.restriction is not None:
         values = values[discretization.restriction]

@@ -35,7 +35,7 @@ Embedded = TypeVar("Embedded", bound=EmbeddedSurface)
 
 @dataclass(frozen=True, eq=False)
 class VertexField(Generic[Surface]):
-    """A scalar at every vertex of a surface.
+    """Signed distance at the vertices of a surface, linear on its triangles.
 
     Attributes
     ----------
@@ -44,9 +44,9 @@ class VertexField(Generic[Surface]):
     values : (n_vertices,) float
         φ, in the units of the vertices; NaN where no source is connected.
     diagnostics : Diagnostics
-        What happened on the way.
-    source : SourceTerm
-        The source as the solver saw it.
+        Timings, diffusion time, and notes on the computation.
+    source : SourceTerm, optional
+        The lowered source, which `sharpen` needs.
 
     Examples
     --------
@@ -72,26 +72,27 @@ class VertexField(Generic[Surface]):
         Parameters
         ----------
         points : SurfacePoints, Curve or (n, 3) float
-            Where; for positions in space, the closest points of the surface count.
+            Points on the surface, or positions in space, for which the closest points of the surface are taken.
 
         Returns
         -------
         (n,) float
+            Signed distances.
         """
         mesh, values, faces, weights = self._at(points)
         result: NDArray[np.float64] = np.einsum("ik,ik->i", weights, values[mesh.faces[faces]])
         return result
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) ∇φ in the faces that points lie in; see `__call__`."""
+        """(n, 3) ∇φ in the faces of points; for `points` see `__call__`."""
         _, _, faces, _ = self._at(points)
         return self.face_gradients[faces]
 
     @cached_property
     def face_gradients(self) -> NDArray[np.float64]:
-        """(m, 3) ∇φ on the faces of the domain's triangulation; of length 1 wherever φ is a distance.
+        """(m, 3) ∇φ on the faces of the domain's triangulation, in space; of length about 1, since φ is a distance.
 
-        Degenerate faces have no gradient: theirs is zero.
+        Zero on degenerate faces.
         """
         field = self._embedded
         mesh = field.domain.triangulation
@@ -106,22 +107,22 @@ class VertexField(Generic[Surface]):
         return result
 
     def contour(self, level: float = 0.0) -> list[Curve]:
-        """Where φ takes a value.
+        """The level set φ = level, as curves on the surface.
 
         Parameters
         ----------
         level : float
-            The value.
+            The level, in the units of the vertices.
 
         Returns
         -------
         list of Curve
-            One for each connected line, closed where it closes; φ grows to its left.
+            One for each connected component, open or closed; greater φ is to its left.
 
         Raises
         ------
         OutsideError
-            If φ takes the value nowhere.
+            If φ does not take the level.
         """
         field = self._embedded
         known = field.values[np.isfinite(field.values)]
@@ -135,7 +136,7 @@ class VertexField(Generic[Surface]):
         return result
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the surface with φ at its vertices; the extension says the format.
+        """Write the surface with φ at its vertices, in the format given by the extension.
 
         ``.ply`` and ``.vtp`` have a property ``signed_distance`` per vertex, ``.obj`` a texture coordinate,
         ``.npz`` the arrays ``values``, ``vertices`` and ``faces``.
@@ -143,7 +144,7 @@ class VertexField(Generic[Surface]):
         Parameters
         ----------
         path : str or path
-            Where to. Written under a temporary name and then renamed: a file that was there before survives a failure.
+            The file. It is written under a temporary name and renamed, so that an existing file survives a failure.
 
         Raises
         ------
