@@ -1,1 +1,1 @@
-"""What goes beyond the three steps; uses the core through its public face."""
+"""Extensions beyond the three steps: sharpening, piecewise distance, completion of curves, morphology, tet meshing."""
