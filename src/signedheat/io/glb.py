@@ -1,4 +1,4 @@
-"""GLB and glTF, by trimesh."""
+"""GLB and glTF, read by trimesh."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .files import PathLike, contents, extension
 
 
 def read_glb(path: PathLike) -> TriangleMesh:
-    """All triangles of a scene, each where its node puts it, one body after another."""
+    """All triangles of a scene, transformed by their nodes, one body after another."""
     contents(path)
     import trimesh
 

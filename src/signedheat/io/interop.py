@@ -1,6 +1,6 @@
-"""Shapes from and to the objects of other packages, each of which is imported only where it is used.
+"""Conversion of shapes from and to the objects of other packages, each imported only where it is used.
 
-Vertices and faces keep their number and order, both ways.
+Vertices and faces keep their number and order in both directions.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def to_meshio(shape: SurfaceShape) -> Any:
         return meshio.Mesh(np.array(shape.points), [("vertex", np.arange(shape.n_points)[:, None])], point_data=normals)
     corners, counts = faces_of(shape)
     starts = np.cumsum(counts) - counts
-    change = np.flatnonzero(np.diff(counts, prepend=-1))  # blocks hold faces of one kind, and keep the order
+    change = np.flatnonzero(np.diff(counts, prepend=-1))  # a block has faces of one kind; the order is kept
     cells = []
     for first, last in zip(change, [*change[1:], len(counts)], strict=True):
         sides = int(counts[first])
