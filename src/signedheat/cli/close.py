@@ -1,4 +1,4 @@
-"""``signedheat close``: broken curves on a surface in, whole ones out."""
+"""``signedheat close``: completes broken curves on a surface."""
 
 from __future__ import annotations
 

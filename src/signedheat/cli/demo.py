@@ -1,4 +1,4 @@
-"""``signedheat demo``: the whole way, on a broken duck that needs no file."""
+"""``signedheat demo``: distance and offset of a bundled broken duck."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def add_to(commands: Any) -> None:
 
 
 def run(arguments: Namespace) -> Summary:
-    """Make everything in one folder."""
+    """Write everything to one folder."""
     folder = Path(arguments.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -74,7 +74,7 @@ def run(arguments: Namespace) -> Summary:
 
 
 def draw_story(shape: Any, field: Any, surface: Any, path: PathLike) -> None:
-    """The broken shape, a slice of its distance, the closed offset surface."""
+    """Draw the broken shape, a slice of its distance, and the closed offset surface."""
     figure = new_figure(13.5, 4.6)
     before = figure.add_subplot(1, 3, 1)
     draw_shape(shape, before)

@@ -1,4 +1,4 @@
-"""``signedheat offset``: closed surfaces at chosen distances from a broken shape."""
+"""``signedheat offset``: closed surfaces at given distances from a broken shape."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
 
 
 def ensure_offset_writable(output: str, planar: bool) -> None:
-    """Find out before computing whether a surface, or lines in the plane, can be written."""
+    """Check before computing that a surface, or polylines in the plane, can be written."""
     if planar:
         ensure_writable(output, POLYLINE_FORMATS, "lines in the plane")
     else:
@@ -80,7 +80,7 @@ def ensure_offset_writable(output: str, planar: bool) -> None:
 
 
 def counts(what: Any) -> dict[str, Any]:
-    """A surface, or lines in the plane, in numbers."""
+    """Key figures of a surface, or of polylines in the plane."""
     if isinstance(what, list):
         closed = sum(line.closed for line in what)
         return {"lines": len(what), "closed": closed, "length": float(sum(line.length for line in what))}
@@ -88,7 +88,7 @@ def counts(what: Any) -> dict[str, Any]:
 
 
 def output_names(output: str, distances: list[float]) -> list[str]:
-    """The name itself for one distance, one name for each of several."""
+    """The given name for one distance; a name with the distance in it for each of several."""
     if len(distances) == 1:
         return [output]
     path = Path(output)

@@ -1,4 +1,4 @@
-"""``signedheat surface``: a mesh and curves on it in, signed distance at its vertices out."""
+"""``signedheat surface``: signed distance to curves on a surface, at its vertices."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def add_to(commands: Any) -> None:
 
 
 def add_curves_and_output(parser: Parser, output: str) -> None:
-    """What it takes to measure distance to curves on a surface, and where the result goes."""
+    """Add the arguments of a distance to curves on a surface, and of its output."""
     parser.add_argument(
         "mesh", metavar="MESH", help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti"
     )
@@ -82,7 +82,7 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
 
 
 def advice(field: VertexField) -> str:
-    """What would make the result more accurate."""
+    """Advice on options that would make the result more accurate, or nothing."""
     note = field.diagnostics.note(LargeAngles)
     return f"; {note}: --intrinsic is more accurate" if note else ""
 
@@ -119,7 +119,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
 
 
 def read_surface(path: str) -> Any:
-    """A file with something that curves can lie on."""
+    """Read a surface domain from a file."""
     surface = read(path)
     if not hasattr(surface, "triangulation"):
         raise SourceError(
@@ -130,7 +130,7 @@ def read_surface(path: str) -> Any:
 
 
 def surface_constraint(word: str) -> Any:
-    """A constraint from its name; on surfaces also given levels."""
+    """A constraint from its name on the command line; on surfaces also given levels."""
     name, _, values = word.partition(":")
     if name == "levels":
         return LevelValues([finite(value) for value in values.split(",")])

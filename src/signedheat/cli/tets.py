@@ -1,4 +1,4 @@
-"""``signedheat volume --tets``: the distance on tets instead of a grid."""
+"""``signedheat volume --tets``: signed distance on tets instead of a grid."""
 
 from __future__ import annotations
 
@@ -63,6 +63,6 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
 
 
 def on_grid(field: TetField) -> GridField:
-    """The field at the nodes of a coarse grid around its mesh, to draw slices of."""
+    """The field at the nodes of a coarse grid around its mesh, for previews."""
     grid = Grid.around(field.mesh.bounds, resolution=PREVIEW_NODES, padding=0.0)
     return GridField(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))

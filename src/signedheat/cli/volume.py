@@ -1,4 +1,4 @@
-"""``signedheat volume``: a broken shape in, its signed distance on a grid out."""
+"""``signedheat volume``: signed distance to a broken shape on a grid."""
 
 from __future__ import annotations
 
