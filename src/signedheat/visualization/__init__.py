@@ -1,4 +1,4 @@
-"""Pictures of fields and shapes, without a screen."""
+"""Pictures of fields and shapes; no display is needed."""
 
 from .figures import PICTURE_FORMATS, new_figure
 from .scenes import draw_shape, save_scene

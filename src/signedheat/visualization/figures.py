@@ -1,4 +1,4 @@
-"""Figures that need no screen and no global state, and files for them."""
+"""Figures without display or global state, and their files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PICTURE_FORMATS = frozenset({".png", ".pdf", ".svg", ".jpg"})
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, in inches."""
+    """An empty figure; width and height in inches."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -23,6 +23,6 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def write_figure(figure: Figure, path: PathLike, dpi: int = 130) -> None:
-    """Write a figure in the format that the file's name ends with."""
+    """Write a figure in the format given by the extension."""
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=dpi, format=extension(path)[1:])

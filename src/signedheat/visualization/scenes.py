@@ -1,4 +1,4 @@
-"""Pictures of shapes: outsides light, insides red, so that holes and flipped faces show."""
+"""Pictures of shapes: outer sides light, inner sides red, so that holes and flipped faces are visible."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 OUTSIDE, INSIDE = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
 MOST_POINTS = 200_000
-"""Of larger clouds an even selection is drawn."""
+"""Of larger clouds an even subset is drawn."""
 
 
 def save_scene(shape: TriangleMesh | PolygonMesh | PointCloud, path: PathLike, up: int = 2) -> None:
-    """A shape seen obliquely from above, axis `up` upwards.
+    """Write a picture of a shape seen obliquely from above, with axis `up` pointing up.
 
     Raises
     ------
