@@ -1,4 +1,4 @@
-"""Kernels: loops compiled by Numba when they are first called, so that importing them costs nothing."""
+"""Kernels: functions that Numba compiles at their first call, so that importing them does not import Numba."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any, overload
 _LOCK = RLock()
 
 prange = range
-"""Iterations that may run at the same time, in kernels compiled with ``parallel=True``."""
+"""A range whose iterations may run in parallel, in kernels compiled with ``parallel=True``."""
 
 
 class Kernel:
-    """A function that Numba compiles at its first call; kept on disk afterwards. Kernels may call kernels.
+    """A function that Numba compiles at its first call, with a cache on disk. Kernels may call kernels.
 
     Examples
     --------
@@ -35,7 +35,7 @@ class Kernel:
 
     @cached_property
     def dispatcher(self) -> Callable[..., Any]:
-        """What Numba makes of the function; the function itself where ``NUMBA_DISABLE_JIT`` is set."""
+        """The compiled function; the function itself if ``NUMBA_DISABLE_JIT`` is set."""
         with _LOCK:
             compiler = _compiler()
             if "prange" in self.function.__globals__:
@@ -55,7 +55,7 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def _compiler() -> Any:
-    """``numba.njit``, which from now on takes kernels in compiled code for what they are."""
+    """``numba.njit``, after registering `Kernel` with Numba so that compiled code can call kernels."""
     import numba
     from numba.core import types
     from numba.extending import typeof_impl
