@@ -130,7 +130,7 @@ class Convex:
         """The maximiser of Eq. 18, starting from φ⁰ = `values`."""
         from threadpoolctl import threadpool_limits
 
-        rows = getattr(source, "rows", None)
+        rows = getattr(source, "interpolation", None)
         if rows is None or rows.shape[1] != len(values):
             raise SourceError(
                 "the convex method holds φ at the source, and this field comes without one, or from one "
