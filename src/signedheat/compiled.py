@@ -7,6 +7,12 @@ from functools import cached_property, update_wrapper
 from threading import RLock
 from typing import Any, overload
 
+from .packages import lazy_module
+
+numba = lazy_module("numba", "compiled kernels")
+extending = lazy_module("numba.extending", "compiled kernels")
+types = lazy_module("numba.core.types", "compiled kernels")
+
 _LOCK = RLock()
 
 prange = range
@@ -56,16 +62,10 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 def _compiler() -> Any:
     """``numba.njit``, after registering `Kernel` with Numba so that compiled code can call kernels."""
-    import numba
-    from numba.core import types
-    from numba.extending import typeof_impl
-
-    if Kernel not in typeof_impl.registry:
-        typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.dispatcher))
+    if Kernel not in extending.typeof_impl.registry:
+        extending.typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.dispatcher))
     return numba.njit
 
 
 def _parallel_range() -> Any:
-    import numba
-
     return numba.prange

@@ -86,6 +86,10 @@ class UnsupportedTypeError(SignedHeatError, TypeError):
     """An argument of a type that is not known here: no domain, no constraint, no field."""
 
 
+class MissingPackageError(SignedHeatError, ImportError):
+    """A package that only some formats or functions need, and that is not installed."""
+
+
 class UnreachedWarning(UserWarning):
     """A connected component of the domain has no source; the distance there is NaN."""
 

@@ -13,7 +13,7 @@ from ..errors import FileFormatError
 from ..io import ensure_writable, save, save_field
 from ..io.files import PathLike, replacing
 from ..samples import broken_duck
-from ..visualization import draw_shape, draw_slices, new_figure
+from ..visualization import draw_shape, draw_slices, ensure_picture_writable, new_figure
 from .computing import compute, describe
 from .options import Summary, add_command, whole_number
 
@@ -49,6 +49,7 @@ def run(arguments: Namespace) -> Summary:
     files = {name: folder / name for name in ("duck.stl", "distance.vti", "offset.stl", "picture.png")}
     for path in files.values():
         ensure_writable(path, {path.suffix}, "a file")
+    ensure_picture_writable(files["picture.png"])
     shape = broken_duck()
     save(shape, files["duck.stl"])
     grid = Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)

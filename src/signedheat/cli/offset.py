@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
-from ..visualization import PICTURE_FORMATS, save_slices
+from ..visualization import ensure_picture_writable, save_slices
 from .computing import check_grid_options, compute, describe, grid_for, hint, is_planar, prefix_errors, read_source
 from .options import Parser, Summary, add_command, add_grid_options, finite
 
@@ -49,7 +49,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     for output in outputs:
         ensure_offset_writable(output, planar)
     if arguments.preview:
-        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+        ensure_picture_writable(arguments.preview)
     shape = read_source(arguments.shape)
     reach = max(abs(distance) for distance in arguments.distances)
     with prefix_errors(arguments.shape):

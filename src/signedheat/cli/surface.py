@@ -15,7 +15,7 @@ from ..fields.vertex_field import VertexField
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..solver import SignedHeatSolver
-from ..visualization import PICTURE_FORMATS, save_surface
+from ..visualization import ensure_picture_writable, save_surface
 from .computing import prefix_errors
 from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
 from .progress import ProgressBar
@@ -91,7 +91,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute, write."""
     ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
     if arguments.preview:
-        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+        ensure_picture_writable(arguments.preview)
     surface, curves, field = measured(arguments)
     field.save(arguments.output)
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..operators.tetrahedral import FLAT
 from .point_cloud import PointCloud
@@ -270,9 +272,6 @@ def _n_repeated(rows: NDArray[Any]) -> int:
 
 
 def _components(n_nodes: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     graph = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(n_nodes, n_nodes))
     result: NDArray[np.int64] = connected_components(graph.tocsr(), directed=False)[1]
     return result

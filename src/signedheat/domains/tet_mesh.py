@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 from ..errors import GeometryError
 from ..geometry.box_tree import BoxTree
 from ..geometry.tet_faces import FaceTable, face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
+from ..packages import lazy_module
 from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
 from .validation import element_ids, finite_rows, frozen
@@ -22,6 +24,9 @@ from .validation import element_ids, finite_rows, frozen
 if TYPE_CHECKING:
     import meshio
     import pyvista
+else:
+    meshio = lazy_module("meshio", "objects of meshio")
+    pyvista = lazy_module("pyvista", "objects of PyVista")
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,8 +118,6 @@ class TetMesh:
     @cached_property
     def parts(self) -> NDArray[np.int64]:
         """(m,) connected component of each tet, through shared faces."""
-        from scipy import sparse
-
         m, tet_faces = self.n_tets, self.faces.tet_faces.ravel()
         size = m + len(self.faces.vertices)
         ends = np.repeat(np.arange(m), 4), tet_faces + m
@@ -158,8 +161,6 @@ class TetMesh:
 
     def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
         """As a `meshio.Mesh`, with `point_data`, arrays at the vertices by name."""
-        import meshio
-
         return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data)
 
     @classmethod
@@ -175,8 +176,6 @@ class TetMesh:
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As a `pyvista.UnstructuredGrid`."""
-        import pyvista
-
         return pyvista.UnstructuredGrid({10: np.array(self.tets)}, np.array(self.vertices))
 
     def __repr__(self) -> str:

@@ -13,8 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
+from threadpoolctl import threadpool_limits
 
 from ..errors import SignedHeatError
 from ..linear import factorize
@@ -130,8 +132,6 @@ def minimize_fast(
     JumpSolution
         The best constants found.
     """
-    from threadpoolctl import threadpool_limits
-
     if not len(problem.faces):
         return _nothing(problem)
     low, high = problem.low, problem.high
@@ -216,8 +216,6 @@ def minimize_exactly(problem: JumpProblem) -> JumpSolution:
     SignedHeatError
         If HiGHS finds no optimum, or there is a duality gap.
     """
-    from scipy.optimize import linprog
-
     if not len(problem.faces):
         return _nothing(problem)
     low, high = problem.low, problem.high
@@ -226,7 +224,7 @@ def minimize_exactly(problem: JumpProblem) -> JumpSolution:
     capacity = np.tile(2.0 * problem.weights / problem.weights.mean(), 2)
     bounds = np.stack([np.zeros_like(capacity), capacity], axis=1)
     for method in ("highs-ipm", "highs-ds"):
-        result = linprog(
+        result = scipy.optimize.linprog(
             np.concatenate([high, -low]) / scale,
             A_eq=sparse.hstack([conserve, -conserve], format="csr"),
             b_eq=np.zeros(problem.n_faces),

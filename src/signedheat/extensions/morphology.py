@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints
@@ -25,8 +26,11 @@ from ..fields.grid_field import GridField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..lowering.area_elements import area_elements, extent, grid_around
+from ..packages import lazy_module
 from ..solver import as_list, signed_distance
 from .sharpening import sharpen
+
+remesh = lazy_module("trimesh.remesh", "walls around sheets")
 
 RESOLUTION = 128
 
@@ -267,9 +271,6 @@ def _unsigned_distance(sheet: Shapes, grid: Grid, reach: float) -> NDArray[np.fl
 
     It is the distance to samples half a cell apart, whose error is less than 1/16 of a squared cell over the distance.
     """
-    from scipy.spatial import cKDTree
-    from trimesh.remesh import subdivide_to_size
-
     for part in as_list(sheet):
         if area_elements(part).corners.shape[1:] != (3, grid.dimension):
             raise SourceError(
@@ -281,8 +282,9 @@ def _unsigned_distance(sheet: Shapes, grid: Grid, reach: float) -> NDArray[np.fl
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     cell = float(grid.spacing.max())
     size = 0.5 * float(grid.spacing.min())
-    samples, _ = subdivide_to_size(corners.reshape(-1, 3), faces, size, max_iter=64)  # type: ignore[no-untyped-call]
+    samples, _ = remesh.subdivide_to_size(corners.reshape(-1, 3), faces, size, max_iter=64)
     far = reach + 2 * cell
-    distance = cKDTree(samples).query(grid.points.reshape(-1, 3), distance_upper_bound=far, workers=-1)[0]
+    tree = scipy.spatial.cKDTree(samples)
+    distance = tree.query(grid.points.reshape(-1, 3), distance_upper_bound=far, workers=-1)[0]
     result: NDArray[np.float64] = np.minimum(distance, far).reshape(grid.shape)
     return result

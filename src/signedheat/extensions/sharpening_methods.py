@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ..diagnostics import ConvexRounds, Note
 from ..discretization import Discretization
@@ -128,8 +129,6 @@ class Convex:
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """The maximiser of Eq. 18, starting from φ⁰ = `values`."""
-        from threadpoolctl import threadpool_limits
-
         rows = getattr(source, "interpolation", None)
         if rows is None or rows.shape[1] != len(values):
             raise SourceError(

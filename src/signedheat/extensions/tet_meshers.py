@@ -19,6 +19,10 @@ from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
 from ..lowering.area_elements import area_elements, extent
+from ..packages import lazy_module
+
+pytetwild = lazy_module("pytetwild", "tets of fTetWild")
+tetgen = lazy_module("tetgen", "tets of TetGen")
 
 
 def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
@@ -42,13 +46,11 @@ def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: flo
 
     Raises
     ------
-    ImportError
+    MissingPackageError
         If the package `tetgen` is not installed.
     GeometryError
         If the shape has no extent.
     """
-    import tetgen
-
     lower, upper, spacing = _box_around(shape, resolution, padding)
     volume = 1.64 * spacing**3 / (6 * np.sqrt(2))  # an upper bound for TetGen that gives this mean edge length
     mesher = tetgen.TetGen(*box_walls(lower, upper, np.ceil((upper - lower) / (1.4 * spacing)).astype(np.int64)))
@@ -75,13 +77,11 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
 
     Raises
     ------
-    ImportError
+    MissingPackageError
         If the package `pytetwild` is not installed.
     GeometryError
         If the shape has no faces, or no extent.
     """
-    import pytetwild
-
     if isinstance(shape, PointCloud):
         raise GeometryError(
             "fTetWild follows faces, and a point cloud has none",

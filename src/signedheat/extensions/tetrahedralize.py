@@ -12,6 +12,7 @@ import itertools
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..domains.kinds import Shape
@@ -72,8 +73,6 @@ def tetrahedralize(
     >>> float(mesh.tet_volumes.min()) > 0
     True
     """
-    from scipy.spatial import cKDTree
-
     lower, upper = extent(shape)
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
@@ -94,7 +93,7 @@ def tetrahedralize(
     area = 0.0 if isinstance(shape, PointCloud) else float(area_elements(shape).weights.sum())
     _refuse_too_many(12 * max(float(counts.prod()), (2 * grading * area / spacing**2) if depth else 0.0))
     origin = lower - (counts * coarse - sides) / 2
-    samples = cKDTree(sample_points(shape, spacing))
+    samples = scipy.spatial.cKDTree(sample_points(shape, spacing))
     corners, sizes = _octree(samples, origin, spacing, counts, depth, grading)
     points, tets = _join_leaves(corners, sizes, counts * 2 ** (depth + 1))
     return TetMesh(origin + points * (spacing / 2), tets)

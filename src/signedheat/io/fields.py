@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 import io
 import json
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,10 +17,15 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
+from ..packages import lazy_module, require
 from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
 from .tets import TET_FIELD_FORMATS, load_tet_field, save_tet_field
 from .vtk_xml import read_vti, write_vti
+
+_NEEDED = {".nrrd": ("nrrd", "NRRD files"), ".vdb": ("openvdb", ".vdb files")}
+nrrd = lazy_module(*_NEEDED[".nrrd"])
+openvdb = lazy_module(*_NEEDED[".vdb"])
 
 CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
@@ -96,11 +99,13 @@ def ensure_field_writable(path: PathLike) -> None:
     Raises
     ------
     FileFormatError
-        If the format is unknown or needs a module that is not installed, or the file cannot be created.
+        If the format is unknown, or no file can be made there.
+    MissingPackageError
+        If the format needs a package that is not installed.
     """
     ensure_writable(path, _FORMATS, "a field")
-    if extension(path) == ".vdb":
-        _openvdb(path)
+    if extension(path) in _NEEDED:
+        require(*_NEEDED[extension(path)])
 
 
 def load_field(path: PathLike) -> Field:
@@ -221,8 +226,6 @@ def _write_vti(field: GridField, path: Path) -> None:
 
 
 def _write_nrrd(field: GridField, path: Path) -> None:
-    import nrrd
-
     dimension = field.grid.dimension
     header = {
         "space dimension": dimension,
@@ -238,10 +241,9 @@ def _write_nrrd(field: GridField, path: Path) -> None:
 
 def _read_nrrd(path: PathLike) -> Parts:
     contents(path)
-    import nrrd
-
+    read = nrrd.read
     try:
-        values, header = nrrd.read(str(path), index_order="F")
+        values, header = read(str(path), index_order="F")
     except Exception as error:
         raise FileFormatError(
             f"it is no NRRD file, or is truncated ({error})",
@@ -259,21 +261,7 @@ def _read_nrrd(path: PathLike) -> Parts:
     return values, np.asarray(header.get("space origin", np.zeros(values.ndim))), spacing
 
 
-def _openvdb(path: PathLike) -> ModuleType:
-    for name in ("openvdb", "pyopenvdb"):
-        try:
-            return importlib.import_module(name)
-        except ImportError:
-            continue
-    raise FileFormatError(
-        ".vdb needs OpenVDB's Python module, which is not installed",
-        remedy="conda install -c conda-forge openvdb, or save as .vti",
-        path=path,
-    )
-
-
 def _write_vdb(field: GridField, path: Path) -> None:
-    openvdb = _openvdb(path)
     # A VDB tree omits nodes that equal the background value, so it must differ from all values.
     volume = openvdb.FloatGrid(float(np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))))
     volume.copyFromArray(field.values.astype(np.float32))
@@ -287,11 +275,11 @@ def _write_vdb(field: GridField, path: Path) -> None:
 
 
 def _read_vdb(path: PathLike) -> Parts:
-    openvdb = _openvdb(path)
     contents(path)
+    read = openvdb.read
     try:
         volume = openvdb.readAllGridMetadata(str(path))[0]
-        volume = openvdb.read(str(path), volume.name)
+        volume = read(str(path), volume.name)
         lower, upper = (np.array(corner) for corner in volume.evalActiveVoxelBoundingBox())
         values = np.empty(tuple(upper - lower + 1), dtype=np.float32)
         volume.copyToArray(values, ijk=tuple(int(i) for i in lower))

@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from ..domains.polyline import Polyline
 from ..errors import FileFormatError, GeometryError
+from ..packages import lazy_module
 from .files import PathLike, contents, extension, replacing, unknown_extension
 from .point_lists import read_point_lists, write_point_lists
+
+svgpathtools = lazy_module("svgpathtools", "SVG drawings")
 
 CURVE_PIECES = 64
 """Number of segments that approximate a Bézier curve or an arc."""
@@ -93,16 +96,15 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
 def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
     """Points of each subpath, and whether it is closed."""
     contents(path)
-    from svgpathtools import Document, Line
-    from svgpathtools.document import CONVERSIONS
-
-    conversions = {**CONVERSIONS, "circle": clockwise_ellipse, "ellipse": clockwise_ellipse}
+    conversions = {**svgpathtools.document.CONVERSIONS, "circle": clockwise_ellipse, "ellipse": clockwise_ellipse}
     try:
-        whole_paths = Document(str(path)).paths(path_conversions=conversions)
+        whole_paths = svgpathtools.Document(str(path)).paths(path_conversions=conversions)
         subpaths = [part for whole in whole_paths for part in whole.continuous_subpaths()]
         found = []
         for subpath in subpaths:
-            pieces = [[0.0] if isinstance(s, Line) else np.arange(CURVE_PIECES) / CURVE_PIECES for s in subpath]
+            pieces = [
+                [0.0] if isinstance(s, svgpathtools.Line) else np.arange(CURVE_PIECES) / CURVE_PIECES for s in subpath
+            ]
             places = [s.point(t) for s, ts in zip(subpath, pieces, strict=True) for t in ts]
             closed = abs(subpath.end - subpath.start) <= 1e-9 * max(map(abs, places), default=0.0)
             found.append((np.array(places if closed else [*places, subpath.end]), closed))

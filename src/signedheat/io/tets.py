@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import warnings
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
 from ..fields.tet_field import TetField
+from ..packages import require
 from .files import PathLike, contents, extension, replacing, unknown_extension
 
 NAME = "signed_distance"
@@ -133,4 +133,4 @@ def _module(path: PathLike) -> Any:
     name = MODULES.get(extension(path))
     if name is None:
         raise unknown_extension(path, MODULES, "a tet mesh")
-    return importlib.import_module(f"meshio.{name}")
+    return require(f"meshio.{name}", "tet meshes")

@@ -12,9 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid
 from ..errors import FileFormatError
+from ..packages import lazy_module
 from .fields import _read_npy, _read_nrrd
 from .files import PathLike, contents, extension, unknown_extension
 from .vtk_xml import read_vti
+
+Image = lazy_module("PIL.Image", "pictures as masks")
 
 
 def read_volume(path: PathLike, level: float | None = None, radius: float | None = None) -> DigitalSurface:
@@ -131,8 +134,6 @@ def _read_plain_npy(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], 
 
 def _read_picture(path: PathLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Brightness from 0 to 1, indexed [x, y]; transparent pixels count as white."""
-    from PIL import Image
-
     try:
         picture = Image.open(io.BytesIO(contents(path))).convert("RGBA")
         white = Image.new("RGBA", picture.size, "white")

@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..packages import lazy_module
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
+
+mpl_cm = lazy_module("matplotlib.cm", "pictures")
+mpl_colors = lazy_module("matplotlib.colors", "pictures")
 
 INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]
 """From far inside to far outside: blue inside, light at the surface, orange outside."""
@@ -25,12 +30,11 @@ def distance_colors(low: float, high: float) -> ScalarMappable:
     Equal distances inside and outside have equally saturated colours. The scale is in the square root of distance, so
     that a thin inside is visible next to a wide outside.
     """
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import FuncNorm, LinearSegmentedColormap
-
     reach = max(abs(low), abs(high), 1e-300)
-    norm = FuncNorm((signed_root, signed_square), -reach, reach)
-    return ScalarMappable(norm, LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE))
+    norm = mpl_colors.FuncNorm((signed_root, signed_square), -reach, reach)
+    return mpl_cm.ScalarMappable(
+        norm, mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
+    )
 
 
 def signed_root(values: Any) -> Any:

@@ -9,8 +9,8 @@ import numpy as np
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..io.files import PathLike, ensure_writable
-from .figures import PICTURE_FORMATS, new_figure, write_figure
+from ..io.files import PathLike
+from .figures import ensure_picture_writable, new_figure, write_figure
 from .rasterizer import Camera, oblique, rasterize
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def save_scene(shape: TriangleMesh | PolygonMesh | PointCloud, path: PathLike, u
     FileFormatError
         If the picture cannot be written.
     """
-    ensure_writable(path, PICTURE_FORMATS, "a picture")
+    ensure_picture_writable(path)
     figure = new_figure(7, 6)
     draw_shape(shape, figure.add_subplot(), up=up)
     write_figure(figure, path)

@@ -12,14 +12,17 @@ from ..domains.point_cloud import PointCloud
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
-from ..io.files import PathLike, ensure_writable
+from ..io.files import PathLike
+from ..packages import lazy_module
 from .colors import add_color_bar, distance_colors, isolines_between
-from .figures import PICTURE_FORMATS, new_figure, write_figure
+from .figures import ensure_picture_writable, new_figure, write_figure
 from .scenes import triangulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
+
+mpl_collections = lazy_module("matplotlib.collections", "pictures")
 
 AXES = "xyz"
 
@@ -48,7 +51,7 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
     GeometryError
         If the field has one dimension, or more than three.
     """
-    ensure_writable(path, PICTURE_FORMATS, "a picture")
+    ensure_picture_writable(path)
     if field.grid.dimension not in (2, 3):
         raise GeometryError(f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}")
     if field.grid.dimension == 2:
@@ -182,11 +185,9 @@ def cross_section(mesh: TriangleMesh, axis: int, position: float) -> NDArray[np.
 
 
 def _draw_section(panel: Axes, shape: Any, axis: int, position: float, spacing: float) -> None:
-    from matplotlib.collections import LineCollection
-
     if isinstance(shape, PointCloud):
         near = shape.points[np.abs(shape.points[:, axis] - position) < spacing]
         panel.scatter(*np.delete(near, axis, axis=1).T, s=3, c="#d4145a", linewidths=0, zorder=3)
     elif shape is not None:
         segments = cross_section(triangulated(shape), axis, position)
-        panel.add_collection(LineCollection(list(segments), colors="#d4145a", linewidths=1.1, zorder=3))
+        panel.add_collection(mpl_collections.LineCollection(list(segments), colors="#d4145a", linewidths=1.1, zorder=3))

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..domains.curves import Curve
 from ..fields.vertex_field import VertexField
-from ..io.files import PathLike, ensure_writable
+from ..io.files import PathLike
 from .colors import add_color_bar, distance_colors, isolines_between
-from .figures import PICTURE_FORMATS, new_figure, write_figure
+from .figures import ensure_picture_writable, new_figure, write_figure
 from .rasterizer import Camera, oblique, rasterize
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def save_surface(
     FileFormatError
         If the picture cannot be written.
     """
-    ensure_writable(path, PICTURE_FORMATS, "a picture")
+    ensure_picture_writable(path)
     figure = new_figure(8.0, 7.0)
     axes = figure.add_subplot(1, 1, 1)
     draw_surface(field, axes, sources, n_contours, up=up)

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -144,10 +145,8 @@ class TetDiscretization:
         (Crane et al. 2013), and its sign that of the side of the source from which this heat has come, found by
         steepest ascent.
         """
-        from scipy.spatial import cKDTree
-
         planes, centers = self.planes, self.mesh.tet_barycenters
-        nearest = source.centers[cKDTree(source.centers).query(centers)[1]]
+        nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
         neighbors = tet_neighbors(self.mesh.faces)
         ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
         straight = visible(*ends, neighbors, self.mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs)
@@ -184,9 +183,7 @@ class TetDiscretization:
     @cached_property
     def _is_convex(self) -> bool:
         """Whether the mesh fills its convex hull."""
-        from scipy.spatial import ConvexHull
-
-        hull = ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
+        hull = scipy.spatial.ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
