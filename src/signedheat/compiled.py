@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
+from pathlib import Path
 from threading import RLock
 from typing import Any, overload
 
@@ -46,7 +47,8 @@ class Kernel:
             compiler = _compiler()
             if "prange" in self.function.__globals__:
                 self.function.__globals__["prange"] = _parallel_range()
-            return compiler(cache=True, **self.options)(self.function)  # type: ignore[no-any-return]
+            kept = Path(self.function.__code__.co_filename).is_file()  # what was typed in has no place on disk
+            return compiler(cache=kept, **self.options)(self.function)  # type: ignore[no-any-return]
 
 
 @overload
