@@ -52,7 +52,7 @@ def test_vtk_reads_our_vti_with_the_same_axes(tmp_path):
     image = pyvista.read(tmp_path / "phi.vti")
     values = np.asarray(image.point_data["signed_distance"])
     nodes = phi.grid.points.reshape(-1, 3)
-    order = [image.FindPoint(*node) for node in nodes]
+    order = [image.FindPoint(node) for node in nodes]
     np.testing.assert_array_equal(values[order], phi.values.ravel())
     np.testing.assert_allclose(np.asarray(image.points)[order], nodes, rtol=1e-14, atol=1e-12)
 
