@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..cache import LastUsed, fingerprint
 from ..discretization import Levels, SourceTerm
 from ..errors import ConstraintError
 from ..linear import Factor, factorize, upper_triangle, whole
@@ -38,7 +38,7 @@ class DirectIntegration:
     stiffness: sparse.csr_matrix
     factorize: Callable[[sparse.csr_matrix], Factor] = factorize
     spring: float = 1e8
-    _last: list[Any] = field(default_factory=list, repr=False)
+    _pulled: LastUsed[bytes, Factor] = field(default_factory=LastUsed, init=False, repr=False)
 
     @cached_property
     def components(self) -> NDArray[np.int64]:
@@ -147,14 +147,13 @@ class DirectIntegration:
 
     def _pulled_factor(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
         """Factor of ``C + Aᵀ S A``; the last one is kept."""
-        key = (rows.indptr, rows.indices, rows.data, springs)
-        if self._last and all(np.array_equal(old, new) for old, new in zip(self._last[0], key, strict=True)):
-            return self._last[1]
+        key = fingerprint(rows.indptr, rows.indices, rows.data, springs)
+        return self._pulled(key, lambda: self._factorize_pulled(rows, springs))
+
+    def _factorize_pulled(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
         unreached = np.isin(self.components[self._first_vertices], self._component_of(rows), invert=True)
-        factor = self.factorize(_grounded(matrix, self._first_vertices[unreached]))
-        self._last[:] = key, factor
-        return factor
+        return self.factorize(_grounded(matrix, self._first_vertices[unreached]))
 
     @cached_property
     def _first_vertices(self) -> NDArray[np.int64]:

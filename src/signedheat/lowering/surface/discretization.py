@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...cache import LastUsed, fingerprint
 from ...discretization import discretize
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
@@ -56,8 +57,8 @@ class SurfaceDiscretization:
     positions: NDArray[np.float64] | None = None
     spacing: float | None = None
     notes: Mapping[str, Any] = field(default_factory=dict)
-    _heats: dict[float, VectorHeat] = field(default_factory=dict, repr=False)
-    _turned: dict[bytes, SurfaceDiscretization] = field(default_factory=dict, repr=False)
+    _heats: LastUsed[float, VectorHeat] = field(default_factory=LastUsed, init=False, repr=False)
+    _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.spacing is None:
@@ -97,12 +98,12 @@ class SurfaceDiscretization:
         """The same triangles with other first faces at nonmanifold edges; step 3 does not see them."""
         if triangles is self.triangles:
             return self
-        key = triangles.first_halfedges.tobytes()
-        if key not in self._turned:
-            self._turned.clear()
-            turned = self._turned[key] = replace(self, triangles=triangles, _heats={}, _turned={})
-            turned.__dict__.update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
-        return self._turned[key]
+        return self._turned(fingerprint(triangles.first_halfedges), lambda: self._turn_to(triangles))
+
+    def _turn_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
+        turned = replace(self, triangles=triangles)
+        turned.__dict__.update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
+        return turned
 
     def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
         """The same surface in more triangles, whose first vertices are those of this."""
@@ -113,8 +114,6 @@ class SurfaceDiscretization:
             restriction=np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction,
             transfer=None,
             notes={**self.notes, "vertices added for sources": added},
-            _heats={},
-            _turned={},
         )
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
@@ -127,12 +126,11 @@ class SurfaceDiscretization:
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
         """Solve for several sources of the same t at once."""
-        heat = self._heats.get(sources[0].time)
-        if heat is None:
-            self._heats.clear()
-            order = self.triangles.edges.elimination_order(self.vertex_order)
-            heat = self._heats[sources[0].time] = VectorHeat(self.triangles, sources[0].time, order)
+        heat = self._heats(sources[0].time, lambda: self._vector_heat(sources[0].time))
         return heat.solve([source.vectors for source in sources])
+
+    def _vector_heat(self, time: float) -> VectorHeat:
+        return VectorHeat(self.triangles, time, self.triangles.edges.elimination_order(self.vertex_order))
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
         """X at the faces, as complex numbers in their layouts: each face from the last stage that covers it."""
