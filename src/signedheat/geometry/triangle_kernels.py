@@ -140,13 +140,3 @@ def _root(leader, f):
         leader[f] = leader[leader[f]]
         f = leader[f]
     return f
-
-
-@compiled
-def extremes(vectors):
-    """Smallest and largest of the vectors' larger components, whose squares may underflow."""
-    smallest, largest = np.inf, 0.0
-    for vector in vectors:
-        size = max(abs(vector.real), abs(vector.imag))
-        smallest, largest = min(smallest, size), max(largest, size)
-    return smallest, largest

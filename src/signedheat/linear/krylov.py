@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from ..compiled import compiled
+from .matrices import whole
 
 SMALLEST = 1e-290
 """Unknowns below this have lost bits to underflow and stop nothing."""
@@ -104,6 +105,13 @@ def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArra
     array([1, 0, 2])
     """
     return _breadth_first(matrix.indptr, matrix.indices, matrix.data, np.asarray(seeds, dtype=np.int64))
+
+
+def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
+    """What solves a system given by its upper triangle: unknowns in the order of its own graph, from the first on."""
+    full = whole(upper)
+    _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
+    return IncompleteCholesky.of(full, outward_order(full, first))
 
 
 @compiled
