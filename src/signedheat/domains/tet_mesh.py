@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.box_tree import BoxTree
+from ..geometry.components import element_components
 from ..geometry.tet_faces import face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
 from .exchange import save_shape
@@ -107,13 +108,7 @@ class TetMesh:
     @cached_property
     def parts(self) -> NDArray[np.int64]:
         """(m,) part of the mesh that each tet belongs to; tets of one part are connected through faces."""
-        from scipy import sparse
-
-        m, tet_faces = self.n_tets, self.faces.tet_faces.ravel()
-        size = m + len(self.faces.vertices)
-        ends = np.repeat(np.arange(m), 4), tet_faces + m
-        graph = sparse.coo_matrix((np.ones(4 * m, dtype=np.int8), ends), shape=(size, size))
-        return sparse.csgraph.connected_components(graph, directed=False)[1][:m].astype(np.int64)
+        return element_components(self.faces.tet_faces)
 
     @cached_property
     def search_tree(self) -> Any:

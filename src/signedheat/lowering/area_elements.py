@@ -21,7 +21,7 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
-from ..geometry.components import face_components, same_positions
+from ..geometry.components import element_components, same_positions
 from ..operators.grid.node_sources import NodeSources
 from ..operators.grid.wavefront import padded_shape
 from .grid.binning import merge_in_cells
@@ -105,7 +105,7 @@ def area_elements(shape: Any) -> AreaElements:
 @area_elements.register
 def _(shape: TriangleMesh) -> AreaElements:
     corners = shape.vertices[shape.faces]
-    components = connected_components(shape.vertices, shape.faces)
+    components = components_of(shape.vertices, shape.faces)
     return AreaElements(corners, shape.face_area_vectors, shape.face_areas, components)
 
 
@@ -120,7 +120,7 @@ def _(shape: PolygonMesh) -> AreaElements:
     lengths = np.linalg.norm(total, axis=1, keepdims=True)
     normals = total / np.where(lengths > 0, lengths, 1)
     weights = np.einsum("ij,ij->i", vectors, normals[polygon])
-    return AreaElements(corners, vectors, weights, connected_components(shape.vertices, fans))
+    return AreaElements(corners, vectors, weights, components_of(shape.vertices, fans))
 
 
 @area_elements.register
@@ -185,9 +185,9 @@ def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> ND
     return (unit_ball * reach**dimension / k / counts)[which.ravel()]
 
 
-def connected_components(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def components_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m,) connected component of each face; vertices at the same position are one vertex."""
-    return face_components(same_positions(vertices)[faces])
+    return element_components(same_positions(vertices)[faces])
 
 
 def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSamples:

@@ -62,9 +62,7 @@ class SurfaceDiscretization:
 
     def __post_init__(self) -> None:
         if self.spacing is None:
-            lengths = np.empty(self.triangles.n_edges)
-            lengths[self.triangles.edges.face_edges] = self.triangles.edge_lengths
-            object.__setattr__(self, "spacing", 0.5 * float(lengths.mean()))
+            object.__setattr__(self, "spacing", 0.5 * float(self.triangles.lengths_of_edges.mean()))
 
     @cached_property
     def integration(self) -> DirectIntegration:
