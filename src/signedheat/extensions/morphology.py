@@ -12,16 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve
-from ..domains.grid import Grid
+from ..domains.grid import Grid, room_around
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number
 from ..errors import SignedHeatError, SourceError
 from ..fields.grid_field import GridField
-from ..lowering.area_elements import area_elements, extent, grid_around
+from ..lowering.area_elements import area_elements, bounds_around
 from ..solver import SignedHeatSolver, as_list
 from .sharpening import sharpen
 
 RESOLUTION = 128
+ROOM = 0.15
+"""Share of its longest side by which a shape is padded, besides what its offsets take."""
 
 
 def dilate(shape: Any, distance: float, domain: Any = None, *, resolution: int = RESOLUTION) -> Any:
@@ -198,9 +200,8 @@ def _room(shape: Any, reach: float, resolution: int) -> Grid:
     shapes = as_list(shape)
     if any(isinstance(part, Curve) for part in shapes):
         raise SourceError("a Curve lies on a surface: pass that surface as the domain")
-    bounds = np.stack([extent(part) for part in shapes])
-    longest = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
-    return grid_around(shapes, resolution, padding=0.15 * longest + 1.05 * reach)
+    bounds = bounds_around(shapes)
+    return Grid.around(bounds, resolution, room_around(bounds, reach, ROOM))
 
 
 def _grid(domain: Any) -> Grid:

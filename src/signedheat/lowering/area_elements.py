@@ -136,26 +136,6 @@ def _(shape: PointCloud) -> AreaElements:
     return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
 
 
-@singledispatch
-def extent(shape: Any) -> NDArray[np.float64]:
-    """(2, d) least and greatest coordinates of a shape."""
-    corners = area_elements(shape).corners
-    return np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
-
-
-@extent.register
-def _(shape: PointCloud) -> NDArray[np.float64]:
-    return np.stack([shape.points.min(axis=0), shape.points.max(axis=0)])
-
-
-@extent.register
-def _(shape: TriangleMesh) -> NDArray[np.float64]:
-    used = np.zeros(shape.n_vertices, dtype=bool)
-    used[shape.faces] = True
-    vertices = shape.vertices[used]
-    return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
-
-
 def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = None) -> Grid:
     """A grid of cubic cells around shapes, with `resolution` nodes along its longest side.
 
@@ -164,8 +144,16 @@ def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = 
     >>> grid_around([PointCloud([[0, 0, 0], [1, 2, 4]])], 7, padding=1.0)
     Grid(origin=[-1.0, -1.0, -1.0], spacing=[1.0, 1.0, 1.0], shape=(4, 5, 7))
     """
-    extents = np.stack([extent(shape) for shape in shapes])
-    return Grid.around([extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)], resolution, padding)
+    return Grid.around(bounds_around(shapes), resolution, padding)
+
+
+def bounds_around(shapes: Sequence[Any]) -> NDArray[np.float64]:
+    """(2, d) lower and upper corner of the box around shapes that have area elements."""
+    for shape in shapes:
+        if area_elements.dispatch(type(shape)) is area_elements.dispatch(object):
+            area_elements(shape)  # which raises
+    bounds = np.stack([shape.bounds for shape in shapes])
+    return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
 
 def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> NDArray[np.float64]:
