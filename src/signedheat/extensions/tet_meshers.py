@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.grid import room_around
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
-from ..lowering.area_elements import area_elements, extent
+from ..lowering.area_elements import area_elements, bounds_around
 
 
 def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
@@ -94,11 +95,11 @@ def _box_around(
     shape: Any, resolution: int, padding: float | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Corners of the padded box of a shape, and the edge length wanted."""
-    lower, upper = extent(shape)
+    lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
         raise GeometryError(f"{shape!r} has no extent in space of three dimensions to put a mesh around")
-    padding = longest / 5 if padding is None else padding
+    padding = room_around((lower, upper)) if padding is None else padding
     return lower - padding, upper + padding, longest / resolution
 
 

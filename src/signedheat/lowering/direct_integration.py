@@ -14,6 +14,7 @@ from ..cache import LastUsed, fingerprint
 from ..discretization import Levels, SourceTerm
 from ..errors import ConstraintError
 from ..linear import Factor, factorize, upper_triangle, whole
+from ..linear.conjugate_gradients import conjugate_gradients
 
 _MAX_ROUNDS = 12
 _MAX_INNER = 30
@@ -134,7 +135,9 @@ class DirectIntegration:
         values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
         gap, worst, slow = levels, np.inf, False
         for _ in range(_MAX_ROUNDS):
-            displacements = _conjugate_gradients(lambda d: rows @ pull(d), gap) if slow else gap
+            displacements = gap
+            if slow:  # roughly: what remains is left to the next round
+                displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=_MAX_INNER)
             step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
             values += step
             multipliers -= spring * (displacements - rows @ step)
@@ -189,28 +192,6 @@ def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.
     diagonal = matrix.indptr[vertices]
     data[diagonal] += np.where(data[diagonal] > 0, data[diagonal], 1.0)
     return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
-
-
-def _conjugate_gradients(
-    operator: Callable[[NDArray[np.float64]], NDArray[np.float64]], rhs: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Each column solved for by itself, roughly: whoever asks repeats it on what remains."""
-    solution, residual = np.zeros_like(rhs), rhs.copy()
-    direction, size = residual.copy(), (residual**2).sum(axis=0)
-    goal = 1e-6 * size
-    for _ in range(_MAX_INNER):
-        image = operator(direction)
-        curvature = (direction * image).sum(axis=0)
-        active = (size > goal) & (curvature > 0)
-        if not active.any():
-            break
-        length = np.divide(size, curvature, out=np.zeros_like(size), where=active)
-        solution += length * direction
-        residual -= length * image
-        smaller = (residual**2).sum(axis=0)
-        direction = residual + np.divide(smaller, size, out=np.zeros_like(size), where=size > 0) * direction
-        size = smaller
-    return solution
 
 
 def _refuse_contradictions(rows: sparse.csr_matrix, levels: NDArray[np.float64], values: NDArray[np.float64]) -> None:

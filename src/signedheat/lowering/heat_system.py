@@ -12,7 +12,7 @@ from scipy import sparse
 from ..geometry.directions import unit
 from ..geometry.visibility import uphill_roots
 from ..linear import Factor, factorize
-from ..linear.krylov import IncompleteCholesky, outward_order
+from ..linear.incomplete_cholesky import IncompleteCholesky, outward_order
 from ..linear.restarts import Stage, matrix_forces, solve_with_restarts
 
 

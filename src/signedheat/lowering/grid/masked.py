@@ -16,7 +16,7 @@ from ...discretization import Levels
 from ...domains.grid import Grid
 from ...geometry.directions import unit
 from ...linear import upper_triangle
-from ...linear.krylov import from_first
+from ...linear.incomplete_cholesky import from_first
 from ...linear.restarts import Stage
 from ..area_elements import sample_on_grid
 from ..direct_integration import DirectIntegration

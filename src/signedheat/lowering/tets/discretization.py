@@ -17,7 +17,7 @@ from ...domains.tet_mesh import TetMesh
 from ...geometry.tet_clipping import Planes
 from ...geometry.visibility import tet_neighbors, visible
 from ...linear import upper_triangle
-from ...linear.krylov import from_first
+from ...linear.incomplete_cholesky import from_first
 from ...linear.restarts import Stage
 from ..heat_system import HeatSystem, bend_around_corners
 from .integration import TetIntegration
