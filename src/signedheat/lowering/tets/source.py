@@ -37,7 +37,7 @@ class TetSource:
     interpolation : (s, n) sparse
         Row i averages φ over patch i of the source: what lies nearest to one vertex of the tets that it crosses.
         Where the source follows faces of the mesh, the patch is the vertex itself.
-    bends : (s, 3n) sparse
+    quadratic_correction : (s, 3n) sparse
         What `rows` lack of being exact for quadratic φ, from the gradients of φ at the unknowns, x, y, z of each in
         turn.
     weights : (s,) float
@@ -53,7 +53,7 @@ class TetSource:
     centers: NDArray[np.float64]
     time: float
     interpolation: sparse.csr_matrix
-    bends: sparse.csr_matrix
+    quadratic_correction: sparse.csr_matrix
     weights: NDArray[np.float64]
     components: NDArray[np.int64]
     source_ids: NDArray[np.int64]
@@ -113,14 +113,14 @@ def tet_source(
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
         raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
     patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
-    rows, bends, weights, members = zip(*patches, strict=True)
+    rows, corrections, weights, members = zip(*patches, strict=True)
     return TetSource(
         vectors=loads[:, :3],
         strengths=loads[:, 3],
         centers=np.concatenate([_centers(mesh, polygons) for polygons in cuts]),
         time=time,
         interpolation=sparse.vstack(rows, format="csr"),
-        bends=sparse.vstack(bends, format="csr"),
+        quadratic_correction=sparse.vstack(corrections, format="csr"),
         weights=np.concatenate(weights),
         components=np.unique(np.concatenate(members), return_inverse=True)[1],
         source_ids=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
@@ -169,7 +169,7 @@ def _patches(
     polygons: ClippedPolygons,
     components: NDArray[np.int64],
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
-    """Rows, bends, areas and components of the patches.
+    """Rows, quadratic corrections, areas and components of the patches.
 
     One row for each piece would say more than φ, linear on every tet, can obey but by being flat around the source.
     A quadratic φ is at x, of barycentric coordinates λ between corners v, ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
@@ -199,8 +199,8 @@ def _patches(
     away = (_centers(mesh, polygons)[:, None] - mesh.vertices[mesh.tets[polygons.tets]])[inside].reshape(-1, 3)
     steps = (entries / np.where(real, weights, 1)[index])[n_on:, None] * away / 2
     places = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
-    bends = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
-    return rows[real], bends[real], weights[real], found[real] // n_unknowns
+    corrections = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
+    return rows[real], corrections[real], weights[real], found[real] // n_unknowns
 
 
 def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> NDArray[np.float64]:
