@@ -126,8 +126,7 @@ class Convex:
         """The maximiser, from φ⁰ on."""
         from threadpoolctl import threadpool_limits
 
-        rows = getattr(source, "rows", None)
-        if rows is None or rows.shape[1] != len(values):
+        if source is None or source.interpolation.shape[1] != len(values):
             raise SourceError(
                 "the convex method holds φ at the source, and this field comes without one, or from one that lies on "
                 "other triangles: pass what SignedHeatSolver.distance returned for oriented curves or points, on "
