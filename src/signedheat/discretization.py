@@ -6,7 +6,7 @@ The method (`method.py`) runs once, on discretisations, and never learns what th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import singledispatch
 from typing import Any, Protocol
@@ -53,6 +53,9 @@ class Integration(Protocol):
     def solve(self, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² with nothing imposed."""
 
+    def solve_many(self, divergences: Iterable[Any], sources: Sequence[SourceTerm]) -> Iterable[NDArray[np.float64]]:
+        """The same for several sources (see `SolvesEach`)."""
+
     def fit(self, divergence: Any, source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
         """Impose levels at the samples, in the way that suits the domain best."""
 
@@ -82,14 +85,32 @@ class Discretization(Protocol):
     def diffuse(self, source: SourceTerm) -> Any:
         """Solve ``(M + tL) X = X₀``, right in direction however small X becomes."""
 
+    def diffuse_many(self, sources: Sequence[SourceTerm]) -> Iterable[Any]:
+        """The same for several sources of one τ (see `DiffusesEach`)."""
+
     def to_cells(self, vectors: Any) -> NDArray[Any]:
         """X at the cells on which ∇φ lives: complex numbers on surfaces, rows of components in space."""
 
     def divergence(self, directions: NDArray[Any]) -> Any:
         """b, the right-hand side of ``C φ = b``."""
 
-    def field(self, values: NDArray[np.float64], source: SourceTerm, diagnostics: Diagnostics) -> Any:
-        """The result, as users see it."""
+
+class DiffusesEach:
+    """For discretisations that have nothing to gain by diffusing several sources at once."""
+
+    def diffuse_many(self: Discretization, sources: Sequence[Any]) -> Iterable[Any]:
+        """One after the other, each when it is asked for."""
+        return (self.diffuse(source) for source in sources)
+
+
+class SolvesEach:
+    """For step 3 that has nothing to gain by solving for several sources at once."""
+
+    def solve_many(
+        self: Integration, divergences: Iterable[Any], sources: Sequence[Any]
+    ) -> Iterable[NDArray[np.float64]]:
+        """One after the other, each when it is asked for."""
+        return (self.solve(divergence, source) for divergence, source in zip(divergences, sources, strict=True))
 
 
 @dataclass(frozen=True)

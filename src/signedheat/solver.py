@@ -158,7 +158,7 @@ def checked(constraint: Constraint | None) -> Constraint:
     """The constraint, or the default for none."""
     if constraint is None:
         return ZeroSet()
-    if isinstance(constraint, type) or not hasattr(constraint, "integrate"):
+    if isinstance(constraint, type) or not isinstance(constraint, Constraint):
         raise TypeError(
             f"{constraint!r} is not a constraint: pass Free(), ZeroSet(), EachComponent(), LevelValues(values) or "
             "Soft(weight)"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import singledispatch
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from ..progress import Progress
 from .sharpening_methods import Geodesic
 
 
+@runtime_checkable
 class Method(Protocol):
     """A way to sharpen."""
 
@@ -89,7 +90,7 @@ def sharpened(
 ) -> tuple[NDArray[np.float64], Diagnostics]:
     """What fields on surfaces and on tets have in common: new values, and diagnostics that compare the slopes."""
     method = Geodesic() if method is None else method
-    if isinstance(method, type) or not hasattr(method, "sharpened"):
+    if isinstance(method, type) or not isinstance(method, Method):
         raise TypeError(f"{method!r} is no method of sharpening: pass Geodesic() or Convex()")
     known = np.isfinite(values)
     if not known.any():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -18,7 +18,8 @@ from ..linear.conjugate_gradients import conjugate_gradients
 
 _MAX_ROUNDS = 12
 _MAX_INNER = 30
-_BATCH = 32  # right-hand sides solved at a time
+BATCH = 32
+"""Right-hand sides solved at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +57,10 @@ class DirectIntegration:
         return self.solve_many([divergence], [source])[0]
 
     def solve_many(
-        self, divergences: Sequence[NDArray[np.float64]], sources: Sequence[SourceTerm]
+        self, divergences: Iterable[NDArray[np.float64]], sources: Sequence[SourceTerm]
     ) -> list[NDArray[np.float64]]:
         """The same for several sources at once."""
-        solved = self.factor.solve(np.stack(divergences).T)
+        solved = self.factor.solve(np.stack(list(divergences)).T)
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
@@ -93,8 +94,8 @@ class DirectIntegration:
         loads = sparse.csr_matrix(entries, shape=(len(group), len(free)))
         _, pull = self._interpolate(rows, divergence[:, None], values[:, None])
         capacitance = np.empty((len(free), len(free)))
-        for begin in range(0, len(free), _BATCH):
-            batch = slice(begin, begin + _BATCH)
+        for begin in range(0, len(free), BATCH):
+            batch = slice(begin, begin + BATCH)
             lifted = loads[:, batch].toarray()
             _, multipliers = self._interpolate(rows, np.zeros((len(divergence), lifted.shape[1])), lifted)
             capacitance[:, batch] = loads.T @ multipliers

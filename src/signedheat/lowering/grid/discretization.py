@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...discretization import discretize
+from ...discretization import DiffusesEach, discretize
 from ...domains.grid import Grid
 from ...errors import MemoryLimitError, SourceError
 from ...operators.grid.multilevel import Level, collapse, diffuse_multilevel
@@ -56,7 +56,7 @@ def refuse_beyond_memory(grid: Grid) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class GridDiscretization:
+class GridDiscretization(DiffusesEach):
     """A grid, as the three steps see it."""
 
     grid: Grid

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...discretization import Levels
+from ...discretization import Levels, SolvesEach
 from ...domains.grid import Grid
 from ...linear.conjugate_gradients import conjugate_gradients
 from ...operators.grid.multilevel import collapse, diffuse_multilevel, skip_finest
@@ -25,7 +25,7 @@ MULTIPLIER_STEPS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class GridIntegration:
+class GridIntegration(SolvesEach):
     """Step 3 on a grid."""
 
     grid: Grid

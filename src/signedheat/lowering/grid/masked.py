@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...cache import LastUsed
-from ...discretization import Levels
+from ...discretization import DiffusesEach, Levels
 from ...domains.grid import Grid
 from ...geometry.directions import unit
 from ...linear import upper_triangle
@@ -40,7 +40,7 @@ FACING = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class MaskedGridDiscretization:
+class MaskedGridDiscretization(DiffusesEach):
     """A grid with solid nodes, as the three steps see it."""
 
     grid: Grid

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...cache import LastUsed
-from ...discretization import discretize
+from ...discretization import DiffusesEach, discretize
 from ...domains.tet_mesh import TetMesh
 from ...geometry.tet_clipping import Planes
 from ...geometry.visibility import tet_neighbors, visible
@@ -37,7 +37,7 @@ SPRINGS = 30.0
 
 
 @dataclass(frozen=True, eq=False)
-class TetDiscretization:
+class TetDiscretization(DiffusesEach):
     """A tet mesh as the three steps see it.
 
     Parameters
