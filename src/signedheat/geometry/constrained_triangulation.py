@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import floor
@@ -246,21 +246,25 @@ def force(points: Sequence[Point], apex: Apex, leaving: dict[int, int], a: int, 
         r, s = points[u], points[v]
         return turn(p, q, r) * turn(p, q, s) < 0 and turn(r, s, p) * turn(r, s, q) < 0
 
-    queue = deque(crossed_edges(apex, leaving, a, b, crosses))
-    patience = 100 + len(queue) ** 3
-    while queue and patience:
+    remaining = crossed_edges(apex, leaving, a, b, crosses)
+    patience = 100 + len(remaining) ** 2
+    flipped = True
+    while remaining and flipped and patience:
         patience -= 1
-        u, v = queue.popleft()
-        w, x = apex[u, v], apex[v, u]
-        if min(turn(points[x], points[v], points[w]), turn(points[w], points[u], points[x])) <= FLAT:
-            queue.append((u, v))
-            continue
-        del apex[u, v], apex[v, u]
-        add(apex, w, x, v)
-        add(apex, x, w, u)
-        leaving.update({u: x, v: w, w: x, x: w})
-        if crosses(w, x):
-            queue.append((w, x))
+        flipped, waiting = False, []
+        for u, v in reversed(remaining):  # there and back: flips at one end make room for the next
+            w, x = apex[u, v], apex[v, u]
+            if min(turn(points[x], points[v], points[w]), turn(points[w], points[u], points[x])) <= FLAT:
+                waiting.append((u, v))
+                continue
+            del apex[u, v], apex[v, u]
+            add(apex, w, x, v)
+            add(apex, x, w, u)
+            leaving.update({u: x, v: w, w: x, x: w})
+            flipped = True
+            if crosses(w, x):
+                waiting.append((w, x))
+        remaining = waiting
 
 
 def crossed_edges(
