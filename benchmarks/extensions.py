@@ -20,6 +20,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 import signedheat as sh
+from signedheat.diagnostics import Jumps, SlopeErrors
 from signedheat.samples import sphere, torus
 
 
@@ -68,11 +69,11 @@ def jumps(large: bool) -> None:
         }
         for name, (mesh, curve) in cases.items():
             phi, seconds = timed(lambda mesh=mesh, curve=curve: sh.piecewise_distance(mesh, curve))
-            notes = phi.diagnostics.notes
-            line = f"{name:18} {mesh.n_faces:8d} {seconds:8.2f} {notes['rounds']:7d} {notes['gap']:8.2%}"
+            jumps = phi.diagnostics.note(Jumps)
+            line = f"{name:18} {mesh.n_faces:8d} {seconds:8.2f} {jumps.rounds:7d} {jumps.gap:8.2%}"
             if mesh.n_faces < 25_000:
                 exact, slow = timed(lambda mesh=mesh, curve=curve: sh.piecewise_distance(mesh, curve, exact=True))
-                line += f"   {slow:9.2f} {notes['objective'] / exact.diagnostics.notes['objective'] - 1:15.3%}"
+                line += f"   {slow:9.2f} {jumps.objective / exact.diagnostics.note(Jumps).objective - 1:15.3%}"
             print(line, flush=True)
 
 
@@ -189,9 +190,9 @@ def in_tets() -> None:
         texts = []
         for method in (sh.Geodesic(), sh.Convex()):
             phi, spent = timed(lambda method=method: sh.sharpen(plain, method=method))
-            notes = phi.diagnostics.notes
-            texts.append(f"{off(phi.values[used], exact[used])} {notes['slope_error_after']:6.4f} {spent:6.2f}s")
-        before = f"{off(plain.values[used], exact[used])} {notes['slope_error_before']:6.4f} {seconds:6.2f}s"
+            slopes = phi.diagnostics.note(SlopeErrors)
+            texts.append(f"{off(phi.values[used], exact[used])} {slopes.slope_error_after:6.4f} {spent:6.2f}s")
+        before = f"{off(plain.values[used], exact[used])} {slopes.slope_error_before:6.4f} {seconds:6.2f}s"
         print(f"{name:12} {mesh.n_tets:8d} {diffusion:4g} | {' | '.join([before, *texts])}", flush=True)
 
     round_shape = ball(5)

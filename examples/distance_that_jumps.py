@@ -10,8 +10,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import signedheat as sh
+from signedheat.diagnostics import Jumps
 from signedheat.samples import sphere, torus
-from signedheat.visualization.surfaces import draw_surface
+from signedheat.visualization import draw_surface
 
 EXPECTED = 2 * np.pi * 0.4, 0.08  # length of the first cut: once across the tube, whose radius is 0.4
 
@@ -32,7 +33,7 @@ def main(folder: Path) -> float:
         phi = sh.piecewise_distance(mesh, sources, smoothing=1.0)
         cut = phi.cut[0]
         lengths.append(cut.length)
-        print(f"{title}: {phi.diagnostics.notes['gap']:.1%} from the least objective at most; {cut}")
+        print(f"{title}: {phi.diagnostics.note(Jumps).gap:.1%} from the least objective at most; {cut}")
         direction = np.array([0.2, -0.8, 0.7]) if mesh is ring else np.array([0.9, 0.3, 0.5])
         draw_surface(phi.split(), panel, sources, view=direction)
         panel.set_title(f"{title}: cut {cut.length:.2f} long", fontsize=10)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat.visualization import slices as viewing
+from signedheat import visualization
 
 PLAN = """
 #########################
@@ -38,7 +38,7 @@ def main(folder: Path) -> float:
     phi = sh.signed_distance(north, grid)
 
     phi.save(folder / "floor_plan.npz")
-    viewing.save_slices(phi, folder / "floor_plan.png", north)
+    visualization.save_slices(phi, folder / "floor_plan.png", north)
     return float(phi([[9.5, 1.5]])[0])
 
 

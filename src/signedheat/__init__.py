@@ -1,7 +1,7 @@
 """Generalized signed distance to broken geometry, by the signed heat method."""
 
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
-from .discretization import Diagnostics
+from .diagnostics import Diagnostics
 from .domains.curves import Curve, SurfacePoints
 from .domains.digital_surface import DigitalSurface
 from .domains.grid import Grid
@@ -21,6 +21,7 @@ from .errors import (
     SignedHeatError,
     SourceError,
     UnreachedWarning,
+    UnsupportedTypeError,
 )
 from .extensions.close_curves import close_curves
 from .extensions.common_subdivision import common_subdivision
@@ -79,6 +80,7 @@ __all__ = [
     "TetMesh",
     "TriangleMesh",
     "UnreachedWarning",
+    "UnsupportedTypeError",
     "VertexField",
     "ZeroSet",
     "close_curves",

@@ -23,7 +23,7 @@ class Constraint(Protocol):
 
 @dataclass(frozen=True)
 class Free:
-    """No constraint: φ is shifted so that its weighted mean over the source is zero.
+    """No constraint: φ solves Eq. 13 and is shifted so that its weighted mean over the source is zero.
 
     Examples
     --------
@@ -62,7 +62,7 @@ class ZeroSet:
 
 @dataclass(frozen=True)
 class EachComponent:
-    """φ is constant on every connected component of the source, each at its own unknown level (Fig. 10).
+    """φ is constant on every connected component of the source, each at its own unknown level (Eq. 14, Fig. 10).
 
     Examples
     --------
@@ -76,7 +76,7 @@ class EachComponent:
 
 @dataclass(frozen=True)
 class LevelValues:
-    """Given levels: φ = ``values[k]`` on the k-th source, as for the contour lines of a map.
+    """Given levels: φ = ``values[k]`` on the k-th source, as for the contour lines of a map (Eq. 14 with ``A φ = c``).
 
     Parameters
     ----------
@@ -111,15 +111,16 @@ class LevelValues:
             index = source.components
         else:
             raise ConstraintError(
-                f"{len(self.values)} level values were given for {n_sources} sources with {n_components} connected "
-                "components in all: give one value for each source, or one for each component"
+                f"{len(self.values)} level values were given for {n_sources} sources with {n_components} "
+                "connected components in all",
+                remedy="give one value for each source, or one for each component",
             )
         return integration.fit(divergence, source, Levels(np.array(self.values)[index]))
 
 
 @dataclass(frozen=True)
 class Soft:
-    """A penalty pulls φ to zero on the source (Fig. 11): zero weight is `Free`, infinite weight `ZeroSet`.
+    """A penalty pulls φ to zero on the source: zero weight is `Free`, infinite weight ``ZeroSet(hard=True)`` (Fig. 11).
 
     Parameters
     ----------

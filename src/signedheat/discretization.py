@@ -6,13 +6,15 @@ The method (`method.py`) runs once, on discretisations, and never learns what th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .errors import UnsupportedTypeError
 
 
 class SourceTerm(Protocol):
@@ -20,7 +22,7 @@ class SourceTerm(Protocol):
 
     @property
     def vectors(self) -> Any:
-        """X₀, the right-hand side of Eq. 12, in the discretisation's own layout."""
+        """X₀, the right-hand side of Eq. 12 (on surfaces Eq. 11, Eq. 19), in the discretisation's own layout."""
 
     @property
     def time(self) -> float:
@@ -28,7 +30,7 @@ class SourceTerm(Protocol):
 
     @property
     def interpolation(self) -> Any:
-        """A: sparse (s, n), row i interpolates φ at source sample i."""
+        """A of Eq. 14: sparse (s, n), row i interpolates φ at source sample i."""
 
     @property
     def weights(self) -> NDArray[np.float64]:
@@ -50,28 +52,24 @@ class Integration(Protocol):
     weighted mean of zero over the source samples of each part. A part without samples is NaN.
     """
 
-    def solve(self, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
-        """Minimise ∫|∇φ − Y|² with nothing imposed."""
+    def solve(self, divergence: Any, source: Any) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² (Eq. 2) with nothing imposed: ``C φ = b`` (Eq. 13)."""
 
-    def solve_many(self, divergences: Iterable[Any], sources: Sequence[SourceTerm]) -> Iterable[NDArray[np.float64]]:
+    def solve_many(self, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[NDArray[np.float64]]:
         """The same for several sources (see `SolvesEach`)."""
 
-    def fit(self, divergence: Any, source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels at the samples, in the way that suits the domain best."""
+    def fit(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels at the samples (Eq. 14), in the way that suits the domain best."""
 
-    def fit_exactly(self, divergence: Any, source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels at the samples, exactly (where the rows allow it)."""
+    def fit_exactly(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels at the samples exactly (Eq. 14), as far as the rows of A do not contradict each other."""
 
-    def penalize(self, divergence: Any, source: SourceTerm, strength: float) -> NDArray[np.float64]:
-        """Minimise ∫|∇φ − Y|² + strength · Σ weight · φ(sample)²."""
+    def penalize(self, divergence: Any, source: Any, strength: float) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² + strength · Σ weight · φ(sample)² (Sec. 7.1, Fig. 11)."""
 
 
-class Discretization(Protocol):
-    """A domain, as the three steps see it."""
-
-    @property
-    def integration(self) -> Integration:
-        """Step 3."""
+class Adaptable(Protocol):
+    """What becomes a discretisation when the sources are known."""
 
     def adapt(self, sources: Sequence[Any]) -> tuple[Discretization, Sequence[Any]]:
         """A discretisation that can hold these sources, and the sources as it knows them: most often itself and they.
@@ -79,11 +77,19 @@ class Discretization(Protocol):
         Isolated points and unoriented curves inside faces need edges and vertices of their own.
         """
 
+
+class Discretization(Adaptable, Protocol):
+    """A domain, as the three steps see it. Source terms that it is given are those that it has made itself."""
+
+    @property
+    def integration(self) -> Integration:
+        """Step 3."""
+
     def lower(self, sources: Sequence[Any], diffusion: float) -> SourceTerm:
         """Bring sources into this discretisation."""
 
-    def diffuse(self, source: SourceTerm) -> Any:
-        """Solve ``(M + tL) X = X₀``, right in direction however small X becomes."""
+    def diffuse(self, source: Any) -> Any:
+        """Solve ``(M + tL) X = X₀`` (Eq. 12); directions stay right however small X becomes."""
 
     def diffuse_many(self, sources: Sequence[SourceTerm]) -> Iterable[Any]:
         """The same for several sources of one τ (see `DiffusesEach`)."""
@@ -129,32 +135,10 @@ class Levels:
     groups: NDArray[np.int64] | None = None
 
 
-@dataclass(frozen=True)
-class Diagnostics:
-    """What happened on the way to a field.
-
-    Attributes
-    ----------
-    timings : mapping of str to float
-        Seconds per step.
-    time : float
-        Diffusion time t, in squared units of length.
-    unreached : (k,) int
-        Unknowns to which no source is connected; φ is NaN there.
-    notes : mapping of str to object
-        Residuals, what was repaired, subdivided or cured: named by the step that met it.
-    """
-
-    timings: Mapping[str, float] = field(default_factory=dict)
-    time: float = float("nan")
-    unreached: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    notes: Mapping[str, Any] = field(default_factory=dict)
-
-
 @singledispatch
 def discretize(domain: Any, **options: Any) -> Discretization:
     """Lower a domain to its discretisation; each kind of domain registers its own way."""
-    raise TypeError(
-        f"{type(domain).__name__} is not a domain: use TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, "
-        "TetMesh or Grid"
+    raise UnsupportedTypeError(
+        f"{type(domain).__name__} is not a domain",
+        remedy="use TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid",
     )

@@ -2,12 +2,56 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
+from typing import TypeVar
 
 
 class SignedHeatError(ValueError):
-    """Base class of every error that signedheat raises for bad input."""
+    """Base class of every error that signedheat raises for bad input.
+
+    Attributes
+    ----------
+    cause : str
+        What is wrong.
+    remedy : str, optional
+        What to do about it, where the cause does not say it already.
+    element : str, optional
+        The part of the input that it is about, such as ``face 3``.
+    path : str, optional
+        The file that it is about.
+
+    Examples
+    --------
+    >>> error = GeometryError("polygon 3 has 2 corners", remedy="remove it", element="polygon 3")
+    >>> print(error.at("broken.obj"))
+    broken.obj: polygon 3 has 2 corners: remove it
+    >>> error.at("broken.obj").element
+    'polygon 3'
+    """
+
+    def __init__(
+        self,
+        cause: str,
+        *,
+        remedy: str | None = None,
+        element: str | None = None,
+        path: str | os.PathLike[str] | None = None,
+    ) -> None:
+        super().__init__(cause)
+        self.cause, self.remedy, self.element = cause, remedy, element
+        self.path = None if path is None else str(path)
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.path, self.cause, self.remedy) if part is not None)
+
+    def at(self: AnyError, path: str | os.PathLike[str]) -> AnyError:
+        """The same error, about a file."""
+        return type(self)(self.cause, remedy=self.remedy, element=self.element, path=path)
+
+
+AnyError = TypeVar("AnyError", bound=SignedHeatError)
 
 
 class GeometryError(SignedHeatError):
@@ -36,6 +80,10 @@ class FactorizationError(SignedHeatError):
 
 class FileFormatError(SignedHeatError):
     """A file that cannot be read or written: missing, truncated, of unknown kind, unwritable."""
+
+
+class UnsupportedTypeError(SignedHeatError, TypeError):
+    """An argument of a type that is not known here: no domain, no constraint, no field."""
 
 
 class UnreachedWarning(UserWarning):

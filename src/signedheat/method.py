@@ -17,7 +17,7 @@ from .geometry.directions import unit
 
 
 def diffuse(discretization: Discretization, source: SourceTerm) -> Any:
-    """Step 1, Eq. 12: ``(M + tL) X = X₀``."""
+    """Step 1: solve ``(M + tL) X = X₀`` (Eq. 12), the heat equation of Eq. 1 by one step of backward Euler."""
     return discretization.diffuse(source)
 
 
@@ -27,14 +27,14 @@ def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) 
 
 
 def normalize(discretization: Discretization, vectors: Any) -> NDArray[Any]:
-    """Step 2: ``Y = X / |X|`` on every cell. Cells that nothing reached keep Y = 0."""
+    """Step 2: ``Y = X / |X|`` on every cell (Sec. 6). Cells that nothing reached keep Y = 0."""
     return unit(discretization.to_cells(vectors))
 
 
 def integrate(
     discretization: Discretization, directions: NDArray[Any], source: SourceTerm, constraint: Constraint
 ) -> NDArray[np.float64]:
-    """Step 3, Eq. 13: ``C φ = b`` with b the divergence of Y, under the constraint (Sec. 7.1)."""
+    """Step 3: solve ``C φ = b`` (Eq. 13), b the divergence of Y, under a constraint (Eq. 14). Minimises Eq. 2."""
     return constraint.integrate(discretization.integration, discretization.divergence(directions), source)
 
 

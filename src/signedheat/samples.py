@@ -36,7 +36,7 @@ def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0
         edges = TriangleMesh(points, faces).edges
         middle = len(points) + edges.face_edges
         points = np.concatenate([points, points[edges.vertices].mean(axis=1)])
-        corner, ab, bc, ca = faces, *middle.T
+        corner, (ab, bc, ca) = faces, middle.T
         faces = np.concatenate(
             [
                 np.stack([corner[:, 0], ab, ca], axis=1),

@@ -7,13 +7,22 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
-from typing import Any
+from typing import Generic, Literal, TypeVar, overload
 
 from .constraints import Constraint, ZeroSet
-from .discretization import Diagnostics, Discretization, discretize
+from .diagnostics import Diagnostics
+from .discretization import Adaptable, discretize
+from .domains.curves import CurvesAndPoints
+from .domains.grid import Dimension, Grid
+from .domains.intrinsic_triangulation import triangle_mesh
+from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources
+from .domains.tet_mesh import TetMesh
 from .domains.validation import positive_number
-from .errors import SourceError
-from .fields.to_field import to_field
+from .errors import SourceError, UnsupportedTypeError
+from .fields.grid_field import GridField
+from .fields.tet_field import TetField
+from .fields.to_field import Field, to_field
+from .fields.vertex_field import VertexField
 from .lowering.area_elements import grid_around
 from .lowering.surface.intrinsic import Retriangulated
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
@@ -21,9 +30,11 @@ from .progress import Progress, Stopwatch
 
 _BATCH = 16  # sources diffused at a time
 
+AnyDomain = TypeVar("AnyDomain", bound=Domain, covariant=True)
+
 
 @dataclass(frozen=True, eq=False)
-class SignedHeatSolver:
+class SignedHeatSolver(Generic[AnyDomain]):
     """Generalized signed distance on one domain.
 
     What a domain needs factorised is factorised at first use and kept, so that a second distance is cheap.
@@ -47,7 +58,7 @@ class SignedHeatSolver:
         If `diffusion` is not positive and finite.
     """
 
-    domain: Any
+    domain: AnyDomain
     diffusion: float = 1.0
     progress: Progress | None = field(default=None, repr=False)
     intrinsic: bool = False
@@ -56,15 +67,15 @@ class SignedHeatSolver:
         object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
 
     @cached_property
-    def discretization(self) -> Discretization:
+    def discretization(self) -> Adaptable:
         """The domain as the method sees it."""
         if self.intrinsic:
             progress = self.progress
             report = None if progress is None else lambda share: progress((1 + share) / 5, "refine")
-            return Retriangulated(self.domain, report)
+            return Retriangulated(triangle_mesh(self.domain), report)
         return discretize(self.domain)
 
-    def with_diffusion(self, diffusion: float) -> SignedHeatSolver:
+    def with_diffusion(self, diffusion: float) -> SignedHeatSolver[AnyDomain]:
         """The same with another τ; keeps what does not depend on it, which is half of what is factorised.
 
         Examples
@@ -78,7 +89,21 @@ class SignedHeatSolver:
         other.__dict__["discretization"] = self.discretization
         return other
 
-    def distance(self, sources: Any, constraint: Constraint | None = None) -> Any:
+    @overload
+    def distance(
+        self: SignedHeatSolver[Grid[Dimension]], sources: SpaceSources, constraint: Constraint | None = None
+    ) -> GridField[Dimension]: ...
+    @overload
+    def distance(
+        self: SignedHeatSolver[TetMesh], sources: Shapes, constraint: Constraint | None = None
+    ) -> TetField: ...
+    @overload
+    def distance(
+        self: SignedHeatSolver[AnySurface], sources: CurvesAndPoints, constraint: Constraint | None = None
+    ) -> VertexField[AnySurface]: ...
+    @overload
+    def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field: ...
+    def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field:
         """Signed distance to sources.
 
         Parameters
@@ -101,13 +126,16 @@ class SignedHeatSolver:
         ConstraintError
             If the constraint does not fit the sources.
         """
+        return self._distance(sources, constraint)
+
+    def _distance(self, sources: Sources, constraint: Constraint | None) -> Field:
         constraint = checked(constraint)
         stopwatch = Stopwatch(self.progress, steps=5)
         with stopwatch("prepare"):
             discretization = self.discretization
         with stopwatch("sources"):
-            discretization, sources = discretization.adapt(as_list(sources))
-            source = discretization.lower(sources, self.diffusion)
+            discretization, adapted = discretization.adapt(as_list(sources))
+            source = discretization.lower(adapted, self.diffusion)
         with stopwatch("diffuse"):
             vectors = diffuse(discretization, source)
         with stopwatch("normalize"):
@@ -118,7 +146,21 @@ class SignedHeatSolver:
         diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time)
         return to_field(discretization, values, source, diagnostics)
 
-    def distance_many(self, sources: Sequence[Any], constraint: Constraint | None = None) -> list[Any]:
+    @overload
+    def distance_many(
+        self: SignedHeatSolver[Grid[Dimension]], sources: Sequence[SpaceSources], constraint: Constraint | None = None
+    ) -> list[GridField[Dimension]]: ...
+    @overload
+    def distance_many(
+        self: SignedHeatSolver[TetMesh], sources: Sequence[Shapes], constraint: Constraint | None = None
+    ) -> list[TetField]: ...
+    @overload
+    def distance_many(
+        self: SignedHeatSolver[AnySurface], sources: Sequence[CurvesAndPoints], constraint: Constraint | None = None
+    ) -> list[VertexField[AnySurface]]: ...
+    @overload
+    def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]: ...
+    def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]:
         """Signed distance to each of several sources on its own; cheaper than one after the other.
 
         Parameters
@@ -134,7 +176,7 @@ class SignedHeatSolver:
             What `distance` gives for each, up to rounding. Timings are those of each source's share.
         """
         constraint = checked(constraint)
-        fields: list[Any] = []
+        fields: list[Field] = []
         for begin in range(0, len(sources), _BATCH):
             batch = []
             for entry in sources[begin : begin + _BATCH]:
@@ -154,36 +196,102 @@ class SignedHeatSolver:
         return fields
 
 
+One = TypeVar("One")
+
+
 def checked(constraint: Constraint | None) -> Constraint:
     """The constraint, or the default for none."""
     if constraint is None:
         return ZeroSet()
     if isinstance(constraint, type) or not isinstance(constraint, Constraint):
-        raise TypeError(
-            f"{constraint!r} is not a constraint: pass Free(), ZeroSet(), EachComponent(), LevelValues(values) or "
-            "Soft(weight)"
+        raise UnsupportedTypeError(
+            f"{constraint!r} is not a constraint",
+            remedy="pass Free(), ZeroSet(), EachComponent(), LevelValues(values) or Soft(weight)",
         )
     return constraint
 
 
-def as_list(sources: Any) -> list[Any]:
+def as_list(sources: One | Sequence[One]) -> list[One]:
     """One source or several, as a list."""
-    listed = list(sources) if isinstance(sources, Sequence) else [sources]
+    listed: list[One] = list(sources) if isinstance(sources, Sequence) else [sources]
     if not listed:
-        raise SourceError("there is no source: pass at least one curve, point or shape")
+        raise SourceError(
+            "there is no source",
+            remedy="pass at least one curve, point or shape",
+        )
     return listed
 
 
+@overload
 def signed_distance(
-    source: Any,
-    domain: Any = None,
+    source: Shapes,
+    domain: None = None,
     *,
     resolution: int = 128,
     padding: float | None = None,
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     progress: Progress | None = None,
-) -> Any:
+) -> GridField[Literal[3]]: ...
+@overload
+def signed_distance(
+    source: Polylines,
+    domain: None = None,
+    *,
+    resolution: int = 128,
+    padding: float | None = None,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> GridField[Literal[2]]: ...
+@overload
+def signed_distance(
+    source: SpaceSources,
+    domain: Grid[Dimension],
+    *,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> GridField[Dimension]: ...
+@overload
+def signed_distance(
+    source: Shapes,
+    domain: TetMesh,
+    *,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> TetField: ...
+@overload
+def signed_distance(
+    source: CurvesAndPoints,
+    domain: AnySurface,
+    *,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> VertexField[AnySurface]: ...
+@overload
+def signed_distance(
+    source: Sources,
+    domain: Domain | None,
+    *,
+    resolution: int = 128,
+    padding: float | None = None,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> Field: ...
+def signed_distance(
+    source: Sources,
+    domain: Domain | None = None,
+    *,
+    resolution: int = 128,
+    padding: float | None = None,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> Field:
     """Signed distance to a shape, however broken, in one call.
 
     Parameters
@@ -230,4 +338,4 @@ def signed_distance(
     """
     if domain is None:
         domain = grid_around(as_list(source), resolution, padding)
-    return SignedHeatSolver(domain, diffusion, progress).distance(source, constraint)
+    return SignedHeatSolver(domain, diffusion, progress)._distance(source, constraint)

@@ -6,6 +6,7 @@ from scipy.spatial import Delaunay
 
 import signedheat as sh
 from shapes import domain_cases as cases
+from signedheat.diagnostics import PointsLeftOut
 from signedheat.geometry.hole_filling import hole_fillings
 from signedheat.geometry.local_triangulations import local_triangulations
 
@@ -43,10 +44,16 @@ def plane_with_circle(n, seed=0):
 CASES = {"sphere": sphere_with_circle, "cylinder": cylinder_with_circle, "plane": plane_with_circle}
 
 
-def along_the_circle(cloud, ids, exact):
-    """Distance to a closed path, signed as `exact` whichever side the cloud has chosen for its normals."""
-    phi = sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True)).values
-    return phi * np.sign((phi * exact).sum())
+def outward(name, points):
+    """(n, 3) unit normals: out of the sphere and the cylinder, up from the plane. `exact` is positive to the left."""
+    normals = {"sphere": points, "cylinder": points * [1, 1, 0], "plane": points * 0 + [0, 0, 1]}[name]
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def along_the_circle(cloud, ids, normals):
+    """Distance to a closed path, positive to its left as seen from outside."""
+    path = cloud.path(ids if (cloud.surface_normals * normals).sum() > 0 else ids[::-1], closed=True)
+    return sh.SignedHeatSolver(cloud).distance(path).values
 
 
 def test_in_the_plane_the_local_triangulations_are_the_delaunay_triangulation():
@@ -100,9 +107,8 @@ def test_error_falls_and_is_below_the_peers(name):
     errors, sizes = [], [500, 2000, 8000]
     for n in sizes:
         points, ids, exact = CASES[name](n)
-        errors.append(cases.error(along_the_circle(sh.PointCloud(points), ids, exact), exact))
-        normals = {"sphere": points, "cylinder": points * [1, 1, 0], "plane": points * 0 + [0, 0, 1]}[name]
-        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = outward(name, points)
+        errors.append(cases.error(along_the_circle(sh.PointCloud(points), ids, normals), exact))
         solver = peers.PointCloudHeatSolver(points)
         peer = np.asarray(solver.compute_signed_distance([[*map(int, ids), int(ids[0])]], normals))
         assert errors[-1] < min(cases.error(peer, exact), cases.error(-peer, exact))
@@ -160,7 +166,7 @@ def test_points_that_coincide_get_the_same_distance_as_without_them():
     order = np.concatenate([np.arange(len(points)), np.repeat(np.arange(0, 200), 40)])
     double = sh.PointCloud(points[order])
     field = sh.SignedHeatSolver(double).distance(double.path(len(points) + 40 * ids[:5]))
-    assert field.diagnostics.notes["duplicate points"] == 8000
+    assert field.diagnostics.note(PointsLeftOut).duplicate_points == 8000
     again = sh.SignedHeatSolver(double).distance(double.path(ids, closed=True)).values
     assert again == pytest.approx(phi[order], abs=1e-9)
 
@@ -173,7 +179,9 @@ def test_outliers_get_no_distance_and_disturb_no_one():
         field = sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True))
     assert np.isnan(field.values[-3:]).all()
     assert cases.error(field.values[:-3], exact) < 2e-3
-    assert field.diagnostics.notes["points without triangles"].tolist() == [len(points) + k for k in range(3)]
+    assert field.diagnostics.note(PointsLeftOut).points_without_triangles.tolist() == [
+        len(points) + k for k in range(3)
+    ]
 
 
 def test_a_mobius_strip_of_points_is_like_one_of_triangles():

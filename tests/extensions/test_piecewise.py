@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
 from signedheat.extensions.jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 from signedheat.fields.piecewise_field import chains
@@ -53,10 +54,10 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_fast_is_as_good_as_exact(case):
     mesh, curve = CASES[case]()
-    fast, exact = (sh.piecewise_distance(mesh, curve, exact=e).diagnostics.notes for e in (False, True))
-    assert exact["gap"] < 1e-6
-    assert exact["objective"] * (1 - 1e-6) <= fast["objective"] <= 1.005 * exact["objective"]
-    assert fast["bound"] <= exact["objective"] * (1 + 1e-6)
+    fast, exact = (sh.piecewise_distance(mesh, curve, exact=e).diagnostics.note(Jumps) for e in (False, True))
+    assert exact.gap < 1e-6
+    assert exact.objective * (1 - 1e-6) <= fast.objective <= 1.005 * exact.objective
+    assert fast.bound <= exact.objective * (1 + 1e-6)
 
 
 def test_loop_round_the_tube_is_cut_across_the_tube():
@@ -69,7 +70,7 @@ def test_loop_round_the_tube_is_cut_across_the_tube():
     assert 2 * np.pi * 0.6 < cut.height < 2 * np.pi * 1.4  # between the ways round the inner and the outer equator
     ring = np.arctan2(*mesh.vertices[cut.vertices, 1::-1].T)
     assert np.abs(ring).min() > 2 * np.pi / 64  # not at the source
-    assert np.allclose(np.linalg.norm(phi.gradient, axis=1), 1)
+    assert np.allclose(np.linalg.norm(phi.face_gradients, axis=1), 1)
 
 
 def test_source_is_cut_only_where_nothing_else_is_possible():
@@ -85,7 +86,7 @@ def test_gradient_is_one_and_source_is_zero():
     curve = arc(mesh)
     phi = sh.piecewise_distance(mesh, curve)
     spacing = mesh.edge_lengths.mean()
-    assert np.allclose(np.linalg.norm(phi.gradient, axis=1), 1)
+    assert np.allclose(np.linalg.norm(phi.face_gradients, axis=1), 1)
     assert np.abs(phi(curve)).max() < spacing
     assert abs(np.median(phi(curve))) < 0.1 * spacing
 
@@ -96,8 +97,8 @@ def test_bounding_curve_equals_plain_distance():
     t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
     circle = mesh.polyline(np.stack([0.9 * np.cos(t), 0.9 * np.sin(t), np.full_like(t, 0.4)], axis=1), closed=True)
     phi = sh.piecewise_distance(mesh, circle)
-    notes = phi.diagnostics.notes
-    assert notes["continuous"] and phi.cut == [] and notes["cut_length"] == 0
+    notes = phi.diagnostics.note(Jumps)
+    assert notes.continuous and phi.cut == [] and notes.cut_length == 0
     plain = sh.SignedHeatSolver(mesh).distance(circle, sh.Free())
     split = phi.split()
     assert split.domain.n_vertices == mesh.n_vertices
@@ -106,7 +107,7 @@ def test_bounding_curve_equals_plain_distance():
     area = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3))
     difference = at_vertices - plain.values
     difference -= np.average(difference, weights=area)
-    assert np.sqrt(np.average(difference**2, weights=area)) <= 1.1 * notes["integration_error"] / np.sqrt(2)
+    assert np.sqrt(np.average(difference**2, weights=area)) <= 1.1 * notes.integration_error / np.sqrt(2)
 
 
 def test_orientation_of_faces_does_not_matter():
@@ -119,16 +120,18 @@ def test_orientation_of_faces_does_not_matter():
         along = np.cross(np.diff(mesh.vertices[ids], axis=0), [0.0, 0.0, 1.0])
         curve = sh.Curve(across.faces, across.barycentric, normals=along)
         fields.append(sh.piecewise_distance(mesh, curve, exact=True))
-    assert fields[0].diagnostics.notes["objective"] == pytest.approx(fields[1].diagnostics.notes["objective"], rel=1e-9)
-    assert np.ptp(fields[0].values) > 4 and not fields[0].diagnostics.notes["continuous"]
+    assert fields[0].diagnostics.note(Jumps).objective == pytest.approx(
+        fields[1].diagnostics.note(Jumps).objective, rel=1e-9
+    )
+    assert np.ptp(fields[0].values) > 4 and not fields[0].diagnostics.note(Jumps).continuous
 
 
 def test_reversal_changes_the_sign():
     mesh = torus(n_around=40, n_across=20)
     curve = mesh.path(range(20), closed=True)
     forth, back = (sh.piecewise_distance(mesh, c, exact=True) for c in (curve, curve.reversed()))
-    assert forth.diagnostics.notes["objective"] == pytest.approx(back.diagnostics.notes["objective"], rel=1e-9)
-    assert np.allclose(forth.gradient, -back.gradient)
+    assert forth.diagnostics.note(Jumps).objective == pytest.approx(back.diagnostics.note(Jumps).objective, rel=1e-9)
+    assert np.allclose(forth.face_gradients, -back.face_gradients)
 
 
 def test_scale():
@@ -144,7 +147,7 @@ def test_inconsistently_oriented_curve():
     t = np.linspace(0, np.pi, 60)
     halves = [mesh.polyline(np.stack([np.cos(t), s * np.sin(t), 0 * t], axis=1)) for s in (1, -1)]
     phi = sh.piecewise_distance(mesh, halves)
-    assert not phi.diagnostics.notes["continuous"]
+    assert not phi.diagnostics.note(Jumps).continuous
     ends = np.concatenate([c.points for c in phi.cut])
     assert min(np.linalg.norm(ends - [1, 0, 0], axis=1).min(), np.linalg.norm(ends - [-1, 0, 0], axis=1).min()) < 0.5
     for side in (1, -1):
@@ -178,7 +181,7 @@ def test_intrinsic_triangulation_equals_the_mesh():
     h = [discretize(domain).spacing for domain in domains]  # a mean over edges, and over the area
     diffusion = [(h[0] / spacing) ** 2 for spacing in h]
     best = [
-        sh.piecewise_distance(domain, curve, exact=True, diffusion=tau).diagnostics.notes["objective"]
+        sh.piecewise_distance(domain, curve, exact=True, diffusion=tau).diagnostics.note(Jumps).objective
         for domain, tau in zip(domains, diffusion, strict=True)
     ]
     assert best[0] == pytest.approx(best[1], rel=1e-9)  # several fields may reach it
@@ -187,11 +190,11 @@ def test_intrinsic_triangulation_equals_the_mesh():
     )
     middle = sh.SurfacePoints(np.arange(mesh.n_faces), np.full((mesh.n_faces, 3), 1 / 3))
     assert np.abs(plain(middle) - intrinsic(middle)).max() < 1e-6
-    assert intrinsic.diagnostics.notes["cut_length"] == pytest.approx(plain.diagnostics.notes["cut_length"])
+    assert intrinsic.diagnostics.note(Jumps).cut_length == pytest.approx(plain.diagnostics.note(Jumps).cut_length)
     split = intrinsic.split()
     assert split.domain.n_vertices == plain.split().domain.n_vertices
     with pytest.raises(sh.GeometryError, match="split"):
-        _ = intrinsic.gradient
+        _ = intrinsic.face_gradients
 
 
 def bad(mesh: sh.TriangleMesh) -> sh.TriangleMesh:
@@ -209,7 +212,7 @@ def test_intrinsic_triangulation_of_a_bad_mesh(refine, tmp_path):
     curve = mesh.path(range(20), closed=True)
     better = sh.intrinsic_delaunay(mesh, keep=curve, refine=refine)
     phi = sh.piecewise_distance(better, curve)
-    assert phi.diagnostics.notes["gap"] < 0.002
+    assert phi.diagnostics.note(Jumps).gap < 0.002
     # One loop round the tube, of circumference 0.8 π, with a twig or two at bad triangles. It sits where triangles are
     # longest, and there the way round, from 1.2 π to 2.8 π, is measured with an error of a triangle or so.
     assert 0.97 * 0.8 * np.pi < sum(cut.length for cut in phi.cut) < 1.3 * 0.8 * np.pi
@@ -219,7 +222,7 @@ def test_intrinsic_triangulation_of_a_bad_mesh(refine, tmp_path):
     assert split.domain.triangulation.face_areas.sum() == pytest.approx(mesh.face_areas.sum(), rel=1e-6)
     slope = np.linalg.norm(split.face_gradients, axis=1)
     area = split.domain.triangulation.face_areas
-    assert np.sqrt(np.average((slope - 1) ** 2, weights=area)) < 1.001 * phi.diagnostics.notes["integration_error"]
+    assert np.sqrt(np.average((slope - 1) ** 2, weights=area)) < 1.001 * phi.diagnostics.note(Jumps).integration_error
     assert np.ptp(split.values) == pytest.approx(np.ptp(phi.values), rel=0.05)  # means at vertices
     assert len(phi.contour(0.0)) >= 1
     phi.save(tmp_path / "phi.ply")

@@ -8,6 +8,7 @@ import pytest
 import signedheat as sh
 from shapes.domain_cases import fitted_order
 from shapes.tet_cases import boxes, lattice, rectangle, rms, sphere
+from signedheat.diagnostics import ConvexRounds, RoundCorners, SlopeErrors
 
 
 def ell(n: int) -> tuple[sh.TetMesh, sh.TriangleMesh, np.ndarray]:
@@ -66,9 +67,9 @@ def test_lines_bend_round_a_corner():
         used = np.unique(mesh.tets)
         plain = sh.SignedHeatSolver(mesh).distance(wall)
         sharp = sh.sharpen(plain)
-        notes = sharp.diagnostics.notes
-        assert notes["round corners"] > 0.05 * mesh.n_vertices
-        assert notes["slope_error_after"] < notes["slope_error_before"]
+        slopes = sharp.diagnostics.note(SlopeErrors)
+        assert sharp.diagnostics.note(RoundCorners).round_corners > 0.05 * mesh.n_vertices
+        assert slopes.slope_error_after < slopes.slope_error_before
         before, after = (rms((phi.values - exact)[used]) for phi in (plain, sharp))
         assert after < 0.05 * before
         sizes.append(1 / n)
@@ -119,8 +120,8 @@ def test_convex_method_holds_slopes_and_signs():
     plain = sh.SignedHeatSolver(mesh).distance(sphere(4))
     seen = []
     sharp = sh.sharpen(plain, method=sh.Convex(), progress=lambda *step: seen.append(step))
-    notes = sharp.diagnostics.notes
-    assert notes["residual"] <= 2e-3 and notes["rounds"] <= 200 and notes["rounds"] < len(seen)
+    ended = sharp.diagnostics.note(ConvexRounds)
+    assert ended.residual <= 2e-3 and ended.rounds <= 200 and ended.rounds < len(seen)
     excess = np.maximum(np.linalg.norm(sharp.tet_gradients, axis=1) - 1, 0)
     assert np.sqrt(np.average(excess**2, weights=mesh.tet_volumes)) <= 2e-3
     assert (np.abs(sharp.values) <= np.abs(ball_around(mesh)) + 0.05).all()

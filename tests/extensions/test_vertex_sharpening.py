@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 import signedheat as sh
+from signedheat.diagnostics import ConvexRounds, SlopeErrors
 from signedheat.discretization import discretize
 from signedheat.geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
 from signedheat.samples import sphere, torus
@@ -149,8 +150,8 @@ def test_star_in_the_disk(diffusion, stretch, jitter):
     assert after < 0.25 * before
     assert after < 2e-3
     assert np.array_equal(np.sign(sharp.values), np.where(plain.values < 0, -1, 1))
-    notes = sharp.diagnostics.notes
-    assert notes["slope_error_after"] < notes["slope_error_before"]
+    slopes = sharp.diagnostics.note(SlopeErrors)
+    assert slopes.slope_error_after < slopes.slope_error_before
 
 
 def plank(n: int, ratio: float) -> sh.TriangleMesh:
@@ -193,9 +194,9 @@ def test_convex_method_mends_a_long_diffusion():
     exact = polygon_distance(mesh.vertices[:, :2], incident_faces())
     plain = sh.SignedHeatSolver(mesh, 100.0).distance(mesh.level_set(exact, 0.0))
     sharp = sh.sharpen(plain, method=sh.Convex())
-    notes = sharp.diagnostics.notes
+    ended = sharp.diagnostics.note(ConvexRounds)
     assert error(sharp.values, exact) < 0.25 * error(plain.values, exact)
-    assert notes["residual"] <= 2e-3 and notes["rounds"] <= 200
+    assert ended.residual <= 2e-3 and ended.rounds <= 200
     excess = np.maximum(np.linalg.norm(sharp.face_gradients, axis=1) - 1, 0)
     assert np.sqrt(np.average(excess**2, weights=mesh.face_areas)) <= 2e-3  # no more than the residual
     assert np.abs(sharp(mesh.level_set(exact, 0.0)[0])).max() < 1e-5

@@ -325,3 +325,8 @@ def test_base64_of_vtk_is_decoded_by_hand(tmp_path):
         '<DataArray type="Int64" Name="offsets" format="ascii">3</DataArray></Polys></Piece></PolyData></VTKFile>'
     )
     assert sh.read(tmp_path / "a.vtp").face_areas.tolist() == [0.5]
+
+
+def test_off_with_vertices_and_faces_over_several_lines(tmp_path):
+    (tmp_path / "a.off").write_text("OFF\n4 2 0\n0 0\n0\n1 0 0\n1 1 0\n0 1 0\n3 0\n1 2\n3\n0 2 3 255 0 0\n")
+    assert sh.read(tmp_path / "a.off").faces.tolist() == [[0, 1, 2], [0, 2, 3]]

@@ -7,8 +7,7 @@ from typing import Any
 
 from ..extensions.close_curves import refuse_without_sides
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
-from ..visualization.slices import PICTURE_FORMATS
-from ..visualization.surfaces import save_surface
+from ..visualization import PICTURE_FORMATS, save_surface
 from .computing import prefix_errors
 from .options import Summary, add_command
 from .surface import add_curves_and_output, advice, measured

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import sharpen
+from ..diagnostics import SampledSource
 from ..domains.grid import Grid, room_around
 from ..errors import SignedHeatError
 from ..fields.grid_field import GridField
@@ -31,9 +32,9 @@ def prefix_errors(path: Any) -> Iterator[None]:
     try:
         yield
     except SignedHeatError as error:
-        if str(error).startswith(str(path)):
+        if error.path is not None:
             raise
-        raise type(error)(f"{path}: {error}") from error
+        raise error.at(path) from error
 
 
 def check_grid_options(parser: Parser, arguments: Namespace) -> None:
@@ -99,7 +100,8 @@ def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
 
 def hint(field: GridField) -> str:
     """A further line on sources that may have been given twice."""
-    cancelled = field.diagnostics.notes.get("area that cancels", 0.0)
+    note = field.diagnostics.note(SampledSource)
+    cancelled = note.area_cancelled if note else 0.0
     if cancelled < MOST:
         return ""
     return (
@@ -111,12 +113,13 @@ def hint(field: GridField) -> str:
 def describe(field: Any) -> dict[str, Any]:
     """A field in numbers, for ``--json``."""
     if isinstance(field, GridField):
+        note = field.diagnostics.note(SampledSource)
         where = {
             "origin": field.grid.origin.tolist(),
             "spacing": field.grid.spacing.tolist(),
             "shape": list(field.grid.shape),
-            "area_outside": field.diagnostics.notes.get("area outside the grid", 0.0),
-            "area_cancelled": field.diagnostics.notes.get("area that cancels", 0.0),
+            "area_outside": note.area_outside if note else 0.0,
+            "area_cancelled": note.area_cancelled if note else 0.0,
         }
     else:
         where = {"n_vertices": len(field.values)}

@@ -13,7 +13,7 @@ from ..errors import FileFormatError
 from ..io import ensure_writable, save, save_field
 from ..io.files import PathLike, replacing
 from ..samples import broken_duck
-from ..visualization.slices import draw_shape, draw_slices, new_figure
+from ..visualization import draw_shape, draw_slices, new_figure
 from .computing import compute, describe
 from .options import Summary, add_command, whole_number
 
@@ -41,7 +41,11 @@ def run(arguments: Namespace) -> Summary:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileFormatError(f"{folder}: cannot be made a folder ({error.strerror}): name another") from error
+        raise FileFormatError(
+            f"cannot be made a folder ({error.strerror})",
+            remedy="name another",
+            path=folder,
+        ) from error
     files = {name: folder / name for name in ("duck.stl", "distance.vti", "offset.stl", "picture.png")}
     for path in files.values():
         ensure_writable(path, {path.suffix}, "a file")
@@ -72,13 +76,13 @@ def run(arguments: Namespace) -> Summary:
 def draw_story(shape: Any, field: Any, surface: Any, path: PathLike) -> None:
     """The broken shape, a slice of its distance, the closed offset surface."""
     figure = new_figure(13.5, 4.6)
-    before = figure.add_subplot(1, 3, 1, projection="3d")
+    before = figure.add_subplot(1, 3, 1)
     draw_shape(shape, before)
     before.set_title("in: holes, noise, flipped and\nduplicate faces", fontsize=11)
     middle = figure.add_subplot(1, 3, 2)
     draw_slices(field, [middle], shape, [DISTANCE], across=(1,))
     middle.set_title("its signed distance", fontsize=11)
-    after = figure.add_subplot(1, 3, 3, projection="3d")
+    after = figure.add_subplot(1, 3, 3)
     draw_shape(surface, after)
     after.set_title(f"out: the closed surface at +{DISTANCE:g}", fontsize=11)
     with replacing(path) as temporary:

@@ -59,7 +59,8 @@ def run(arguments: Namespace) -> Summary:
     if arguments.curves:
         if not hasattr(shape, "triangulation"):
             raise SourceError(
-                f"{arguments.curves}: curves lie on meshes and point clouds, not a {type(shape).__name__}"
+                f"curves lie on meshes and point clouds, not a {type(shape).__name__}",
+                path=arguments.curves,
             )
         summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
         text += f"\n\n{arguments.curves}\n{as_text(summary['curves'])}"

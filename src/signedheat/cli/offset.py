@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
-from ..visualization.slices import PICTURE_FORMATS, save_slices
+from ..visualization import PICTURE_FORMATS, save_slices
 from .computing import check_grid_options, compute, describe, grid_for, hint, is_planar, prefix_errors, read_source
 from .options import Parser, Summary, add_command, add_grid_options, finite
 

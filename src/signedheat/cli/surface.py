@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from ..constraints import LevelValues, ZeroSet
+from ..diagnostics import LargeAngles
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
+from ..fields.vertex_field import VertexField
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..solver import SignedHeatSolver
-from ..visualization.slices import PICTURE_FORMATS
-from ..visualization.surfaces import save_surface
+from ..visualization import PICTURE_FORMATS, save_surface
 from .computing import prefix_errors
 from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
 from .progress import ProgressBar
@@ -69,7 +70,10 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     """The surface, the curves, and the distance."""
     surface = read_surface(arguments.mesh)
     if arguments.intrinsic and not isinstance(surface, TriangleMesh):
-        raise SourceError(f"{arguments.mesh}: --intrinsic is for triangle meshes; this is a {type(surface).__name__}")
+        raise SourceError(
+            f"--intrinsic is for triangle meshes; this is a {type(surface).__name__}",
+            path=arguments.mesh,
+        )
     curves = read_curves(arguments.curves, surface)
     with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
         solver = SignedHeatSolver(surface, arguments.diffusion, progress, arguments.intrinsic)
@@ -77,10 +81,10 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     return surface, curves, field
 
 
-def advice(field: Any) -> str:
+def advice(field: VertexField) -> str:
     """What would make the result more accurate."""
-    share = field.diagnostics.notes.get("large angles", 0.0)
-    return f"; {share:.0%} of the angles exceed 120°: --intrinsic is more accurate" if share else ""
+    note = field.diagnostics.note(LargeAngles)
+    return f"; {note}: --intrinsic is more accurate" if note else ""
 
 
 def run(parser: Parser, arguments: Namespace) -> Summary:
@@ -118,7 +122,10 @@ def read_surface(path: str) -> Any:
     """A file with something that curves can lie on."""
     surface = read(path)
     if not hasattr(surface, "triangulation"):
-        raise SourceError(f"{path}: curves lie on meshes, points and voxels, and this is a {type(surface).__name__}")
+        raise SourceError(
+            f"curves lie on meshes, points and voxels, and this is a {type(surface).__name__}",
+            path=path,
+        )
     return surface
 
 

@@ -15,7 +15,7 @@ from ..fields.tet_field import TetField
 from ..io import ensure_writable, read
 from ..io.tets import TET_FIELD_FORMATS
 from ..solver import SignedHeatSolver
-from ..visualization.slices import PICTURE_FORMATS, save_slices
+from ..visualization import PICTURE_FORMATS, save_slices
 from .computing import describe, prefix_errors
 from .options import Parser, Summary
 from .progress import ProgressBar
@@ -37,7 +37,10 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     shape = read(arguments.shape)
     mesh = read(given) if given else None
     if mesh is not None and not isinstance(mesh, TetMesh):
-        raise GeometryError(f"{given} holds no tets, but a {type(mesh).__name__}: use a .mesh, .msh, .vtu or .ele file")
+        raise GeometryError(
+            f"{given} holds no tets, but a {type(mesh).__name__}",
+            remedy="use a .mesh, .msh, .vtu or .ele file",
+        )
     with prefix_errors(arguments.shape):
         if mesh is None:
             mesh = tetrahedralize(shape, resolution=arguments.resolution or RESOLUTION, padding=arguments.padding)
@@ -53,15 +56,10 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         "output": arguments.output,
         **describe(field),
         "n_tets": mesh.n_tets,
-        "notes": {name: str(note) for name, note in field.diagnostics.notes.items()},
+        "notes": {name: v for note in field.diagnostics.notes for name, v in note.as_dict().items()},
     }
     text = f"{arguments.output}: {mesh.n_tets} tets, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
-    notes = field.diagnostics.notes.items()
-    told = (
-        f"{name.replace('_', ' ')}: {note:.3g}" if isinstance(note, float) else f"{name}: {note}"
-        for name, note in notes
-    )
-    return summary, "; ".join([text, *told])
+    return summary, "; ".join([text, *map(str, field.diagnostics.notes)])
 
 
 def on_grid(field: TetField) -> GridField:

@@ -14,8 +14,7 @@ from ..fields.vertex_field import VertexField
 from ..io import FIELD_FORMATS, ensure_writable, load_field, read
 from ..io.files import extension
 from ..io.tets import TET_FIELD_FORMATS
-from ..visualization.slices import PICTURE_FORMATS, save_scene, save_slices
-from ..visualization.surfaces import save_surface
+from ..visualization import PICTURE_FORMATS, save_scene, save_slices, save_surface
 from .computing import prefix_errors
 from .options import Summary, add_command
 from .tets import on_grid
@@ -31,22 +30,23 @@ def add_to(commands: Any) -> None:
         description="Slices through a field; a shape in perspective, outsides yellow, insides red.",
     )
     parser.add_argument("file", metavar="FILE", help="a shape or a field")
+    parser.add_argument("--up", choices="xyz", default="z", help="axis that points upwards (default: z)")
     parser.add_argument("-o", "--output", required=True, metavar="PNG", help="picture: .png .pdf .svg .jpg")
 
 
 def run(arguments: Namespace) -> Summary:
     """Draw."""
     ensure_writable(arguments.output, PICTURE_FORMATS, "a picture")
-    thing = shape_or_field(arguments.file)
+    thing, up = shape_or_field(arguments.file), "xyz".index(arguments.up)
     with prefix_errors(arguments.file):
         if isinstance(thing, VertexField):
-            save_surface(thing, arguments.output)
+            save_surface(thing, arguments.output, up=up)
         elif isinstance(thing, GridField):
             save_slices(thing, arguments.output)
         elif isinstance(thing, TetField):
             save_slices(on_grid(thing), arguments.output)
         else:
-            save_scene(thing.boundary if isinstance(thing, TetMesh) else thing, arguments.output)
+            save_scene(thing.boundary if isinstance(thing, TetMesh) else thing, arguments.output, up)
     return {"input": arguments.file, "output": arguments.output}, arguments.output
 
 

@@ -6,7 +6,7 @@ from argparse import Namespace
 from typing import Any
 
 from ..io import ensure_field_writable, ensure_writable, save_field
-from ..visualization.slices import PICTURE_FORMATS, save_slices
+from ..visualization import PICTURE_FORMATS, save_slices
 from . import tets
 from .computing import check_grid_options, compute, describe, grid_for, hint, prefix_errors, read_source
 from .options import Parser, Summary, add_command, add_grid_options

@@ -1,1 +1,1 @@
-"""What distance is measured on, or to: one frozen dataclass per kind of geometry."""
+"""Domains and sources, that is, what distance is measured on and what to: one frozen dataclass per kind of geometry."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,33 +15,32 @@ from .validation import finite_rows, frozen
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A curve on a surface, from point to point; φ > 0 to its left if it is oriented.
+    """A polyline on a surface; φ > 0 to its left if it is oriented.
 
-    Left is a quarter turn counter-clockwise from the curve's direction, as seen with the face normal towards you. A
-    segment along an edge has the left of the first face at that edge. Points given on an edge or at a vertex are
-    recognised whatever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive
-    points that share no face are joined by a shortest line across the faces between them; consecutive points that
-    coincide are harmless.
+    Left is the direction of the curve turned by 90° counter-clockwise, as seen with the face normal towards you. For a
+    segment along an edge it is left in the first face at that edge. Points on an edge or at a vertex are recognised as
+    such whichever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive points
+    that share no face are joined by a geodesic path; consecutive points may coincide.
 
     Parameters
     ----------
     faces : (n,) int
-        Face that each point lies in; any face that has the point will do.
+        Face that each point lies in; any face that contains the point.
     barycentric : (n, 3) float
-        Where in that face.
+        Barycentric coordinates in that face.
     closed : bool
         Whether the last point is joined to the first.
     oriented : bool
-        Whether the curve has two sides; an unoriented curve has distance like |φ|.
+        Whether the curve has a positive and a negative side; distance to an unoriented curve is unsigned.
     normals : (segments, 3) float, optional
         Direction in space in which φ grows across each segment. Needed where left has no meaning: on surfaces whose
-        faces are not consistently oriented. Only their part along the surface counts, and not their length.
+        faces are not consistently oriented. Normals are projected on the surface; their lengths are ignored.
 
     Raises
     ------
     SourceError
         If there are fewer than two points, a number is NaN or infinite, coordinates are not barycentric, or the number
-        of normals is not that of the segments. Face ids are checked when the curve meets its surface.
+        of normals is not that of the segments. Face ids are checked when the curve is used on its surface.
 
     Examples
     --------
@@ -67,7 +68,8 @@ class Curve:
         ids, weights = surface_points(faces, barycentric, "curve")
         if len(ids) < 2:
             raise SourceError(
-                f"a curve needs at least two points, not {len(ids)}: use SurfacePoints for isolated points"
+                f"a curve needs at least two points, not {len(ids)}",
+                remedy="use SurfacePoints for isolated points",
             )
         object.__setattr__(self, "faces", ids)
         object.__setattr__(self, "barycentric", weights)
@@ -93,7 +95,7 @@ class Curve:
         return self.n_points if self.closed else self.n_points - 1
 
     def reversed(self) -> Curve:
-        """The same curve run the other way: left and right change places, normals stay what they are."""
+        """The curve in opposite direction: left and right are exchanged; given normals stay the same."""
         normals = None
         if self.normals is not None:
             normals = np.roll(self.normals[::-1], -1, axis=0) if self.closed else self.normals[::-1]
@@ -111,9 +113,9 @@ class SurfacePoints:
     Parameters
     ----------
     faces : (n,) int
-        Face that each point lies in; any face that has the point will do.
+        Face that each point lies in; any face that contains the point.
     barycentric : (n, 3) float
-        Where in that face.
+        Barycentric coordinates in that face.
 
     Raises
     ------
@@ -132,7 +134,10 @@ class SurfacePoints:
     def __init__(self, faces: ArrayLike, barycentric: ArrayLike) -> None:
         ids, weights = surface_points(faces, barycentric, "point source")
         if not len(ids):
-            raise SourceError("there is no point: pass at least one")
+            raise SourceError(
+                "there is no point",
+                remedy="pass at least one",
+            )
         object.__setattr__(self, "faces", ids)
         object.__setattr__(self, "barycentric", weights)
 
@@ -145,10 +150,17 @@ class SurfacePoints:
         return f"SurfacePoints({self.n_points} points)"
 
 
+CurveOrPoints: TypeAlias = Curve | SurfacePoints
+"""What distance on a surface is measured to."""
+
+CurvesAndPoints: TypeAlias = CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
+"""One source or several; curves and points in a sequence of their own count as one."""
+
+
 def surface_points(
     faces: ArrayLike, barycentric: ArrayLike, name: str
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Frozen face ids and barycentric coordinates, checked as far as they can be without the surface."""
+    """Read-only face ids and barycentric coordinates, checked as far as possible without the surface."""
     ids = np.atleast_1d(np.asarray(faces))
     if ids.size == 0:
         return frozen(np.empty(0, dtype=np.int64)), frozen(np.empty((0, 3)))
@@ -161,14 +173,15 @@ def surface_points(
     if len(wrong):
         raise SourceError(
             f"point {wrong[0]} of a {name} has barycentric coordinates {weights[wrong[0]].tolist()}: "
-            "they must be at least 0 and add up to 1"
+            "they must be at least 0 and add up to 1",
+            element=f"point {wrong[0]}",
         )
     return frozen(ids.astype(np.int64)), weights
 
 
 def finite(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    """(n, 3) finite numbers, or a `SourceError`."""
+    """`values` as (n, 3) finite numbers; raises `SourceError` otherwise."""
     try:
         return finite_rows(values, name, 3)
     except GeometryError as error:
-        raise SourceError(str(error)) from None
+        raise SourceError(error.cause, remedy=error.remedy, element=error.element) from None

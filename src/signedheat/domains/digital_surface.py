@@ -18,32 +18,32 @@ from .validation import frozen
 
 @dataclass(frozen=True, eq=False)
 class DigitalSurface(Surface):
-    """The faces of voxels that separate inside from outside, seen as the smooth surface that they digitise.
+    """The boundary of a set of voxels, as a domain that approximates the smooth surface that was digitised.
 
     Parameters
     ----------
     volume : (nx, ny, nz) bool
-        True inside. Beyond the array is outside.
+        True inside. Everything beyond the array is outside.
     spacing : float or (3,) float
         Edge lengths of a voxel.
     origin : (3,) float
         Position of the centre of voxel ``(0, 0, 0)``.
     radius : float, optional
-        Radius, in units of length, of the neighbourhood over which normals are estimated; 0 takes each face as it is.
-        Small radii follow detail, large ones smooth the steps away. By default the square root of the voxel size times
-        the diameter of the shape, times 0.4: it shrinks under refinement, but counts ever more voxels, as convergence
-        needs.
+        Radius, in units of length, of the neighbourhood over which normals are estimated; with 0 every face has its own
+        normal. Small radii keep details, large ones remove the staircase. By default 0.4 times the square root of voxel
+        size times diameter of the shape: under refinement it shrinks, but contains ever more voxels, which convergence
+        requires.
 
     Raises
     ------
     GeometryError
-        If the volume is not three-dimensional and boolean (zeros and ones will do), holds no voxel, or the spacing or
-        the radius make no sense.
+        If the volume is not a three-dimensional array of booleans (or zeros and ones), is empty, the spacing is not
+        positive, or the radius is negative.
 
     Notes
     -----
-    Voxels may touch along edges, where they count as connected, and at corners. `vertices` are corners of voxels, and
-    lie up to a voxel's diagonal off the surface that was digitised.
+    Voxels that touch along an edge only are connected there; voxels that touch at a corner only are not. `vertices` are
+    corners of voxels, at a distance of up to a voxel's diagonal from the surface that was digitised.
 
     Examples
     --------
@@ -70,8 +70,8 @@ class DigitalSurface(Surface):
             raise GeometryError(f"a volume must be an array with 3 axes, not {array.ndim}")
         if array.dtype != bool and not (array.size and np.isin(array, (0, 1)).all()):
             raise GeometryError(
-                f"a volume must be boolean, or 0 and 1, not {array.dtype} with other values: "
-                "threshold it first, for instance volume > 0.5"
+                f"a volume must be boolean, or 0 and 1, not {array.dtype} with other values",
+                remedy="threshold it first, for instance volume > 0.5",
             )
         solid = array.astype(bool)
         if not solid.any():
@@ -96,7 +96,7 @@ class DigitalSurface(Surface):
 
     @cached_property
     def surfels(self) -> Surfels:
-        """The faces between inside and outside, on the lattice."""
+        """The faces between inside and outside, on the voxel lattice."""
         return boundary_surfels(self.volume)
 
     @cached_property
@@ -116,17 +116,17 @@ class DigitalSurface(Surface):
 
     @cached_property
     def squares(self) -> PolygonMesh:
-        """The faces as they are, counter-clockwise seen from outside."""
+        """The faces of the voxels as a polygon mesh, counter-clockwise as seen from outside."""
         return PolygonMesh(self.vertices, self.surfels.corners)
 
     @cached_property
     def normals(self) -> NDArray[np.float64]:
-        """(m, 3) unit normal of the digitised surface at each face, pointing out."""
+        """(m, 3) estimated unit normal of the digitised surface at each face, outward."""
         return frozen(corrected_normals(self.volume, self.surfels, self.spacing, self.radius))
 
     @property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to: four to a face, in its order, round a virtual vertex."""
+        """The triangles that curves refer to: four per face, in the order of its sides, around a virtual vertex."""
         return self.squares.triangulation
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:

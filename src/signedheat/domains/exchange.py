@@ -1,55 +1,66 @@
-"""What all shapes share: files, and the objects of other packages."""
+"""Saving of shapes, and conversion from and to the objects of other packages."""
 
 from __future__ import annotations
 
 from os import PathLike
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..slots import Slot
 
-Shape = TypeVar("Shape", bound="Exchangeable")
+if TYPE_CHECKING:
+    import meshio
+    import pyvista
 
-save_shape: Slot[[Any, str | PathLike[str]], None] = Slot("save_shape")
-"""Write a shape in the format that the file's name ends with."""
-shape_from: Slot[[str, type, Any], Any] = Slot("shape_from")
-"""A shape of a given type from an object of a package, named first."""
-shape_to: Slot[[str, Any], Any] = Slot("shape_to")
-"""An object of a package, named first, from a shape."""
+Kind = TypeVar("Kind", bound="Exchangeable[Any]")
+Trimesh = TypeVar("Trimesh")
+"""The type of trimesh that corresponds to a kind of shape."""
+
+save_shape: Slot[[object, str | PathLike[str]], None] = Slot("save_shape")
+"""Write a shape in the format given by the extension of the file."""
+shape_from: Slot[[str, type[object], object], Any] = Slot("shape_from")
+"""Arguments: name of a package, type of a shape, object of that package. Returns the shape."""
+shape_to: Slot[[str, object], Any] = Slot("shape_to")
+"""Arguments: name of a package, shape. Returns an object of that package."""
 
 
-class Exchangeable:
-    """A shape that can be saved, and turned into what trimesh, PyVista and meshio use.
+class Exchangeable(Generic[Trimesh]):
+    """A shape that can be saved, and converted from and to objects of trimesh, PyVista and meshio.
 
-    Vertices and faces keep their number and order. Each package is optional, imported when it is asked for.
+    Vertices and faces keep their number and order. Each package is optional, and imported when it is needed.
     """
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format that its name ends with: see `signedheat.save`."""
+        """Write to a file, in the format given by its extension: see `signedheat.save`."""
         save_shape(self, path)
 
     @classmethod
-    def from_trimesh(cls: type[Shape], thing: Any) -> Shape:
+    def from_trimesh(cls: type[Kind], thing: object) -> Kind:
         """From a `trimesh.Trimesh` or `trimesh.PointCloud`."""
-        return shape_from("trimesh", cls, thing)
+        shape: Kind = shape_from("trimesh", cls, thing)
+        return shape
 
-    def to_trimesh(self) -> Any:
+    def to_trimesh(self) -> Trimesh:
         """As a `trimesh.Trimesh`, not processed, or `trimesh.PointCloud`; polygons raise `GeometryError`."""
-        return shape_to("trimesh", self)
+        thing: Trimesh = shape_to("trimesh", self)
+        return thing
 
     @classmethod
-    def from_pyvista(cls: type[Shape], thing: Any) -> Shape:
+    def from_pyvista(cls: type[Kind], thing: object) -> Kind:
         """From a `pyvista.PolyData`; point data ``Normals`` are the normals of points."""
-        return shape_from("pyvista", cls, thing)
+        shape: Kind = shape_from("pyvista", cls, thing)
+        return shape
 
-    def to_pyvista(self) -> Any:
+    def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData`; the normals of points are point data ``Normals``."""
-        return shape_to("pyvista", self)
+        thing: pyvista.PolyData = shape_to("pyvista", self)
+        return thing
 
     @classmethod
-    def from_meshio(cls: type[Shape], thing: Any) -> Shape:
+    def from_meshio(cls: type[Kind], thing: object) -> Kind:
         """From the triangles, quadrilaterals and polygons, or the points, of a `meshio.Mesh`."""
-        return shape_from("meshio", cls, thing)
+        shape: Kind = shape_from("meshio", cls, thing)
+        return shape
 
-    def to_meshio(self) -> Any:
+    def to_meshio(self) -> meshio.Mesh:
         """As a `meshio.Mesh`; the normals of points are point data ``nx``, ``ny``, ``nz``."""
         return shape_to("meshio", self)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,10 +15,18 @@ from .validation import frozen
 
 ROOM = 0.2
 """Share of its longest side by which a shape is padded on every side."""
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Dimension = TypeVar("Dimension", bound=int, default=int, covariant=True)
+else:
+    from typing import TypeVar
+
+    Dimension = TypeVar("Dimension", bound=int, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Grid(Generic[Dimension]):
     """Nodes at ``origin + index * spacing``, in any number of dimensions.
 
     Parameters
@@ -29,15 +38,15 @@ class Grid:
     shape : (d,) int
         Number of nodes along each axis. Arrays on the grid are indexed ``[i, j, k]`` ↔ x, y, z.
     mask : (*shape) bool, optional
-        Solid nodes: True where no way leads through. Distance is measured around the boxes of one cell that have them
-        at their centres, from node to node along the axes: a wall is tight where its nodes are joined by sides, or, in
-        the plane, by corners.
+        Solid nodes: True where distance must not pass. Each is a box of one cell around the node, and distance is
+        measured around these boxes. Neighbouring free nodes along an axis are connected, diagonal ones are not: a wall
+        is tight if its nodes are connected along the axes, or, in the plane, diagonally.
 
     Raises
     ------
     GeometryError
         If the spacing is not positive and finite, an axis has fewer than two nodes, or the mask is not boolean, has
-        another shape or leaves no node.
+        another shape or leaves no node free.
 
     Examples
     --------
@@ -53,6 +62,26 @@ class Grid:
     shape: tuple[int, ...]
     mask: NDArray[np.bool_] | None
 
+    @overload
+    def __init__(
+        self: Grid[Literal[3]],
+        origin: ArrayLike,
+        spacing: ArrayLike,
+        shape: tuple[int, int, int],
+        mask: ArrayLike | None = None,
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Grid[Literal[2]],
+        origin: ArrayLike,
+        spacing: ArrayLike,
+        shape: tuple[int, int],
+        mask: ArrayLike | None = None,
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Grid[int], origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None
+    ) -> None: ...
     def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None) -> None:
         corner = np.atleast_1d(np.array(origin, dtype=np.float64))
         counts = np.atleast_1d(np.asarray(shape))
@@ -74,29 +103,29 @@ class Grid:
 
     @classmethod
     def around(
-        cls,
+        cls: type[Grid[int]],
         bounds: ArrayLike,
         resolution: int = 128,
         padding: float | None = None,
         spacing: ArrayLike | None = None,
-    ) -> Grid:
-        """A grid around the middle of a box, with room on every side.
+    ) -> Grid[int]:
+        """A grid centred on a box, with padding on every side.
 
         Parameters
         ----------
         bounds : (2, d) float
-            Lower and upper corner, as the `bounds` of any shape.
+            Lower and upper corner of the box, such as the `bounds` of a shape.
         resolution : int
-            Nodes along the longest side, all axes with the same spacing.
+            Number of nodes along the longest side; all axes have the same spacing.
         padding : float, optional
-            Room on every side, or a little more; a fifth of the longest side by default.
+            Least distance between the box and the boundary of the grid; a fifth of the longest side by default.
         spacing : (d,) float or float, optional
-            Distance between nodes; the resolution then plays no part.
+            Distance between nodes; if given, the resolution is ignored.
 
         Raises
         ------
         GeometryError
-            If the box has no extent and there is no padding, or resolution, padding or spacing make no sense.
+            If the box has no extent and there is no padding, or resolution, padding or spacing are out of range.
 
         Examples
         --------
@@ -109,7 +138,10 @@ class Grid:
             raise GeometryError(f"the padding must be a length, zero or more, not {padding}")
         room = room_around(bounds) if padding is None else float(padding)
         if not longest + 2 * room > 0:
-            raise GeometryError("the shape is a single point: give a padding or a grid")
+            raise GeometryError(
+                "the shape is a single point",
+                remedy="give a padding or a grid",
+            )
         if spacing is None:
             if int(resolution) != resolution or resolution < 2:
                 raise GeometryError(f"the resolution must be a whole number of at least 2 nodes, not {resolution}")
@@ -132,25 +164,27 @@ class Grid:
 
     @property
     def upper(self) -> NDArray[np.float64]:
-        """Position of the last node."""
-        return self.origin + self.spacing * (np.array(self.shape) - 1)
+        """(d,) position of the last node."""
+        result: NDArray[np.float64] = self.origin + self.spacing * (np.array(self.shape) - 1)
+        return result
 
     @cached_property
     def axes(self) -> tuple[NDArray[np.float64], ...]:
-        """Node coordinates along each axis."""
+        """Coordinates of the nodes along each axis."""
         return tuple(
             frozen(o + s * np.arange(n)) for o, s, n in zip(self.origin, self.spacing, self.shape, strict=True)
         )
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """(*shape, d) node positions; made anew at each call, since they take d times the memory of a field."""
+        """(*shape, d) node positions; not cached, since they take d times the memory of a field."""
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Which of the (n, d) points lie within the box of the nodes."""
-        points = np.asarray(points, dtype=np.float64)
-        return ((points >= self.origin) & (points <= self.upper)).all(axis=-1)
+        """(n,) whether each of the (n, d) points lies within the bounding box of the nodes."""
+        positions = np.asarray(points, dtype=np.float64)
+        inside: NDArray[np.bool_] = np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
+        return inside
 
     def __repr__(self) -> str:
         solid = "" if self.mask is None else f", {int(self.mask.sum())} solid nodes"

@@ -1,4 +1,4 @@
-"""What is right and wrong with a shape: edges open, nonmanifold or inconsistent, elements degenerate or double."""
+"""Defects of a shape: open, nonmanifold and inconsistent edges, degenerate and duplicate elements."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .triangle_mesh import TriangleMesh
 
 @dataclass(frozen=True)
 class SurfaceReport:
-    """What a surface is made of. None of it is an error: every such surface has a signed distance.
+    """Counts of the elements and defects of a surface. No defect is an error: every such surface has a signed distance.
 
     Attributes
     ----------
@@ -27,17 +27,17 @@ class SurfaceReport:
     corners_per_face : (int, int)
         Least and greatest number of corners.
     components : int
-        Parts that share no vertex, unreferenced vertices left out.
+        Connected components through shared vertices, unreferenced vertices not counted.
     open_edges, borders : int
-        Edges of a single face; connected sets of them (each a hole, or the rim of an open surface).
+        Edges with a single face; boundary curves, that is connected sets of open edges.
     nonmanifold_edges, nonmanifold_vertices : int
-        Edges of more than two faces; vertices at which the faces do not form a single fan or disk.
+        Edges with more than two faces; vertices at which the faces do not form a single fan or disk.
     inconsistent_edges : int
-        Edges whose two faces run along them in the same direction: one of them is flipped.
+        Edges whose two faces run along them in the same direction, so that one of the faces is flipped.
     degenerate_faces, duplicate_faces : int
-        Faces without area, or that name a vertex twice; faces on the same vertices as an earlier one.
+        Faces without area, or with a repeated vertex; faces with the same vertices as an earlier one.
     duplicate_vertices, unreferenced_vertices : int
-        Vertices at exactly the place of an earlier one; vertices of no face.
+        Vertices at exactly the position of an earlier one; vertices without a face.
     area : float
         Total area.
     lower, upper : tuple of float
@@ -69,22 +69,22 @@ class SurfaceReport:
 
     @property
     def is_manifold(self) -> bool:
-        """Whether every edge has at most two faces, and every vertex a single fan."""
+        """Whether every edge has at most two faces, and the faces at every vertex form a single fan or disk."""
         return self.nonmanifold_edges == 0 and self.nonmanifold_vertices == 0
 
 
 @dataclass(frozen=True)
 class CloudReport:
-    """What a point cloud is made of.
+    """Counts and properties of a point cloud.
 
     Attributes
     ----------
     n_points : int
         Number of points.
     has_normals, has_areas : bool
-        What is known at the points.
+        Whether the points have normals, and areas.
     duplicate_points : int
-        Points at exactly the place of an earlier one.
+        Points at exactly the position of an earlier one.
     lower, upper : tuple of float
         Corners of the bounding box.
     """
@@ -99,24 +99,24 @@ class CloudReport:
 
 @dataclass(frozen=True)
 class TetReport:
-    """What a tet mesh is made of, and what is wrong with it.
+    """Counts of the elements and defects of a tet mesh.
 
     Attributes
     ----------
     n_vertices, n_tets, parts : int
-        Counts; tets of one part are connected through faces.
+        Numbers of vertices, of tets, and of connected components through shared faces.
     inside_out_tets : int
-        Tets that were given inside out; reading turned them.
+        Tets that were given with negative volume; `TetMesh` has turned them.
     flat_tets : int
-        Tets with next to no volume.
+        Tets with nearly zero volume.
     nonmanifold_faces : int
-        Faces of more than two tets.
+        Faces with more than two tets.
     boundary_faces : int
-        Faces of a single tet.
+        Faces with a single tet.
     volume : float
         Sum of the tets' volumes.
     lower, upper : (3,) float
-        Bounds.
+        Corners of the bounding box.
     """
 
     n_vertices: int
@@ -132,7 +132,7 @@ class TetReport:
 
 
 def inspect(shape: TriangleMesh | PolygonMesh | PointCloud | TetMesh) -> SurfaceReport | CloudReport | TetReport:
-    """Count what a shape is made of, and what is wrong with it. Takes O(n log n) time.
+    """Count the elements and defects of a shape, in O(n log n) time.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
 
 
 def _roundoff(polygons: PolygonMesh) -> NDArray[np.float64]:
-    """(p,) areas below which a polygon has none that its coordinates can tell."""
+    """(p,) areas up to which a polygon counts as degenerate, for the rounding of its coordinates."""
     corners = np.abs(polygons.vertices[polygons.corners] - polygons.polygon_centroids[polygons.corner_polygons])
     radius = np.maximum.reduceat(corners.max(axis=1), polygons.offsets[:-1])
     coordinates = np.abs(polygons.vertices[polygons.corners]).max(axis=1)
@@ -234,9 +234,9 @@ def _roundoff(polygons: PolygonMesh) -> NDArray[np.float64]:
 def _n_nonmanifold_vertices(
     polygons: PolygonMesh, halfedges: NDArray[np.int64], edge: NDArray[np.int64], faces_of_edge: NDArray[np.int64]
 ) -> int:
-    """Corners at one vertex that meet along an edge are of one fan; a manifold vertex has one fan, its edges two faces.
+    """Number of vertices whose faces form more than one fan; corners that meet along an edge belong to one fan.
 
-    `halfedges` are sorted by `edge`, so that those of one edge follow each other.
+    `halfedges` are sorted by `edge`.
     """
     tail = polygons.corners
     following = np.arange(1, len(tail) + 1)
@@ -265,7 +265,7 @@ def _n_repeated_faces(sorted_corners: NDArray[np.int64], offsets: NDArray[np.int
 
 
 def _n_repeated(rows: NDArray[Any]) -> int:
-    """How many rows equal an earlier one."""
+    """Number of rows that equal an earlier one."""
     ordered = rows[np.lexsort(rows.T)]
     return int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
 

@@ -1,8 +1,8 @@
-"""Intrinsic triangulations of a mesh: the same surface in better triangles (Sec. 9.4, Fig. 22).
+"""Intrinsic triangulations of a mesh: the same surface with better triangles (Sec. 9.4, Fig. 22).
 
-Edges are straightest lines along the surface instead of segments in space, so that triangles can be chosen for their
-angles alone: nothing of the surface changes. Flips give the intrinsic Delaunay triangulation (Bobenko & Springborn
-2007), in which the maximum principle holds; more vertices give a minimum angle (Sharp, Soliman & Crane 2019).
+Edges are geodesics along the surface instead of segments in space, so that triangles can be chosen for their angles
+alone, without changing the surface. Edge flips give the intrinsic Delaunay triangulation (Bobenko & Springborn 2007),
+whose Laplacian has a maximum principle; inserted vertices give a minimum angle (Sharp, Soliman & Crane 2019).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 from numbers import Real
-from typing import Any
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,38 +26,39 @@ from ..geometry.intrinsic.transfer import ConformingRefinement, transfer_segment
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.mollification import mollify
 from ..progress import Progress, Stopwatch
+from .curves import CurveOrPoints, CurvesAndPoints
 from .segments import segments_of, segments_of_each
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
 MARGIN = 1e-14
-"""Triangle inequalities hold at least by this fraction of the mean length; flat triangles are thickened to it."""
+"""Margin of the triangle inequalities, relative to the mean length, to which flat triangles are mollified."""
 
 LARGEST_ANGLE = 30.0
-"""Degrees; refinement is not sure to end for more."""
+"""Degrees; for larger minimum angles refinement need not terminate."""
 
 
 @dataclass(frozen=True, eq=False)
 class IntrinsicTriangulation:
-    """A mesh in other triangles; made by `intrinsic_delaunay`. A domain like the mesh itself.
+    """An intrinsic triangulation of a mesh, made by `intrinsic_delaunay`; a domain like the mesh itself.
 
-    The first vertices are those of the mesh, under their numbers. Sources are given on the mesh; fields come back at
-    all vertices, and `restrict` returns to those of the mesh.
+    The first vertices are those of the mesh, with the same ids. Sources are given on the mesh; fields have values at
+    all vertices, and `VertexField.restrict` returns those at the vertices of the mesh.
 
     Attributes
     ----------
     mesh : TriangleMesh
-        What is triangulated.
+        The surface.
     triangles : IntrinsicMesh
-        The triangles: vertices, edges and shapes. Two edges may join the same two vertices, or a vertex with itself.
+        The triangles. Two edges may join the same two vertices, or an edge may join a vertex with itself.
     marked : (e,) bool
         Edges along which the kept curves run.
     goal : float
-        The angle, in degrees, that refinement aimed at; 0 for flips only.
+        The minimum angle of refinement, in degrees; 0 for flips only.
     complete : bool
         Whether refinement ended before the limit on the number of vertices.
     close : (m,) bool
-        Faces at vertices that all but coincide; refinement leaves thin ones among them alone.
+        Faces at vertices that nearly coincide, which refinement leaves thin.
     """
 
     mesh: TriangleMesh
@@ -72,7 +73,7 @@ class IntrinsicTriangulation:
 
     @property
     def n_vertices(self) -> int:
-        """Number of vertices; those of the mesh go first."""
+        """Number of vertices; those of the mesh come first."""
         return self.triangles.n_vertices
 
     @property
@@ -82,12 +83,12 @@ class IntrinsicTriangulation:
 
     @property
     def faces(self) -> NDArray[np.int64]:
-        """(m, 3) vertex ids. The corners alone do not tell a face: see `triangles` for its edges."""
+        """(m, 3) vertex ids. These do not determine the edges of a face: see `triangles`."""
         return self.triangles.corner_vertices
 
     @cached_property
     def vertices(self) -> NDArray[np.float64]:
-        """(n, 3) where in space the vertices lie, all of them on the mesh."""
+        """(n, 3) positions in space of the vertices, all of which lie on the mesh."""
         faces, weights = self.vertex_places
         return frozen(self.in_space(faces, weights))
 
@@ -107,7 +108,7 @@ class IntrinsicTriangulation:
 
     @cached_property
     def corner_angles(self) -> NDArray[np.float64]:
-        """(m, 3) radians."""
+        """(m, 3) angles at the corners, in radians."""
         leaving = self.triangles.edge_vectors
         return np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
 
@@ -118,7 +119,7 @@ class IntrinsicTriangulation:
 
     @property
     def summary(self) -> str:
-        """What was reached, in words."""
+        """The smallest angle reached, and the reasons for smaller ones than the goal, in words."""
         if not self.goal:
             return f"Delaunay; the smallest angle is {np.degrees(self.corner_angles.min()):.3g}°"
         if not len(self.thin_faces):
@@ -139,10 +140,11 @@ class IntrinsicTriangulation:
         positions = np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[faces]])
         lost = np.flatnonzero(np.asarray(faces) < 0)
         positions[lost] = self.mesh.vertices[lost]
-        return positions
+        result: NDArray[np.float64] = positions
+        return result
 
     def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Points of the mesh (faces, barycentric coordinates) in the triangulation's own faces.
+        """Faces and barycentric coordinates, on the triangulation, of points given by those on the mesh.
 
         Raises
         ------
@@ -153,19 +155,28 @@ class IntrinsicTriangulation:
         faces = np.asarray(faces, dtype=np.int64)
         wrong = np.flatnonzero((faces < 0) | (faces >= self.mesh.n_faces))
         if len(wrong):
-            raise GeometryError(f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces")
+            raise GeometryError(
+                f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces",
+                element=f"point {wrong[0]}",
+            )
         below = self.refinement.push_forward(faces, barycentric, np.zeros((len(faces), 0, 3)))
         found, weights, _ = self.history.forward(below[0], np.maximum(below[1], 0.0))
         return found, weights / weights.sum(axis=1, keepdims=True)
 
     def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Edges as they run on the mesh: number of the edge, start and end in space of each straight part."""
+        """Edges as polylines on the mesh: for every straight part the id of the edge, and start and end in space."""
         lines = self.history.edges_before()
         starts = self.in_space(*self.refinement.pull_back(lines.faces, lines.starts))
         return lines.owners, starts, self.in_space(*self.refinement.pull_back(lines.faces, lines.ends))
 
-    def transfer(self, source: Any) -> Any:
-        """A source on the mesh, as these triangles see it."""
+    @overload
+    def transfer(self, source: CurveOrPoints | CurveSegments) -> CurveSegments: ...
+    @overload
+    def transfer(self, source: Sequence[CurveOrPoints | CurveSegments]) -> list[CurveSegments]: ...
+    def transfer(
+        self, source: CurveOrPoints | CurveSegments | Sequence[CurveOrPoints | CurveSegments]
+    ) -> CurveSegments | list[CurveSegments]:
+        """Transfer a source given on the mesh to these triangles."""
         if isinstance(source, Sequence):
             return [self.transfer(part) for part in source]
         seen = segments_of(source, self.base, self.mesh.vertices)
@@ -179,48 +190,47 @@ class IntrinsicTriangulation:
 
 def intrinsic_delaunay(
     mesh: TriangleMesh,
-    keep: Any = (),
+    keep: CurvesAndPoints = (),
     refine: bool = False,
     angle: float = 28.0,
     max_vertices: int | None = None,
     progress: Progress | None = None,
 ) -> IntrinsicTriangulation:
-    """Triangulate a mesh anew, along the surface: better angles, the same geometry.
+    """Intrinsic Delaunay triangulation or refinement of a mesh: better angles, the same surface.
 
-    Boundary and nonmanifold edges stay, and so do kept curves, which become paths of edges; refinement splits them
-    where it must. Any mesh will do: nonmanifold, nonorientable, with faces turned at random, nearly flat faces.
+    Boundary and nonmanifold edges are not flipped, and neither are the edges of kept curves; refinement may split them.
+    The mesh may be nonmanifold, nonorientable, inconsistently oriented, and have nearly degenerate faces.
 
     Parameters
     ----------
     mesh : TriangleMesh
         The surface.
     keep : Curve, SurfacePoints or a sequence of them
-        Sources that are to run along edges, and to lie at vertices. Others can still be used afterwards.
+        Curves that are to run along edges, and points that are to be vertices. Other sources can be used as well.
     refine : bool
-        Insert vertices until no angle is smaller than `angle`. Smaller ones remain where the surface, its boundary or
-        kept curves close in at less than 60°; and, on purpose, in faces at vertices that all but coincide: are
-        together smaller than a hundredth of the way to any other (grading towards them takes hundreds of vertices each,
-        and gains nothing). `IntrinsicTriangulation.summary` tells.
+        Insert vertices until no angle is smaller than `angle`. Smaller ones remain where boundaries or kept curves meet
+        at less than 60°, at vertices with a total angle of less than 60°, and at groups of vertices that nearly
+        coincide (of a size less than a hundredth of the distance to any other vertex), since grading the triangles
+        towards them takes hundreds of vertices and gains no accuracy. `IntrinsicTriangulation.summary` reports them.
     angle : float
-        Degrees, at most 30.
+        Minimum angle in degrees, at most 30.
     max_vertices : int, optional
-        Refine no further, so that it ends in any case; 20 for every vertex of the mesh and the kept curves, and
-        10,000 more, by default.
+        Limit on the number of vertices; by default 20 for every vertex of the mesh and the kept curves, plus 10,000.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; what it raises cancels.
+        Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
     Returns
     -------
     IntrinsicTriangulation
-        A domain; time and memory grow in proportion to the flips and the new vertices, which on all but contrived
-        meshes are in proportion to the mesh.
+        A domain. Time and memory are proportional to the numbers of flips and new vertices, which on all but contrived
+        meshes are proportional to the size of the mesh.
 
     Raises
     ------
     GeometryError
         If the domain is not a triangle mesh, has no area, or `angle` or `max_vertices` is out of range.
     SourceError
-        If a curve to be kept does not fit the mesh.
+        If a curve to be kept does not lie on the mesh.
 
     Examples
     --------
@@ -233,8 +243,7 @@ def intrinsic_delaunay(
     >>> bool(abs(better.triangles.face_areas.sum() - 10) < 1e-12)
     True
     """
-    if not isinstance(mesh, TriangleMesh):
-        raise GeometryError(f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(mesh).__name__}")
+    mesh = triangle_mesh(mesh)
     if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
         raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}")
     if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):
@@ -263,8 +272,17 @@ def intrinsic_delaunay(
     return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, refinement, history)
 
 
+def triangle_mesh(domain: object) -> TriangleMesh:
+    """The domain, if it is a triangle mesh; others have no intrinsic triangulation."""
+    if not isinstance(domain, TriangleMesh):
+        raise GeometryError(
+            f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(domain).__name__}"
+        )
+    return domain
+
+
 def laid_out(mesh: TriangleMesh) -> tuple[IntrinsicMesh, float]:
-    """A mesh as intrinsic mesh, none of them quite flat; and the length that was added to all edges for that."""
+    """The intrinsic mesh of a mesh, mollified, and the length that mollification has added to all edges."""
     lengths, added = mollify(mesh.edge_lengths[mesh.edges.face_edges], MARGIN)
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")

@@ -1,4 +1,4 @@
-"""Curves that a surface has of its own: level sets of functions on it, borders of regions, its boundary."""
+"""Curves on a surface: level sets of functions, boundaries of regions, and the boundary of the surface."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .curves import Curve
 
 
 def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> list[Curve]:
-    """Marching triangles: where a piecewise linear function takes a value, with larger values to the left.
+    """Level set of a piecewise linear function by marching triangles, with larger values to the left.
 
     Values equal to the level count as larger, so that every face is crossed along one segment or not at all; loops that
-    shrink to a point are dropped, and faces with a NaN corner left out. Where the faces are not consistently oriented,
-    the curves get normals, along the gradient.
+    degenerate to a point are dropped, and faces with a NaN corner skipped. Where the faces are not consistently
+    oriented, the curves get normals along the gradient.
     """
     faces, edges = mesh.faces, mesh.edges
     if values.shape != (mesh.n_vertices,):
@@ -36,7 +36,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     oriented = is_consistent(mesh)
     normals = None if oriented else gradients(mesh, values, crossed)
     curves = []
-    for order, backwards, closed in assemble_polylines(*on_edges.T, directed=oriented):
+    for order, backwards, closed in assemble_polylines(on_edges[:, 0], on_edges[:, 1], directed=oriented):
         first = np.where(backwards, sides[order, 1], sides[order, 0])
         last = np.where(backwards, sides[order, 0], sides[order, 1])[-1:]
         face = crossed[order]
@@ -53,7 +53,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
 def on_sides(
     mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64], along: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(k, 3) barycentric coordinates of points on sides of faces, from fractions of edges."""
+    """(k, 3) barycentric coordinates of points on sides of faces, given by fractions along their edges."""
     row = np.arange(len(faces))
     fraction = along[mesh.edges.face_edges[faces, sides]]
     fraction = np.where(mesh.edges.forward[faces, sides], fraction, 1 - fraction)
@@ -64,29 +64,30 @@ def on_sides(
 
 
 def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(k, 3) gradients of a piecewise linear function on some faces, up to a positive factor."""
+    """(k, 3) gradients of a piecewise linear function on some faces, up to a positive factor each."""
     corners = mesh.vertices[mesh.faces[faces]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
     of_corners = np.cross(normal[:, None], opposite)
     rise = values[mesh.faces[faces]]
-    return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
+    result: NDArray[np.float64] = np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
+    return result
 
 
 def region_boundary(mesh: Triangles, mask: NDArray[np.bool_]) -> list[Curve]:
-    """Edges between faces in a region and faces outside, with the region to the left."""
+    """Curves along the edges between the faces of a region and all others, with the region to the left."""
     inside = np.bincount(mesh.edges.face_edges.ravel(), np.repeat(mask, 3), len(mesh.edges.vertices))
     between = (inside > 0) & (inside < mesh.edges.face_counts)
     return along_sides(mesh, between[mesh.edges.face_edges] & mask[:, None])
 
 
 def boundary_curves(mesh: Triangles) -> list[Curve]:
-    """Edges of a single face, with the surface to the left."""
+    """Curves along the edges with a single face, with the surface to the left."""
     return along_sides(mesh, (mesh.edges.face_counts == 1)[mesh.edges.face_edges])
 
 
 def along_sides(mesh: Triangles, chosen: NDArray[np.bool_]) -> list[Curve]:
-    """Curves along chosen sides of faces, each face to the left of its own."""
+    """Curves along chosen sides of faces, in the direction in which the face is to the left."""
     faces, sides = np.nonzero(chosen)
     following = (sides + 1) % 3
     tails, heads = mesh.faces[faces, sides], mesh.faces[faces, following]
@@ -104,7 +105,7 @@ def along_sides(mesh: Triangles, chosen: NDArray[np.bool_]) -> list[Curve]:
 
 
 def inward(mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(k, 3) directions in faces, at right angles to sides of theirs, inward."""
+    """(k, 3) directions in faces, orthogonal to one of their sides, inward."""
     corners = mesh.vertices[mesh.faces[faces]]
     row = np.arange(len(faces))
     along = corners[row, (sides + 1) % 3] - corners[row, sides]
@@ -112,7 +113,7 @@ def inward(mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64]) 
 
 
 def is_consistent(mesh: Triangles) -> bool:
-    """Whether no two faces run along an edge in the same direction."""
+    """Whether the faces are consistently oriented: no two run along an edge in the same direction."""
     edges = mesh.edges
     ahead = np.bincount(edges.face_edges.ravel(), edges.forward.ravel(), len(edges.vertices))
     return bool((ahead <= 1).all() and (edges.face_counts - ahead <= 1).all())

@@ -1,9 +1,10 @@
-"""Point clouds: as a domain, and, with normals, as a shape in space."""
+"""Point clouds, as domains, and, with normals, as sources in space."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,9 +16,12 @@ from .surface import Surface
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
+if TYPE_CHECKING:
+    import trimesh  # noqa: F401  named in the base class
+
 
 @dataclass(frozen=True, eq=False)
-class PointCloud(Exchangeable, Surface):
+class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     """Points in space of any dimension, with or without normals and areas.
 
     Parameters
@@ -27,10 +31,10 @@ class PointCloud(Exchangeable, Surface):
     normals : (n, d) float, optional
         Directions pointing out of the shape; normalised here. A zero normal is an error.
     areas : (n,) float, optional
-        Surface area that each point stands for. Estimated from neighbours where needed and absent.
+        Surface area that each point represents. If absent, estimated from neighbours when needed.
     n_neighbors : int
-        Size of the neighbourhoods in which tangent planes are estimated and triangles made, where distance is measured
-        on the cloud.
+        Size of the neighbourhoods in which tangent planes are fitted and triangles made, when distance is measured on
+        the cloud.
 
     Raises
     ------
@@ -40,10 +44,10 @@ class PointCloud(Exchangeable, Surface):
 
     Notes
     -----
-    As a domain, a cloud needs no normals, and normals need not agree: triangles on the points are oriented alike, each
-    connected part to the side to which most of its normals point, or else outward. Left of a curve is told from that
-    side, unless the curve brings its own normals. Points that coincide count once; points that fit into no triangle,
-    such as outliers, get no distance.
+    As a domain, a cloud needs no normals, and its normals need not be consistent: triangles on the points are oriented
+    consistently, each connected component to the side to which most of its normals point, or outward if there are none.
+    The left of a curve is as seen from that side, unless the curve has normals of its own. Points that coincide count
+    once; points without a triangle, such as outliers, get NaN.
 
     Examples
     --------
@@ -73,7 +77,11 @@ class PointCloud(Exchangeable, Surface):
             _same_length(directions, positions, "normals")
             lengths = np.abs(directions).max(axis=1)
             if not lengths.all():
-                raise GeometryError(f"the normal of point {int(np.argmin(lengths))} is zero: remove it or estimate it")
+                raise GeometryError(
+                    f"the normal of point {int(np.argmin(lengths))} is zero",
+                    remedy="remove it or estimate it",
+                    element=f"point {int(np.argmin(lengths))}",
+                )
             directions = directions / lengths[:, None]
             directions = frozen(directions / np.linalg.norm(directions, axis=1)[:, None])
         if areas is not None:
@@ -101,7 +109,7 @@ class PointCloud(Exchangeable, Surface):
 
     @cached_property
     def representatives(self) -> NDArray[np.int64]:
-        """(n,) first point at the same place as each point, to a ten-millionth of the size of the cloud."""
+        """(n,) first point that coincides with each point, within a ten-millionth of the size of the cloud."""
         lower, upper = self.bounds
         cell = 1e-7 * max(float((upper - lower).max()), np.finfo(float).tiny)
         cells = np.rint((self.points - lower) / cell)
@@ -114,7 +122,7 @@ class PointCloud(Exchangeable, Surface):
 
     @cached_property
     def _distinct(self) -> tuple[NDArray[np.int64], LocalTriangulations]:
-        """Ids of the distinct points, and triangles on them."""
+        """Ids of the distinct points, and their local triangulations."""
         if self.points.shape[1] != 3:
             raise GeometryError(
                 f"distance is measured on point clouds in space: points need 3 coordinates, not {self.points.shape[1]}"
@@ -133,12 +141,12 @@ class PointCloud(Exchangeable, Surface):
 
     @cached_property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to; of points that coincide, the first is their vertex."""
+        """The triangles that curves refer to; of points that coincide, the first is the vertex."""
         ids, found = self._distinct
         return TriangleMesh(self.points, ids[found.faces])
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of `triangulation`, which are the points."""
+        """Values at the vertices of `triangulation`, which are the points: the same."""
         return values
 
     @cached_property
@@ -157,6 +165,6 @@ class PointCloud(Exchangeable, Surface):
         return f"PointCloud({self.n_points} points, {'with' if self.normals is not None else 'without'} normals)"
 
 
-def _same_length(values: NDArray, points: NDArray, name: str) -> None:
+def _same_length(values: NDArray[np.float64], points: NDArray[np.float64], name: str) -> None:
     if len(values) != len(points):
         raise GeometryError(f"there are {len(points)} points, but {len(values)} {name}")

@@ -1,4 +1,4 @@
-"""Polygon meshes: faces with any number of corners, nonconvex and mildly nonplanar ones included."""
+"""Polygon meshes: faces with any number of corners, which may be nonconvex and mildly nonplanar."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +18,12 @@ from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
 
+Polygons = Sequence[Sequence[int] | NDArray[np.int64]] | NDArray[np.int64]
+"""Vertex ids of each polygon."""
+
 
 @dataclass(frozen=True, eq=False)
-class PolygonMesh(Exchangeable, Surface):
+class PolygonMesh(Exchangeable[NoReturn], Surface):
     """Polygons in space.
 
     Parameters
@@ -46,14 +50,17 @@ class PolygonMesh(Exchangeable, Surface):
     corners: NDArray[np.int64]
     offsets: NDArray[np.int64]
 
-    def __init__(self, vertices: ArrayLike, polygons: Sequence[Sequence[int]]) -> None:
+    def __init__(self, vertices: ArrayLike, polygons: Polygons) -> None:
         positions = finite_rows(vertices, "vertices", 3)
         counts = np.fromiter((len(p) for p in polygons), dtype=np.int64, count=len(polygons))
         if len(counts) == 0:
             raise GeometryError("there are no polygons: the shape is empty")
         if (counts < 3).any():
             first = int(np.argmax(counts < 3))
-            raise GeometryError(f"polygon {first} has {counts[first]} corners, and needs at least 3")
+            raise GeometryError(
+                f"polygon {first} has {counts[first]} corners, and needs at least 3",
+                element=f"polygon {first}",
+            )
         corners = np.array(list(itertools.chain.from_iterable(polygons)))
         if not np.issubdtype(corners.dtype, np.integer):
             raise GeometryError(f"polygons must hold integer vertex ids, not {corners.dtype}")
@@ -62,7 +69,8 @@ class PolygonMesh(Exchangeable, Surface):
         if len(outside):
             first = int(np.searchsorted(offsets, outside[0], side="right") - 1)
             raise GeometryError(
-                f"polygon {first} names vertex {corners[outside[0]]}, but vertex ids go from 0 to {len(positions) - 1}"
+                f"polygon {first} names vertex {corners[outside[0]]}, but vertex ids go from 0 to {len(positions) - 1}",
+                element=f"polygon {first}",
             )
         object.__setattr__(self, "vertices", positions)
         object.__setattr__(self, "corners", frozen(corners.astype(np.int64)))
@@ -85,7 +93,7 @@ class PolygonMesh(Exchangeable, Surface):
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) lower and upper corner of the box around the polygons; vertices of no polygon do not count."""
+        """(2, 3) lower and upper corner of the bounding box of the polygons, without unreferenced vertices."""
         corners = self.vertices[self.corners]
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
@@ -109,25 +117,26 @@ class PolygonMesh(Exchangeable, Surface):
 
     @cached_property
     def polygon_area_vectors(self) -> NDArray[np.float64]:
-        """(p, 3) vector areas: exact for every polygon, planar or not."""
+        """(p, 3) vector areas, which depend on the boundary of the polygon only, planar or not."""
         center = self.polygon_centroids[self.corner_polygons]
         a, b = self.vertices[self.corners] - center, self.vertices[self.next_corners] - center
         return 0.5 * np.add.reduceat(np.cross(a, b), self.offsets[:-1], axis=0)
 
     @cached_property
     def refinement(self) -> VirtualRefinement:
-        """The polygons as triangles, most often by a virtual vertex in each."""
+        """The polygons as triangles, usually by a virtual vertex in each polygon with more than three corners."""
         return virtual_refinement(self.vertices, self.corners, self.offsets)
 
     @cached_property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to; polygon after polygon, virtual vertices after the mesh's own."""
+        """The triangles that curves refer to, polygon after polygon; virtual vertices follow those of the mesh."""
         refinement = self.refinement
         return TriangleMesh(np.concatenate([self.vertices, refinement.virtual_vertices]), refinement.faces)
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the vertices of `triangulation`, from values at the vertices of the mesh."""
-        return self.refinement.prolongation @ values
+        refined: NDArray[np.float64] = self.refinement.prolongation @ values
+        return refined
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         check_mask(face_mask, self.n_polygons)

@@ -1,4 +1,4 @@
-"""Polylines in the plane: what distance is measured to on a grid of two dimensions."""
+"""Polylines in the plane: sources on two-dimensional grids."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from .validation import finite_rows
 
 @dataclass(frozen=True, eq=False)
 class Polyline:
-    """Points in the plane, joined in order by straight segments. φ is positive to the left.
+    """Points in the plane, joined in order by straight segments; φ is positive to the left.
 
-    So a closed polyline that runs clockwise has φ < 0 inside, like a shape whose normals point outwards.
+    A closed polyline that runs clockwise has φ < 0 inside, like a shape whose normals point outward.
 
     Parameters
     ----------
     points : (n, 2) float
         Positions. Points may coincide and segments may cross one another.
     closed : bool
-        Whether a last segment leads back to the first point, which is not repeated: where it is, it counts once.
+        Whether a last segment joins the last point to the first. A last point equal to the first is dropped.
 
     Raises
     ------
     GeometryError
-        If a coordinate is NaN or infinite, or the points are fewer than two or all the same.
+        If a coordinate is NaN or infinite, or there are fewer than two distinct points.
 
     Examples
     --------
@@ -54,17 +54,17 @@ class Polyline:
 
     @classmethod
     def from_mask(cls, mask: ArrayLike, origin: ArrayLike = (0.0, 0.0), spacing: ArrayLike = 1.0) -> list[Polyline]:
-        """The boundaries of what is True in a boolean image, φ < 0 inside.
+        """The boundary of the True region of a boolean image, with φ < 0 inside.
 
-        Lines run halfway between nodes that differ. An image whose rows run downwards is brought to this order of axes
-        by ``image[::-1].T``.
+        Lines pass halfway between pixels with different values. An image whose rows run downwards is brought into the
+        order [x, y] by ``image[::-1].T``.
 
         Parameters
         ----------
         mask : (nx, ny) bool
-            ``mask[i, j]`` at ``origin + (i, j) * spacing``, as on a `Grid`; outside the image nothing is True.
+            ``mask[i, j]`` is at ``origin + (i, j) * spacing``, as on a `Grid`; outside the image it counts as False.
         origin, spacing : (2,) float
-            Those of the grid, if it is one.
+            Position of the first pixel, and distance between pixels.
 
         Raises
         ------
@@ -80,8 +80,8 @@ class Polyline:
         inside = np.asarray(mask)
         if inside.ndim != 2 or inside.dtype != np.bool_ or not inside.any():
             raise GeometryError(
-                f"a mask is a boolean image with something True in it, not {inside.dtype} of shape {inside.shape}: "
-                "compare the image with a threshold first"
+                f"a mask is a boolean image with something True in it, not {inside.dtype} of shape {inside.shape}",
+                remedy="compare the image with a threshold first",
             )
         steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), 2)
         padded = np.pad(inside, 1)
@@ -100,7 +100,7 @@ class Polyline:
 
     @cached_property
     def segments(self) -> NDArray[np.float64]:
-        """(m, 2, 2) both ends of every segment."""
+        """(m, 2, 2) start and end of every segment."""
         ends = np.roll(self.points, -1, axis=0)
         count = self.n_points if self.closed else self.n_points - 1
         return np.stack([self.points[:count], ends[:count]], axis=1)
@@ -108,7 +108,8 @@ class Polyline:
     @cached_property
     def segment_lengths(self) -> NDArray[np.float64]:
         """(m,) lengths."""
-        return np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
+        result: NDArray[np.float64] = np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
+        return result
 
     @property
     def length(self) -> float:
@@ -117,12 +118,12 @@ class Polyline:
 
     @property
     def signed_area(self) -> float:
-        """Area around which a closed polyline runs, positive where it runs counter-clockwise."""
+        """Area that the polyline, closed, encloses; positive if it runs counter-clockwise."""
         x, y = np.moveaxis(self.segments - self.points[0], -1, 0)
         return float(0.5 * (x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
 
     def reversed(self) -> Polyline:
-        """The same points in opposite order, so that φ changes its sign."""
+        """The polyline in opposite direction, for which φ has the opposite sign."""
         return Polyline(self.points[::-1], self.closed)
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""Polylines in space, brought onto a surface."""
+"""Projection of polylines in space on a surface."""
 
 from __future__ import annotations
 
@@ -18,18 +18,23 @@ from .curves import Curve, finite
 def projected_curve(
     mesh: Triangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
 ) -> Curve:
-    """The curve through the closest points of a mesh, with shortest lines across faces between them."""
+    """The curve through the closest points on a mesh, joined by geodesic paths."""
     points = finite(points, "points of the polyline")
     if len(points) < 2:
-        raise SourceError(f"a polyline needs at least two points, not {len(points)}: for isolated points use points_at")
+        raise SourceError(
+            f"a polyline needs at least two points, not {len(points)}",
+            remedy="for isolated points use points_at",
+        )
     faces, weights, distances = closest_points(mesh, points)
     if max_distance is None:
         max_distance = 0.05 * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
     far = int(distances.argmax())
     if distances[far] > max_distance:
         raise SourceError(
-            f"the polyline leaves the mesh: point {far}, {points[far].tolist()}, is {distances[far]:.6g} away from it, "
-            f"and at most {max_distance:.6g} is allowed: check units and placement, or raise max_distance"
+            f"the polyline leaves the mesh: point {far}, {points[far].tolist()}, is "
+            f"{distances[far]:.6g} away from it, and at most {max_distance:.6g} is allowed",
+            remedy="check units and placement, or raise max_distance",
+            element=f"point {far}",
         )
     lengths = np.linalg.norm(np.roll(mesh.vertices[mesh.faces], -1, axis=1) - mesh.vertices[mesh.faces], axis=2)
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
@@ -44,7 +49,7 @@ def projected_curve(
 def closest_points(
     mesh: Triangles, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Face, barycentric coordinates and distance of the point of a mesh closest to each point."""
+    """Face, barycentric coordinates and distance of the closest point on a mesh, for each of (n, 3) points."""
     corners = mesh.vertices[mesh.faces]
     tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
     faces, weights = nearest_on_triangles(corners, tree, np.ascontiguousarray(points))

@@ -1,10 +1,10 @@
-"""Curves and points cut into the segments that a set of triangles sees of them."""
+"""Curves and points as segments on an intrinsic mesh, each in one face or along one edge."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import singledispatch
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,26 +14,36 @@ from ..geometry.curve_segments import CurveSegments, given_directions
 from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import barycentric_in, locate_points, shared_faces, unique_points
-from .curves import Curve, SurfacePoints
+from .curves import Curve, CurveOrPoints, SurfacePoints
+
+Positions: TypeAlias = NDArray[np.float64] | None
 
 
 @singledispatch
 def segments_of(
-    source: Any, triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None, number: int = 0
+    source: CurveOrPoints | CurveSegments,
+    triangles: IntrinsicMesh,
+    positions: Positions = None,
+    number: int = 0,
 ) -> CurveSegments:
     """Cut a source into segments.
 
     Parameters
     ----------
     source : Curve, SurfacePoints or CurveSegments
-        Face ids refer to `triangles`. Points of a curve that share no face are joined by a shortest line.
+        Face ids refer to `triangles`. Consecutive points of a curve that share no face are joined by a geodesic path.
     triangles : IntrinsicMesh
         The surface.
     positions : (n_vertices, 3) or (m, 3, 3) float, optional
-        Vertices in space, or the corners of each face where faces lie in planes of their own, for curves whose normals
-        are given.
+        Positions in space of vertices, or of the corners of each face if every face lies in a plane of its own; needed
+        for curves with given normals.
     number : int
-        Which of the sources this is, for messages.
+        Index of the source, for messages.
+
+    Returns
+    -------
+    CurveSegments
+        A `CurveSegments` is returned as it is.
 
     Raises
     ------
@@ -41,15 +51,18 @@ def segments_of(
         If the source does not fit the surface.
     """
     raise SourceError(
-        f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a Curve or SurfacePoints "
-        "(see the domain's path, polyline, level_set and points_at)"
+        f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a "
+        "Curve or SurfacePoints (see the domain's path, polyline, level_set and points_at)",
+        element=f"source {number}",
     )
 
 
 def segments_of_each(
-    sources: Sequence[Any], triangles: IntrinsicMesh, positions: NDArray[np.float64] | None = None
+    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]],
+    triangles: IntrinsicMesh,
+    positions: Positions = None,
 ) -> list[list[CurveSegments]]:
-    """Each of several sources in segments; a sequence of curves and points counts as one source."""
+    """The segments of several sources; a sequence of curves and points among them counts as one source."""
     return [
         [
             segments_of(item, triangles, positions, number)
@@ -60,12 +73,12 @@ def segments_of_each(
 
 
 @segments_of.register
-def _(source: CurveSegments, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
+def _(source: CurveSegments, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
     return source
 
 
 @segments_of.register
-def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
+def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
     located = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     none = np.empty(0, dtype=np.int64)
     return CurveSegments(
@@ -74,7 +87,7 @@ def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Any = None, nu
 
 
 @segments_of.register
-def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: int = 0) -> CurveSegments:
+def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
     name = f"curve {number}"
     located = locate_points(triangles, source.faces, source.barycentric, f"{name}: point")
     start = np.arange(source.n_segments)
@@ -104,6 +117,9 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Any = None, number: in
     vectors = np.where(along, 1j * ahead * np.abs(steps), vectors)
     if source.normals is not None and source.oriented:
         if positions is None:
-            raise SourceError(f"{name} has normals in space, but this surface has no positions: leave the normals out")
+            raise SourceError(
+                f"{name} has normals in space, but this surface has no positions",
+                remedy="leave the normals out",
+            )
         vectors = np.abs(steps) * given_directions(triangles, positions, faces, edges, source.normals[segment], name)
     return CurveSegments(located[first], ends, faces, edges, vectors, source.oriented)

@@ -1,4 +1,4 @@
-"""Curves and points on surfaces: what all surface domains have in common."""
+"""Base class of surface domains: how curves and points are placed on them."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ class Surface:
         raise NotImplementedError
 
     def path(self, vertices: ArrayLike, closed: bool = False, oriented: bool = True) -> Curve:
-        """Curve through vertices, in order; φ > 0 to its left.
+        """Curve through vertices, in order, with φ > 0 to its left.
 
         Parameters
         ----------
         vertices : (n,) int
-            Vertex ids. Consecutive ones that no face has in common are joined by a shortest line across faces.
+            Vertex ids. Consecutive vertices that share no face are joined by a geodesic path.
         closed : bool
-            Whether the last is joined to the first.
+            Whether the last vertex is joined to the first.
         oriented : bool
-            Whether the curve has two sides.
+            Whether the curve has a positive and a negative side.
 
         Raises
         ------
@@ -55,7 +55,7 @@ class Surface:
         return Curve(faces, weights, closed=closed, oriented=oriented)
 
     def points_at(self, vertices: ArrayLike) -> SurfacePoints:
-        """Vertices as isolated points, from which φ grows in all directions.
+        """Vertices as isolated point sources, from which φ grows in all directions.
 
         Parameters
         ----------
@@ -78,18 +78,18 @@ class Surface:
     def polyline(
         self, points: ArrayLike, closed: bool = False, oriented: bool = True, max_distance: float | None = None
     ) -> Curve:
-        """Polyline in space, brought onto the surface: closest points, joined by shortest lines across faces.
+        """Polyline in space, projected on the surface: the closest points, joined by geodesic paths.
 
         Parameters
         ----------
         points : (n, 3) float
-            In order.
+            Points in order.
         closed : bool
-            Whether the last is joined to the first.
+            Whether the last point is joined to the first.
         oriented : bool
-            Whether the curve has two sides.
+            Whether the curve has a positive and a negative side.
         max_distance : float, optional
-            How far from the surface a point may be; 5 % of the diagonal of its bounding box by default.
+            Largest distance of a point from the surface; 5 % of the diagonal of its bounding box by default.
 
         Returns
         -------
@@ -99,7 +99,7 @@ class Surface:
         Raises
         ------
         SourceError
-            If a point is too far away, or no way along the surface leads from one point to the next.
+            If a point is too far away, or two consecutive points are not connected on the surface.
 
         Examples
         --------
@@ -111,19 +111,19 @@ class Surface:
         return projected_curve(self.triangulation, points, closed, oriented, max_distance)
 
     def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
-        """Where a function, linear between vertices, takes a value; φ grows with the function.
+        """Level set of a function that is linear between vertices, oriented so that φ grows with the function.
 
         Parameters
         ----------
         values : (n_vertices,) float
-            The function; faces with a NaN corner are left out.
+            The function; faces with a NaN corner are skipped.
         level : float
-            The value.
+            The level.
 
         Returns
         -------
         list of Curve
-            One for each connected line, closed where it closes; larger values lie to its left.
+            One for each connected component, open or closed; larger values are to its left.
 
         Raises
         ------
@@ -140,17 +140,17 @@ class Surface:
         return level_set(self.triangulation, self.on_triangulation(values), float(level))
 
     def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
-        """Border of a region of faces; the region lies to the left, so φ > 0 in it.
+        """Boundary of a region of faces, with the region to the left, so that φ > 0 in it.
 
         Parameters
         ----------
         face_mask : (n_faces,) bool
-            Which faces make up the region.
+            True for the faces of the region.
 
         Returns
         -------
         list of Curve
-            Edges between the region and other faces; edges at the boundary of the surface are no border.
+            Curves along edges between the region and other faces; the boundary of the surface does not count.
 
         Raises
         ------
@@ -167,12 +167,12 @@ class Surface:
         return region_boundary(self.triangulation, self._triangle_mask(np.asarray(face_mask)))
 
     def boundary_curves(self) -> list[Curve]:
-        """The boundary of the surface, which lies to the left of it.
+        """The boundary of the surface, with the surface to its left.
 
         Returns
         -------
         list of Curve
-            Closed loops; parts of loops where they touch one another.
+            Closed loops, split at vertices where they touch each other.
 
         Examples
         --------
@@ -199,7 +199,7 @@ class Surface:
 
 
 def check_mask(face_mask: NDArray[np.bool_], n_faces: int) -> None:
-    """Refuse what is not one boolean per face."""
+    """Raise `SourceError` unless there is one boolean per face."""
     if face_mask.shape != (n_faces,) or face_mask.dtype != bool:
         raise SourceError(
             f"a region needs one boolean per face, {n_faces} in all, not {face_mask.dtype} of shape {face_mask.shape}"

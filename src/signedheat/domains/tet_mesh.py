@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,11 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..geometry.box_tree import BoxTree
 from ..geometry.components import element_components
-from ..geometry.tet_faces import face_table
+from ..geometry.tet_faces import FaceTable, face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
 from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
 from .validation import element_ids, finite_rows, frozen
+
+if TYPE_CHECKING:
+    import meshio
+    import pyvista
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +34,13 @@ class TetMesh:
     vertices : (n, 3) float
         Positions; vertices that no tet uses are allowed.
     tets : (m, 4) int
-        Vertex ids. Seen from the first corner the other three run clockwise when the volume is positive; tets given
-        inside out are turned (their last two corners swapped) and listed in `reoriented`. Flat tets are allowed.
+        Vertex ids. As seen from the first corner the other three run clockwise if the volume is positive; tets with
+        negative volume are turned (their last two corners swapped) and listed in `reoriented`. Flat tets are allowed.
 
     Attributes
     ----------
     reoriented : (k,) int
-        Tets that were given inside out.
+        Tets that were given with negative volume.
 
     Raises
     ------
@@ -81,13 +86,13 @@ class TetMesh:
         return len(self.tets)
 
     @cached_property
-    def geometry(self) -> Any:
-        """Areas, volumes and the operators made of them: an `operators.tetrahedral.Tetrahedra`."""
+    def geometry(self) -> Tetrahedra:
+        """Areas, volumes and operators of the tets."""
         return Tetrahedra(self.vertices, self.tets)
 
     @cached_property
-    def faces(self) -> Any:
-        """The triangles between and around the tets: an `operators.tetrahedral.FaceTable`."""
+    def faces(self) -> FaceTable:
+        """The triangular faces of the tets."""
         return face_table(self.tets)
 
     @property
@@ -97,28 +102,29 @@ class TetMesh:
 
     @cached_property
     def tet_barycenters(self) -> NDArray[np.float64]:
-        """(m, 3) centres."""
-        return self.vertices[self.tets].mean(axis=1)
+        """(m, 3) barycentres."""
+        result: NDArray[np.float64] = self.vertices[self.tets].mean(axis=1)
+        return result
 
     @cached_property
     def boundary(self) -> TriangleMesh:
-        """The faces of a single tet, facing outward, on the vertices of this mesh."""
+        """The faces with a single tet, oriented outward, on the vertices of this mesh."""
         return TriangleMesh(self.vertices, self.faces.vertices[self.faces.tet_counts == 1])
 
     @cached_property
     def parts(self) -> NDArray[np.int64]:
-        """(m,) part of the mesh that each tet belongs to; tets of one part are connected through faces."""
+        """(m,) connected component of each tet, through shared faces."""
         return element_components(self.faces.tet_faces)
 
     @cached_property
-    def search_tree(self) -> Any:
-        """A tree of the tets' boxes: an `operators.box_tree.BoxTree`."""
+    def search_tree(self) -> BoxTree:
+        """Tree of the bounding boxes of the tets."""
         corners = self.vertices[self.tets]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) least and greatest coordinates of the vertices that tets use."""
+        """(2, 3) lower and upper corner of the bounding box of the tets, without unreferenced vertices."""
         used = self.vertices[np.unique(self.tets)]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
@@ -127,35 +133,41 @@ class TetMesh:
         save_shape(self, path)
 
     @classmethod
-    def from_meshio(cls, mesh: Any) -> TetMesh:
-        """The tets of a `meshio.Mesh`; cells of other kinds are left behind.
+    def from_meshio(cls, mesh: meshio.Mesh) -> TetMesh:
+        """From the tets of a `meshio.Mesh`; cells of other kinds are ignored.
 
         Raises
         ------
         GeometryError
-            If it holds no tets.
+            If it has no tets.
         """
         blocks = [block.data for block in mesh.cells if block.type == "tetra"]
         if not blocks:
             kinds = sorted({block.type for block in mesh.cells}) or ["no cells"]
-            raise GeometryError(f"the mesh holds no tets, but {', '.join(kinds)}: convert it to tetrahedra first")
+            raise GeometryError(
+                f"the mesh holds no tets, but {', '.join(kinds)}",
+                remedy="convert it to tetrahedra first",
+            )
         return cls(mesh.points, np.concatenate(blocks))
 
-    def to_meshio(self, point_data: Any = None) -> Any:
-        """As a `meshio.Mesh`, with data at its vertices by name."""
+    def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
+        """As a `meshio.Mesh`, with `point_data`, arrays at the vertices by name."""
         import meshio
 
         return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data)
 
     @classmethod
-    def from_pyvista(cls, grid: Any) -> TetMesh:
-        """The tets of a `pyvista.UnstructuredGrid`; cells of other kinds are left behind."""
-        tets = grid.cells_dict.get(10)  # VTK_TETRA
-        if tets is None:
-            raise GeometryError(f"the grid holds no tets among its {grid.n_cells} cells: triangulate it first")
-        return cls(grid.points, tets.astype(np.int64))
+    def from_pyvista(cls, grid: pyvista.UnstructuredGrid) -> TetMesh:
+        """From the tets of a `pyvista.UnstructuredGrid`; cells of other kinds are ignored."""
+        cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
+        if 10 not in cells:  # VTK_TETRA
+            raise GeometryError(
+                f"the grid holds no tets among its {grid.n_cells} cells",
+                remedy="triangulate it first",
+            )
+        return cls(grid.points, np.asarray(cells[10], dtype=np.int64))
 
-    def to_pyvista(self) -> Any:
+    def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As a `pyvista.UnstructuredGrid`."""
         import pyvista
 

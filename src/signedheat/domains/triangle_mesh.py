@@ -1,9 +1,10 @@
-"""Triangle meshes: as a domain on which distance is measured, and as a shape in space to which it is."""
+"""Triangle meshes, as domains on which distance is measured, and as sources in space."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +14,12 @@ from .exchange import Exchangeable
 from .surface import Surface
 from .validation import element_ids, finite_rows
 
+if TYPE_CHECKING:
+    import trimesh  # noqa: F401  named in the base class
+
 
 @dataclass(frozen=True, eq=False)
-class TriangleMesh(Exchangeable, Surface):
+class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     """Triangles in space: manifold or not, orientable or not, closed or not.
 
     Parameters
@@ -23,7 +27,7 @@ class TriangleMesh(Exchangeable, Surface):
     vertices : (n, 3) float
         Positions; vertices that no face uses are allowed.
     faces : (m, 3) int
-        Vertex ids. A face's normal points to you when its corners run counter-clockwise as you see it.
+        Vertex ids. The normal of a face points to the side from which its corners run counter-clockwise.
 
     Raises
     ------
@@ -57,7 +61,7 @@ class TriangleMesh(Exchangeable, Surface):
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """(2, 3) lower and upper corner of the box around the faces; vertices of no face do not count."""
+        """(2, 3) lower and upper corner of the bounding box of the faces, without unreferenced vertices."""
         corners = self.vertices[self.faces.ravel()]
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
@@ -75,21 +79,23 @@ class TriangleMesh(Exchangeable, Surface):
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
         """(m,) areas."""
-        return np.linalg.norm(self.face_area_vectors, axis=1)
+        areas: NDArray[np.float64] = np.linalg.norm(self.face_area_vectors, axis=1)
+        return areas
 
     @cached_property
     def edge_lengths(self) -> NDArray[np.float64]:
         """(e,) lengths, in the order of `edges`."""
         tail, head = self.edges.vertices.T
-        return np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
+        lengths: NDArray[np.float64] = np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
+        return lengths
 
     @property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to: here the mesh itself."""
+        """The triangles that curves refer to: the mesh itself."""
         return self
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of `triangulation`, from values at the vertices of the domain: here the same."""
+        """Values at the vertices of `triangulation`, from values at the vertices of the domain: the same."""
         return values
 
     def __repr__(self) -> str:

@@ -1,25 +1,27 @@
-"""Checks shared by all domains: arrays come in any shape and leave frozen, or not at all."""
+"""Checks of arguments that all domains share; arrays are returned read-only."""
 
 from __future__ import annotations
 
 from numbers import Real
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, SignedHeatError
 
+Scalar = TypeVar("Scalar", bound=np.generic)
 
-def frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """The array made contiguous and read-only, so that nothing derived from it can go stale."""
+
+def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The array, contiguous and read-only, so that quantities derived from it stay valid."""
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
     return array
 
 
 def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDArray[np.float64]:
-    """`values` as a frozen float64 array of shape (n, columns) without NaN or infinity."""
+    """`values` as a read-only float64 array of shape (n, columns), without NaN or infinity."""
     array = np.array(values, dtype=np.float64)
     if array.ndim != 2 or (columns is not None and array.shape[1] != columns):
         wanted = f"(n, {columns})" if columns is not None else "(n, d)"
@@ -27,20 +29,22 @@ def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDA
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         raise GeometryError(
-            f"{len(bad)} of {len(array)} {name} hold NaN or infinity, first number {bad[0]}: remove or repair them"
+            f"{len(bad)} of {len(array)} {name} hold NaN or infinity, first number {bad[0]}",
+            remedy="remove or repair them",
+            element=f"number {bad[0]}",
         )
     return frozen(array)
 
 
-def finite_number(value: Any, name: str, least: float = -np.inf) -> float:
-    """`value` as a float, not NaN and not infinite, from `least` on.
+def finite_number(value: object, name: str, least: float = -np.inf) -> float:
+    """`value` as a finite float, at least `least`.
 
     Examples
     --------
     >>> finite_number(2, "the distance", least=0)
     2.0
     """
-    if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:
+    if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
         raise SignedHeatError(f"{name} must be a number, not {value!r}")
     number = float(value)
     if not (np.isfinite(number) and number >= least):
@@ -49,8 +53,8 @@ def finite_number(value: Any, name: str, least: float = -np.inf) -> float:
     return number
 
 
-def positive_number(value: Any, name: str) -> float:
-    """`value` as a float above zero, not NaN and not infinite."""
+def positive_number(value: object, name: str) -> float:
+    """`value` as a finite positive float."""
     number = finite_number(value, name)
     if number <= 0:
         raise SignedHeatError(f"{name} must be positive and finite, not {number:g}")
@@ -58,7 +62,7 @@ def positive_number(value: Any, name: str) -> float:
 
 
 def element_ids(values: ArrayLike, name: str, corners: int, n_vertices: int) -> NDArray[np.int64]:
-    """`values` as a frozen int64 array of shape (m, corners), every id within 0 … n_vertices − 1."""
+    """`values` as a read-only int64 array of shape (m, corners), with all ids within 0 … n_vertices − 1."""
     array = np.asarray(values)
     if array.size == 0:
         raise GeometryError(f"there are no {name}: the shape is empty")
@@ -71,7 +75,8 @@ def element_ids(values: ArrayLike, name: str, corners: int, n_vertices: int) -> 
     if len(outside):
         first = outside[0]
         raise GeometryError(
-            f"{len(outside)} {name} name a vertex that does not exist; number {first} is {ids[first].tolist()}, "
-            f"but vertex ids go from 0 to {n_vertices - 1}"
+            f"{len(outside)} {name} name a vertex that does not exist; number {first} is "
+            f"{ids[first].tolist()}, but vertex ids go from 0 to {n_vertices - 1}",
+            element=f"number {first}",
         )
     return frozen(ids)

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from ..constraints import Constraint
-from ..domains.curves import Curve, SurfacePoints
+from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
+from ..domains.kinds import SurfaceDomain
 from ..errors import SourceError
 from ..solver import SignedHeatSolver, as_list
 
 
 def close_curves(
-    domain: Any, curves: Any, *, diffusion: float = 1.0, constraint: Constraint | None = None
+    domain: SurfaceDomain, curves: CurvesAndPoints, *, diffusion: float = 1.0, constraint: Constraint | None = None
 ) -> list[Curve]:
     """The zero set of the signed distance to broken curves: what they are a picture of, without gaps.
 
@@ -51,13 +51,16 @@ def close_curves(
     >>> whole
     [Curve(15 points, open, oriented)]
     """
-    listed = as_list(curves)
+    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
     refuse_without_sides(listed)
     phi = SignedHeatSolver(domain, diffusion=diffusion).distance(listed, constraint)
     return phi.contour(0.0)
 
 
-def refuse_without_sides(curves: Sequence[Any]) -> None:
+def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:
     """Distance to curves that are not oriented, and to points, has no zero set but these."""
     if all(isinstance(curve, Curve | SurfacePoints) and not getattr(curve, "oriented", False) for curve in curves):
-        raise SourceError("curves without sides, and points, bound nothing that could be completed: orient the curves")
+        raise SourceError(
+            "curves without sides, and points, bound nothing that could be completed",
+            remedy="orient the curves",
+        )

@@ -48,7 +48,10 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     True
     """
     if not isinstance(triangulation, IntrinsicTriangulation):
-        raise GeometryError(f"a {type(triangulation).__name__} is no IntrinsicTriangulation: see intrinsic_delaunay")
+        raise GeometryError(
+            f"a {type(triangulation).__name__} is no IntrinsicTriangulation",
+            remedy="see intrinsic_delaunay",
+        )
     triangles, n = triangulation.triangles, triangulation.n_vertices
     polygons, _, where = subdivided(triangulation)
     used = triangles.corner_vertices.ravel()
@@ -113,7 +116,7 @@ def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
     return parts
 
 
-def positions(triangulation: IntrinsicTriangulation, places) -> NDArray[np.float64]:
+def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> NDArray[np.float64]:
     """(p, 3) where points of the triangulation lie in space."""
     found = triangulation.history.backward(places.faces, places.barycentric)
     return triangulation.in_space(*triangulation.refinement.pull_back(*found[:2]))

@@ -12,11 +12,11 @@ from ..fields.grid_field import GridField
 from ..operators.grid.closest_points import distance_to_zero_set
 from ..parallel import run_cancellable
 from ..progress import Progress
-from .sharpening import sharpen
+from .sharpening import sharpen_field
 
 
-@sharpen.register
-def sharpen_grid(field: GridField, progress: Progress | None = None) -> GridField:
+@sharpen_field.register
+def _(field: GridField, *, progress: Progress | None = None) -> GridField:
     """Distance of every node to the zero set; signs stay as they are. Second order on smooth shapes."""
     if not np.isfinite(field.values).all():
         raise GeometryError(

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import SurfacePoints
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.vertex_field import VertexField
@@ -22,20 +24,28 @@ class IntrinsicPiecewiseField(PiecewiseField):
     `domain` and `surface` are the triangulation. Points are those of the mesh.
     """
 
+    domain: IntrinsicTriangulation
+    surface: IntrinsicTriangulation
+
     @property
-    def gradient(self) -> NDArray[np.float64]:
+    def face_gradients(self) -> NDArray[np.float64]:
         """Of length one along the surface; triangles that are bent over edges of the mesh have none in space."""
         raise GeometryError(
-            "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each: use "
-            "split().face_gradients"
+            "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each",
+            remedy="use split().face_gradients",
         )
+
+    def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
+        """As `face_gradients`."""
+        return self.face_gradients
 
     def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
         """φ at points of the mesh."""
         faces, weights = self.domain.locate(points.faces, points.barycentric)
-        return (self.values[faces] * weights).sum(axis=1)
+        result: NDArray[np.float64] = (self.values[faces] * weights).sum(axis=1)
+        return result
 
-    def split(self) -> VertexField:
+    def split(self) -> VertexField[TriangleMesh | PolygonMesh]:
         """The same field on flat polygons, which the edges of mesh and triangulation cut out of each other.
 
         Their vertices are doubled along the cut.

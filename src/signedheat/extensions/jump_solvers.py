@@ -167,7 +167,15 @@ def minimize_fast(
     return JumpSolution(moved, problem.objective(moved), bound, rounds)
 
 
-def _lags(spring, difference, low, high, z, before, scaled) -> bool:
+def _lags(
+    spring: NDArray[np.float64],
+    difference: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    z: NDArray[np.float64],
+    before: NDArray[np.float64],
+    scaled: NDArray[np.float64],
+) -> bool:
     """Whether the multipliers are slow to settle: the dual residual is more than twice the primal one, as parts."""
     primal = np.sqrt(spring @ (difference - z) ** 2)
     jumps = np.sqrt(spring @ (difference - np.clip(difference, low, high)) ** 2)
@@ -189,7 +197,8 @@ def regions_moved(problem: JumpProblem, constants: NDArray[np.float64], jump: fl
     between = faces[:, 0] != faces[:, 1]
     low, high = (low - difference)[between], (high - difference)[between]
     moves = minimize_exactly(JumpProblem(faces[between], low, high, problem.weights[between], n_regions))
-    return constants + moves.constants[region]
+    moved: NDArray[np.float64] = constants + moves.constants[region]
+    return moved
 
 
 def minimize_exactly(problem: JumpProblem) -> JumpSolution:
@@ -227,7 +236,8 @@ def minimize_exactly(problem: JumpProblem) -> JumpSolution:
         ):
             return solution
     raise SignedHeatError(
-        f"the linear program over {problem.n_faces} faces was not solved ({result.message}): leave out exact=True"
+        f"the linear program over {problem.n_faces} faces was not solved ({result.message})",
+        remedy="leave out exact=True",
     )
 
 

@@ -5,28 +5,59 @@ Every step recomputes the distance, since an offset of a distance function is a 
 
 from __future__ import annotations
 
-from functools import singledispatch
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.curves import Curve
+from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints
 from ..domains.grid import Grid, room_around
+from ..domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.polyline import Polyline
+from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number
-from ..errors import SignedHeatError, SourceError
+from ..errors import SignedHeatError, SourceError, UnsupportedTypeError
 from ..fields.grid_field import GridField
+from ..fields.to_field import Field
+from ..fields.vertex_field import VertexField
 from ..lowering.area_elements import area_elements, bounds_around
-from ..solver import SignedHeatSolver, as_list
+from ..solver import as_list, signed_distance
 from .sharpening import sharpen
 
 RESOLUTION = 128
 ROOM = 0.15
 """Share of its longest side by which a shape is padded, besides what its offsets take."""
 
+Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
+"""What bounds the result: of the same kind as the shape."""
 
-def dilate(shape: Any, distance: float, domain: Any = None, *, resolution: int = RESOLUTION) -> Any:
+
+class _Morphology(Protocol):
+    """The types of `dilate` and its like."""
+
+    @overload
+    def __call__(
+        self, shape: Shapes, distance: float, domain: Grid | TetMesh | None = None, *, resolution: int = ...
+    ) -> TriangleMesh: ...
+    @overload
+    def __call__(
+        self, shape: Polylines, distance: float, domain: Grid | None = None, *, resolution: int = ...
+    ) -> list[Polyline]: ...
+    @overload
+    def __call__(
+        self, shape: CurvesAndPoints, distance: float, domain: SurfaceDomain, *, resolution: int = ...
+    ) -> list[Curve]: ...
+
+
+def _by_kind_of_shape(function: Callable[..., Boundary]) -> _Morphology:
+    return cast("_Morphology", function)
+
+
+@_by_kind_of_shape
+def dilate(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
     """Grow a shape by a distance.
 
     Parameters
@@ -65,7 +96,8 @@ def dilate(shape: Any, distance: float, domain: Any = None, *, resolution: int =
     return _offsets(shape, (distance,), domain, resolution)
 
 
-def erode(shape: Any, distance: float, domain: Any = None, *, resolution: int = RESOLUTION) -> Any:
+@_by_kind_of_shape
+def erode(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
     """Shrink a shape by a distance; see `dilate` for parameters, results and errors.
 
     Examples
@@ -79,20 +111,22 @@ def erode(shape: Any, distance: float, domain: Any = None, *, resolution: int = 
     return _offsets(shape, (-distance,), domain, resolution)
 
 
-def opening(shape: Any, distance: float, domain: Any = None, *, resolution: int = RESOLUTION) -> Any:
+@_by_kind_of_shape
+def opening(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
     """Erode, then dilate: what is thinner than twice the distance goes, convex corners turn round; see `dilate`."""
     distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (-distance, distance), domain, resolution)
 
 
-def closing(shape: Any, distance: float, domain: Any = None, *, resolution: int = RESOLUTION) -> Any:
+@_by_kind_of_shape
+def closing(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
     """Dilate, then erode: gaps narrower than twice the distance fill, concave corners turn round; see `dilate`."""
     distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (distance, -distance), domain, resolution)
 
 
 def shell(
-    shape: Any, inner: float, outer: float, domain: Grid | None = None, *, resolution: int = RESOLUTION
+    shape: Shapes, inner: float, outer: float, domain: Grid | None = None, *, resolution: int = RESOLUTION
 ) -> TriangleMesh:
     """The wall between two offsets of a shape: ``inner ≤ φ ≤ outer``. Holes of the shape are closed.
 
@@ -116,19 +150,22 @@ def shell(
     ------
     SignedHeatError
         If inner is not less than outer, one of them is not finite, or the wall is thinner than a cell.
-    TypeError
+    UnsupportedTypeError
         If the domain is not a grid.
     """
     inner, outer = finite_number(inner, "the inner distance"), finite_number(outer, "the outer distance")
     if not inner < outer:
-        raise SignedHeatError(f"a shell needs inner < outer, not {inner:g} and {outer:g}: swap them, or set them apart")
-    grid = _room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else _grid(domain)
-    phi = _distance(grid, shape)
-    return _wall(grid, np.maximum(inner - phi.values, phi.values - outer), outer - inner)
+        raise SignedHeatError(
+            f"a shell needs inner < outer, not {inner:g} and {outer:g}",
+            remedy="swap them, or set them apart",
+        )
+    grid = _grid(_room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else domain)
+    phi = _field(grid, shape).values
+    return _wall(grid, np.maximum(inner - phi, phi - outer), outer - inner)
 
 
 def thicken(
-    sheet: Any,
+    sheet: TriangleMesh | PolygonMesh | Sequence[TriangleMesh | PolygonMesh],
     above: float,
     below: float | None = None,
     domain: Grid | None = None,
@@ -158,71 +195,74 @@ def thicken(
     ------
     SignedHeatError
         If a reach is negative or not finite, both are zero, or the wall is thinner than a cell.
-    TypeError
+    UnsupportedTypeError
         If the domain is not a grid.
     """
     above = finite_number(above, "the reach above", least=0)
     below = above if below is None else finite_number(below, "the reach below", least=0)
     reach = max(above, below)
     if reach == 0:
-        raise SignedHeatError("a sheet thickened by nothing has no inside: give a reach above zero")
-    grid = _room(sheet, reach, resolution) if domain is None else _grid(domain)
+        raise SignedHeatError(
+            "a sheet thickened by nothing has no inside",
+            remedy="give a reach above zero",
+        )
+    grid = _grid(_room(sheet, reach, resolution) if domain is None else domain)
     depth = _unsigned_distance(sheet, grid, reach) - reach
     if above != below:
-        phi = _distance(grid, sheet).values
+        phi = _field(grid, sheet).values
         depth = np.maximum(depth, np.maximum(phi - above, -below - phi))
     return _wall(grid, depth, above + below)
 
 
-@singledispatch
-def _distance(domain: Any, shape: Any) -> Any:
+def _field(domain: Domain, shape: Sources) -> Field:
     """The field that offsets are taken of."""
-    return SignedHeatSolver(domain).distance(shape)
+    field = signed_distance(shape, domain)
+    return sharpen(field) if isinstance(field, GridField) else field
 
 
-@_distance.register
-def _(domain: Grid, shape: Any) -> GridField:
-    return sharpen(SignedHeatSolver(domain).distance(shape))
-
-
-def _offsets(shape: Any, distances: tuple[float, ...], domain: Any, resolution: int) -> Any:
+def _offsets(shape: Sources, distances: tuple[float, ...], domain: Domain | None, resolution: int) -> Boundary:
     """One offset after another, each of the recomputed distance to the last."""
     if domain is None:
         domain = _room(shape, max(0.0, *distances), resolution)
     for distance in distances:
-        field = _distance(domain, shape)
-        shape = field.offset(distance) if hasattr(field, "offset") else field.contour(distance)
-    return shape
+        field = _field(domain, shape)
+        boundary = field.contour(distance) if isinstance(field, VertexField) else field.offset(distance)
+        shape = boundary
+    return boundary
 
 
-def _room(shape: Any, reach: float, resolution: int) -> Grid:
+def _room(shape: Sources, reach: float, resolution: int) -> Grid:
     """A grid around a shape, with room for offsets."""
-    shapes = as_list(shape)
+    shapes: list[Source | Sequence[CurveOrPoints]] = as_list(shape)
     if any(isinstance(part, Curve) for part in shapes):
-        raise SourceError("a Curve lies on a surface: pass that surface as the domain")
+        raise SourceError(
+            "a Curve lies on a surface",
+            remedy="pass that surface as the domain",
+        )
     bounds = bounds_around(shapes)
     return Grid.around(bounds, resolution, room_around(bounds, reach, ROOM))
 
 
-def _grid(domain: Any) -> Grid:
+def _grid(domain: object) -> Grid[Literal[3]]:
     if not isinstance(domain, Grid):
-        raise TypeError(
-            f"walls are made on a Grid, not on a {type(domain).__name__}: leave the domain out, or pass one"
+        raise UnsupportedTypeError(
+            f"walls are made on a Grid, not on a {type(domain).__name__}",
+            remedy="leave the domain out, or pass one",
         )
-    return domain
+    return cast("Grid[Literal[3]]", domain)
 
 
-def _wall(grid: Grid, depth: NDArray[np.float64], thickness: float) -> TriangleMesh:
+def _wall(grid: Grid[Literal[3]], depth: NDArray[np.float64], thickness: float) -> TriangleMesh:
     cell = float(grid.spacing.max())
     if thickness < cell:
         raise SignedHeatError(
-            f"a wall of thickness {thickness:g} slips between nodes {cell:g} apart: raise the resolution to "
-            f"{int(np.ceil(max(grid.shape) * 2 * cell / thickness))}"
+            f"a wall of thickness {thickness:g} slips between nodes {cell:g} apart",
+            remedy=f"raise the resolution to {int(np.ceil(max(grid.shape) * 2 * cell / thickness))}",
         )
     return GridField(grid, depth).offset(0.0)
 
 
-def _unsigned_distance(sheet: Any, grid: Grid, reach: float) -> NDArray[np.float64]:
+def _unsigned_distance(sheet: Shapes, grid: Grid, reach: float) -> NDArray[np.float64]:
     """Distance to a surface that exists, completed nowhere, at the nodes up to two cells beyond `reach`.
 
     Distance to samples half a cell apart, which errs by less than 1/16 of a squared cell over the distance.
@@ -233,13 +273,16 @@ def _unsigned_distance(sheet: Any, grid: Grid, reach: float) -> NDArray[np.float
     for part in as_list(sheet):
         if area_elements(part).corners.shape[1:] != (3, grid.dimension):
             raise SourceError(
-                f"a sheet has faces in the {grid.dimension} dimensions of the grid, and a {type(part).__name__} has "
-                "none: reconstruct a mesh first"
+                f"a sheet has faces in the {grid.dimension} dimensions of the grid, and a "
+                f"{type(part).__name__} has none",
+                remedy="reconstruct a mesh first",
             )
     corners = np.concatenate([area_elements(part).corners for part in as_list(sheet)])
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     cell = float(grid.spacing.max())
-    samples, _ = subdivide_to_size(corners.reshape(-1, 3), faces, 0.5 * float(grid.spacing.min()), max_iter=64)
+    size = 0.5 * float(grid.spacing.min())
+    samples, _ = subdivide_to_size(corners.reshape(-1, 3), faces, size, max_iter=64)  # type: ignore[no-untyped-call]
     far = reach + 2 * cell
     distance = cKDTree(samples).query(grid.points.reshape(-1, 3), distance_upper_bound=far, workers=-1)[0]
-    return np.minimum(distance, far).reshape(grid.shape)
+    result: NDArray[np.float64] = np.minimum(distance, far).reshape(grid.shape)
+    return result

@@ -1,4 +1,4 @@
-"""Signed distance to curves that bound no region: piecewise-continuous integration (Sec. 7.2, Eq. 16).
+"""Signed distance to curves that bound no region: piecewise-continuous integration (Sec. 7.2, Eq. 15, Eq. 16).
 
 In every face φ is linear with gradient exactly Y, so it is known up to one constant per face. Where Y is integrable
 the constants fit across edges; where it is not, φ jumps, and the jumps are gathered on a cut that is short and runs
@@ -9,28 +9,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..discretization import Diagnostics, discretize
+from ..diagnostics import Diagnostics, Jumps
+from ..discretization import discretize
+from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from ..domains.kinds import SurfaceDomain
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
-from ..errors import SourceError, UnreachedWarning, warn_user
+from ..errors import SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..fields.piecewise_field import PiecewiseField
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in
 from ..linear import factorize
+from ..lowering.surface.discretization import SurfaceDiscretization
 from ..method import diffuse, normalize
 from ..operators.cotan import cotan_matrix
 from ..progress import Progress, Stopwatch
-from ..solver import SignedHeatSolver, as_list
+from ..solver import as_list
 from .intrinsic_piecewise import IntrinsicPiecewiseField
 from .jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 
@@ -40,7 +43,7 @@ SOURCE_WEIGHT = 100.0
 
 def piecewise_distance(
     domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation,
-    sources: Any,
+    sources: CurvesAndPoints,
     *,
     diffusion: float = 1.0,
     exact: bool = False,
@@ -51,7 +54,7 @@ def piecewise_distance(
 
     Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
     triangle is the diffused, normalised source normal Y; κ_e is the difference between the slopes along e that the two
-    faces want (Eqs. 15–16). Edges at the source weigh 100 times as much, so that the cut keeps away from it unless
+    faces want (Eq. 15, Eq. 16). Edges at the source weigh 100 times as much, so that the cut keeps away from it unless
     nothing else is possible. Curves that do bound a region have a field without a cut: it differs from that of
     `SignedHeatSolver.distance` by no more than ``integration_error / √λ`` in the mean square, λ the least positive
     eigenvalue of the Laplacian. Works on surfaces of any topology, orientable or not; curves whose parts are oriented
@@ -78,46 +81,47 @@ def piecewise_distance(
     Returns
     -------
     PiecewiseField
-        Its median over the source is zero. ``diagnostics.notes`` has `objective`, `bound` (none is smaller),
-        `gap` (relative difference of the two), `rounds`, `continuous` (whether there is no cut), `largest_jump`,
-        `cut_length`, and `integration_error`, the root mean square of ∇φ̄ − Y, φ̄ being φ averaged at the vertices of
-        `PiecewiseField.split`.
+        Its median over the source is zero. ``diagnostics.note(Jumps)`` tells the objective, how far it may be
+        from the least, and what the jumps are: see `diagnostics.Jumps`.
 
     Raises
     ------
     SourceError
         If a source does not fit the surface, or an unoriented curve was not kept by an intrinsic triangulation.
-    TypeError
+    UnsupportedTypeError
         If the domain is none of these.
     ValueError
         If `diffusion` or `smoothing` is not positive and finite.
 
     Examples
     --------
+    >>> from signedheat.diagnostics import Jumps
     >>> from signedheat.samples import torus
     >>> mesh = torus(n_around=48, n_across=24)
     >>> phi = piecewise_distance(mesh, mesh.path(range(24), closed=True))  # round the tube: bounds nothing
-    >>> len(phi.cut), phi.diagnostics.notes["gap"] < 0.002
+    >>> len(phi.cut), phi.diagnostics.note(Jumps).gap < 0.002
     (1, True)
     >>> bool(phi.cut[0].height > 4)  # nearly the length of the way round, 2π
     True
     """
     if not isinstance(domain, TriangleMesh | PolygonMesh | IntrinsicTriangulation):
-        raise TypeError(
+        raise UnsupportedTypeError(
             "piecewise distance needs a TriangleMesh, a PolygonMesh or an IntrinsicTriangulation, not a "
             f"{type(domain).__name__}"
         )
     if smoothing is not None:
         smoothing = positive_number(smoothing, "smoothing")
-    sources = as_list(sources)
+    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(sources)
     stopwatch = Stopwatch(progress, steps=4)
     with stopwatch("prepare"):
-        discretization = SignedHeatSolver(domain, diffusion).discretization
-        if not holds(discretization, sources):
-            domain = intrinsic_delaunay(domain.triangulation, keep=sources)
-            discretization = discretize(domain)
+        diffusion = positive_number(diffusion, "diffusion")
+        discretization = _lowered(domain)
+        if not holds(discretization, listed):
+            assert not isinstance(domain, IntrinsicTriangulation)  # which `holds` refuses
+            domain = intrinsic_delaunay(domain.triangulation, keep=listed)
+            discretization = _lowered(domain)
     with stopwatch("diffuse"):
-        discretization, groups = discretization.adapt(sources)
+        discretization, groups = discretization.adapt(listed)
         triangles = discretization.triangles
         source = discretization.lower(groups, diffusion)
         directions = normalize(discretization, diffuse(discretization, source))
@@ -131,7 +135,7 @@ def piecewise_distance(
         values = centered(triangles, slopes + solution.constants[:, None], parts)
     with stopwatch("finish"):
         if isinstance(domain, IntrinsicTriangulation):
-            phi = IntrinsicPiecewiseField(domain, domain, values, triangles)
+            phi: PiecewiseField = IntrinsicPiecewiseField(domain, domain, values, triangles)
         else:
             phi = PiecewiseField(domain, domain.triangulation, values, triangles)
         if smoothing is not None:
@@ -140,44 +144,52 @@ def piecewise_distance(
     unreached = np.flatnonzero(np.isnan(phi.values[:, 0]))
     if len(unreached):
         warn_user(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning)
-    notes = {
-        "objective": solution.objective,
-        "bound": solution.bound,
-        "gap": solution.gap,
-        "rounds": solution.rounds,
-        "continuous": not phi.is_cut.any(),
-        "largest_jump": float(np.nanmax(np.abs(phi.jumps), initial=0.0)),
-        "cut_length": sum(line.length for line in phi.cut),
-        "integration_error": error,
-        **discretization.notes,
-    }
+    jumps = Jumps(
+        objective=solution.objective,
+        bound=solution.bound,
+        gap=solution.gap,
+        rounds=solution.rounds,
+        continuous=not phi.is_cut.any(),
+        largest_jump=float(np.nanmax(np.abs(phi.jumps), initial=0.0)),
+        cut_length=float(sum(line.length for line in phi.cut)),
+        integration_error=error,
+    )
+    notes = (jumps, *discretization.notes)
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
 
-def holds(discretization: Any, sources: Sequence[Any]) -> bool:
+def _lowered(domain: SurfaceDomain) -> SurfaceDiscretization:
+    lowered = discretize(domain)
+    assert isinstance(lowered, SurfaceDiscretization)
+    return lowered
+
+
+def holds(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> bool:
     """Whether all sources have edges to run along, and vertices to lie at, where they need them."""
     adapted = discretization.adapt(sources)[0].triangles
     fits = adapted.corner_vertices is discretization.triangles.corner_vertices
     if not fits and isinstance(discretization.domain, IntrinsicTriangulation):
         raise SourceError(
-            "an unoriented curve runs across faces of the intrinsic triangulation: make it with "
-            "intrinsic_delaunay(mesh, keep=curve), or orient the curve"
+            "an unoriented curve runs across faces of the intrinsic triangulation",
+            remedy="make it with intrinsic_delaunay(mesh, keep=curve), or orient the curve",
         )
     return fits
 
 
 def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid."""
+    """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners, if it were zero at the centroid (constraint of Eq. 16)."""
     centroid = triangles.corner_positions.mean(axis=1, keepdims=True)
-    return (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
+    result: NDArray[np.float64] = (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
+    return result
 
 
 def jump_problem(
     triangles: IntrinsicMesh, pairs: FacePairs, slopes: NDArray[np.float64], guarded: NDArray[np.bool_]
 ) -> JumpProblem:
-    """Eq. 16; jumps across guarded edges beyond those that the curl forces are dearer.
+    """The objective of Eq. 16, with one constant per face as unknowns, and the curl κ of Eq. 15 in its weights.
 
-    κ |e| is the difference between the jumps at the two ends of e.
+    The jumps at the two ends of an edge e differ by κ |e|, whatever the constants are. What they jump beyond that costs
+    `SOURCE_WEIGHT` times as much across guarded edges.
     """
     offsets = pairs.ends(slopes)
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]
@@ -202,7 +214,8 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> N
         along = part.edges >= 0
         touched[triangles.edges.vertices[part.edges[along]]] = True
         touched[triangles.corner_vertices[part.faces[~along]]] = True
-    return touched[triangles.edges.vertices].any(axis=1)
+    guarded: NDArray[np.bool_] = np.any(touched[triangles.edges.vertices], axis=1)
+    return guarded
 
 
 def centered(
@@ -229,7 +242,8 @@ def centered(
     for here in np.split(order, 1 + np.flatnonzero(np.diff(label[face[order]]))):
         total = np.cumsum(weight[here])
         shift[label[face[here[0]]]] = height[here[np.searchsorted(total, 0.5 * total[-1])]]
-    return values - shift[label][:, None]
+    result: NDArray[np.float64] = values - shift[label][:, None]
+    return result
 
 
 def smoothed(phi: PiecewiseField, width: float) -> NDArray[np.float64]:
@@ -256,4 +270,5 @@ def split_triangles(phi: PiecewiseField) -> tuple[IntrinsicMesh, NDArray[np.floa
     owner, vertices = phi.glued
     opened = replace(phi.triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=len(vertices))
     mean = np.bincount(owner, phi.values.ravel()) / np.bincount(owner)
-    return opened, mean, np.bincount(owner, np.repeat(phi.triangles.face_areas / 3.0, 3))
+    masses = np.asarray(np.bincount(owner, np.repeat(phi.triangles.face_areas / 3.0, 3)), dtype=np.float64)
+    return opened, mean, masses

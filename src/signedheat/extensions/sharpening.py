@@ -5,13 +5,19 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import singledispatch
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeVar, overload, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization import Diagnostics, Discretization
-from ..errors import GeometryError, OutsideError
+from ..diagnostics import Diagnostics, Note, SlopeErrors
+from ..discretization import Discretization
+from ..domains.grid import Dimension
+from ..errors import GeometryError, OutsideError, UnsupportedTypeError
+from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
+from ..fields.to_field import Field
+from ..fields.vertex_field import VertexField
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
 from .sharpening_methods import Geodesic
@@ -28,12 +34,20 @@ class Method(Protocol):
         values: NDArray[np.float64],
         source: Any,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """New values at the unknowns from old ones, and notes for the diagnostics."""
 
 
-@singledispatch
-def sharpen(field: Any, **options: Any) -> Any:
+AnyField = TypeVar("AnyField", bound=VertexField | TetField)
+
+
+@overload
+def sharpen(field: GridField[Dimension], *, progress: Progress | None = None) -> GridField[Dimension]: ...
+@overload
+def sharpen(field: AnyField, method: Method | None = None, progress: Progress | None = None) -> AnyField: ...
+@overload
+def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
+def sharpen(field: Field, *arguments: Any, **options: Any) -> Field:
     """A field closer to the exact distance to its own zero set (Sec. 7.3).
 
     On grids: the distance of every node to the zero set of the field, second order, with the field's signs.
@@ -49,18 +63,19 @@ def sharpen(field: Any, **options: Any) -> Any:
     ----------
     field : GridField, VertexField or TetField
         What `signed_distance` or `SignedHeatSolver.distance` returned.
-    **options
-        `progress`, called as ``progress(fraction, step)``; what it raises cancels. On surfaces and tets also `method`:
-        `Geodesic` or `Convex`.
+    method : Geodesic or Convex, optional
+        On surfaces and tets only.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; what it raises cancels.
 
     Returns
     -------
-    The same kind of field. On surfaces and tets ``diagnostics.notes`` gains `slope_error_before` and
-    `slope_error_after`, the root mean square of ``|∇φ| − 1`` over the domain, and notes of the method.
+    The same kind of field. On surfaces and tets ``diagnostics`` gains a note `diagnostics.SlopeErrors`,
+    the root mean squares of ``|∇φ| − 1`` over the domain, and notes of the method.
 
     Raises
     ------
-    TypeError
+    UnsupportedTypeError
         If this kind of field cannot be sharpened, or not by this method.
     OutsideError
         If a field has one sign everywhere, or no value anywhere.
@@ -77,11 +92,20 @@ def sharpen(field: Any, **options: Any) -> Any:
     >>> bool(np.abs(sharpened.values - (radius - 0.5)).max() < 0.01)
     True
     """
-    raise TypeError(f"a {type(field).__name__} cannot be sharpened: pass a field that signed_distance returned")
+    return sharpen_field(field, *arguments, **options)
+
+
+@singledispatch
+def sharpen_field(field: object, *arguments: object, **options: object) -> Field:
+    """Sharpening of each kind of field, registered where the kind is dealt with; `sharpen` is its public face."""
+    raise UnsupportedTypeError(
+        f"a {type(field).__name__} cannot be sharpened",
+        remedy="pass a field that signed_distance returned",
+    )
 
 
 def sharpened(
-    field: Any,
+    field: VertexField | TetField,
     discretization: Discretization,
     elements: LinearElements,
     values: NDArray[np.float64],
@@ -91,12 +115,22 @@ def sharpened(
     """What fields on surfaces and on tets have in common: new values, and diagnostics that compare the slopes."""
     method = Geodesic() if method is None else method
     if isinstance(method, type) or not isinstance(method, Method):
-        raise TypeError(f"{method!r} is no method of sharpening: pass Geodesic() or Convex()")
+        raise UnsupportedTypeError(
+            f"{method!r} is no method of sharpening",
+            remedy="pass Geodesic() or Convex()",
+        )
     known = np.isfinite(values)
     if not known.any():
-        raise OutsideError("the field has no value anywhere: pass one that a source reaches")
+        raise OutsideError(
+            "the field has no value anywhere",
+            remedy="pass one that a source reaches",
+        )
     if not (known | np.isnan(values)).all():
-        raise GeometryError(f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}: compute it anew")
+        raise GeometryError(
+            f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}",
+            remedy="compute it anew",
+            element=f"vertex {np.flatnonzero(np.isinf(values))[0]}",
+        )
     begin = time.perf_counter()
     if progress is not None:
         progress(0.0, "sharpen")
@@ -104,6 +138,6 @@ def sharpened(
     if progress is not None:
         progress(1.0, "done")
     old = field.diagnostics
-    errors = {"slope_error_before": elements.slope_error(values), "slope_error_after": elements.slope_error(new)}
+    errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new))
     timings = {**old.timings, "sharpen": time.perf_counter() - begin}
-    return new, replace(old, timings=timings, notes={**old.notes, **errors, **notes})
+    return new, replace(old, timings=timings).noting(errors, *notes)

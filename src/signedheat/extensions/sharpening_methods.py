@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..diagnostics import ConvexRounds, Note
 from ..discretization import Discretization
 from ..domains.validation import finite_number, positive_number
-from ..errors import OutsideError, SignedHeatError, SourceError
+from ..errors import OutsideError, SignedHeatError, SourceError, UnsupportedTypeError
+from ..lowering.direct_integration import DirectIntegration
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
@@ -57,7 +59,7 @@ class Geodesic:
         values: NDArray[np.float64],
         source: Any,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """|φ| measured anew; parts without a zero set keep what they have."""
         distance, notes = run_cancellable(
             lambda: straight_distance(discretization, values, source, self.tolerance),
@@ -65,8 +67,9 @@ class Geodesic:
         )
         if not np.isfinite(distance).any():
             raise OutsideError(
-                "the field has one sign everywhere, hence no zero set to measure from: add an offset to its values, or "
-                "use method=Convex(), which measures from the source that it was computed from"
+                "the field has one sign everywhere, hence no zero set to measure from",
+                remedy="add an offset to its values, or use method=Convex(), which measures from the source "
+                "that it was computed from",
             )
         distance = np.where(np.isfinite(distance), distance, np.abs(values))
         sides = values if getattr(source, "oriented", True) else np.ones_like(values)
@@ -76,14 +79,14 @@ class Geodesic:
 @singledispatch
 def straight_distance(
     discretization: Any, values: NDArray[np.float64], source: Any, tolerance: float
-) -> tuple[NDArray[np.float64], dict[str, Any]]:
+) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Distance of every unknown from where values vanish, inf where that is not connected; and notes."""
-    raise TypeError(f"there are no straight lines on a {type(discretization).__name__}")
+    raise UnsupportedTypeError(f"there are no straight lines on a {type(discretization).__name__}")
 
 
 @dataclass(frozen=True)
 class Convex:
-    """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 18).
+    """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 17, Eq. 18).
 
     Repairs wrong signs that a long diffusion left. Biased low, since a slope of at most one in every triangle or tet is
     a lower bound on distance: on fine meshes `Geodesic` is far more accurate, and on tets the bias is greater than the
@@ -122,19 +125,22 @@ class Convex:
         values: NDArray[np.float64],
         source: Any,
         progress: Progress | None,
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
+    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """The maximiser, from φ⁰ on."""
         from threadpoolctl import threadpool_limits
 
         if source is None or source.interpolation.shape[1] != len(values):
             raise SourceError(
-                "the convex method holds φ at the source, and this field comes without one, or from one that lies on "
-                "other triangles: pass what SignedHeatSolver.distance returned for oriented curves or points, on "
-                "intrinsic_delaunay(mesh) if need be instead of with intrinsic=True"
+                "the convex method holds φ at the source, and this field comes without one, or from one "
+                "that lies on other triangles",
+                remedy="pass what SignedHeatSolver.distance returned for oriented curves or points, on "
+                "intrinsic_delaunay(mesh) if need be instead of with intrinsic=True",
             )
+        integration = discretization.integration
+        assert isinstance(integration, DirectIntegration)  # of surfaces and tets, whose elements these are
         sizes, total = elements.sizes, elements.sizes.sum()
         with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
-            factor = discretization.integration.anchored(source)
+            factor = integration.anchored(source)
             phi = np.nan_to_num(values)
             pull = elements.masses * np.sign(phi) / (np.ptp(phi) or 1.0)
             relaxed = slopes = elements.slopes(phi)
@@ -152,9 +158,10 @@ class Convex:
                 number += 1
                 if progress is not None:
                     progress(number / self.max_rounds, "sharpen")
-        return np.where(np.isnan(values), np.nan, phi), {"rounds": number, "residual": float(residual)}
+        return np.where(np.isnan(values), np.nan, phi), (ConvexRounds(number, float(residual)),)
 
 
 def at_most_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rows longer than one cut to length one."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
+    result: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
+    return result

@@ -74,14 +74,17 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
     import pytetwild
 
     if isinstance(shape, PointCloud):
-        raise GeometryError("fTetWild follows faces, and a point cloud has none: use tetrahedralize")
+        raise GeometryError(
+            "fTetWild follows faces, and a point cloud has none",
+            remedy="use tetrahedralize",
+        )
     lower, upper, spacing = _box_around(shape, resolution, padding)
     corners, faces = box_walls(lower, upper, np.ones(3, dtype=np.int64))
     triangles = area_elements(shape).corners
     vertices, ids = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     leftover = Path("__tracked_surface.stl")  # fTetWild leaves it in the working directory
     keep = leftover.exists()
-    vertices, tets = pytetwild.tetrahedralize(
+    vertices, tets = pytetwild.tetrahedralize(  # type: ignore[attr-defined]
         np.concatenate([corners, vertices]),
         np.concatenate([faces, ids.reshape(-1, 3) + len(corners)]).astype(np.int32),
         edge_length_abs=spacing,

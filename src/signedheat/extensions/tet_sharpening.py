@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..diagnostics import Note, RoundCorners
 from ..discretization import discretize
 from ..fields.tet_field import TetField
 from ..geometry.box_tree import BoxTree
@@ -18,7 +19,8 @@ from ..geometry.tet_clipping import barycentric
 from ..geometry.visibility import tet_neighbors
 from ..lowering.tets.discretization import TetDiscretization
 from ..operators.linear_elements import LinearElements
-from .sharpening import Method, Progress, sharpen, sharpened
+from ..progress import Progress
+from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
 
 GRAZING = 1e-6
@@ -28,9 +30,10 @@ LARGEST_BEND = 1.0
 """The zero set is moved by at most this, over h, for the curvature of φ; creases know no curvature."""
 
 
-@sharpen.register
+@sharpen_field.register
 def _(field: TetField, method: Method | None = None, progress: Progress | None = None) -> TetField:
     lowered = discretize(field.mesh)
+    assert isinstance(lowered, TetDiscretization)
     elements = LinearElements.on_tets(field.mesh.geometry, lowered.unknowns, lowered.n_unknowns)
     new, diagnostics = sharpened(field, lowered, elements, field.values[lowered.vertices], method, progress)
     return replace(field, values=lowered.at_vertices(new), diagnostics=diagnostics)
@@ -39,7 +42,7 @@ def _(field: TetField, method: Method | None = None, progress: Progress | None =
 @straight_distance.register
 def _(
     lowered: TetDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
-) -> tuple[NDArray[np.float64], dict[str, Any]]:
+) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Through space, from the surface on which values vanish; round the walls of the mesh.
 
     Where the linear interpolant vanishes, φ itself does not if it is curved. By how much it differs there, its
@@ -49,7 +52,7 @@ def _(
     points = mesh.vertices[lowered.vertices] - planes.center
     positions, corners, owners = level_triangles(points, unknowns, values, 0.0)
     if not len(corners):
-        return np.full(len(values), np.inf), {}
+        return np.full(len(values), np.inf), ()
     triangles = positions[corners]
     nearest, _ = nearest_on_triangles(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)), points)
     nearest[np.isnan(values)] = -1
@@ -76,7 +79,7 @@ def _(
     most = LARGEST_BEND * lowered.spacing
     bend = np.clip(rise / np.where(slope > 0, slope, np.inf), -most, most)
     distance[reached] = np.maximum(distance[reached] + np.copysign(1.0, values[reached]) * bend, 0.0)
-    return distance, {"round corners": hidden}
+    return distance, (RoundCorners(int(hidden)),)
 
 
 def by_element(ids: NDArray[np.int64], n: int, width: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

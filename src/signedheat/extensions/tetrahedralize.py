@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.grid import room_around
+from ..domains.kinds import Shape
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError, MemoryLimitError
@@ -27,7 +28,9 @@ MOST_TETS = 50_000_000
 """More would need over 20 GB to build."""
 
 
-def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float | None = None, grading: float = 3.0) -> TetMesh:
+def tetrahedralize(
+    shape: Shape, *, resolution: int = 32, padding: float | None = None, grading: float = 3.0
+) -> TetMesh:
     """Fill a box around a shape with tets of good angles, graded from the shape outward.
 
     Parameters
@@ -98,7 +101,7 @@ def tetrahedralize(shape: Any, *, resolution: int = 32, padding: float | None = 
     return TetMesh(origin + points * (spacing / 2), tets)
 
 
-def sample_points(shape: Any, spacing: float) -> NDArray[np.float64]:
+def sample_points(shape: Shape, spacing: float) -> NDArray[np.float64]:
     """Points on a shape, so dense that no point of it is farther than `spacing` from one of them."""
     if isinstance(shape, PointCloud):
         return shape.points
@@ -116,11 +119,14 @@ def sample_points(shape: Any, spacing: float) -> NDArray[np.float64]:
 
 def _refuse_too_many(tets: float) -> None:
     if tets > MOST_TETS:
-        raise MemoryLimitError(f"the lattice would have over {tets:,.0f} tets: lower the resolution")
+        raise MemoryLimitError(
+            f"the lattice would have over {tets:,.0f} tets",
+            remedy="lower the resolution",
+        )
 
 
 def _octree(
-    samples: Any, origin: NDArray, spacing: float, counts: NDArray, depth: int, grading: float
+    samples: Any, origin: NDArray[np.float64], spacing: float, counts: NDArray[np.int64], depth: int, grading: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Lower corners and sizes of the leaves, in half cells of the finest level; neighbours differ by at most two.
 
@@ -151,12 +157,12 @@ def _join_leaves(
     stride = np.array([(upper[1] + 1) * (upper[2] + 1), upper[2] + 1, 1])
     leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
-    def is_leaf(corner: NDArray, size: NDArray) -> NDArray[np.bool_]:
+    def is_leaf(corner: NDArray[np.int64], size: NDArray[np.int64]) -> NDArray[np.bool_]:
         return _contains(leaves, (corner * 32 + np.log2(size).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
     octants = np.array(list(itertools.product((0, 1), repeat=3)))
     taken = np.unique((corners[:, None] + octants * sizes[:, None, None]).reshape(-1, 3) @ stride)
-    tets = []
+    joined = []
     for axis, side in itertools.product(range(3), (0, 1)):
         step = np.zeros(3, dtype=np.int64)
         step[axis] = 2 * side - 1
@@ -180,8 +186,8 @@ def _join_leaves(
             whole = ~split
             for ends, which in (((start, end), whole), ((start, middle), split), ((middle, end), split)):
                 parts = (center[chosen], opposite[chosen], *ends)
-                tets.append(np.stack([part[which] @ stride for part in parts], axis=1))
-    keys, ids = np.unique(np.concatenate(tets), return_inverse=True)
+                joined.append(np.stack([part[which] @ stride for part in parts], axis=1))
+    keys, ids = np.unique(np.concatenate(joined), return_inverse=True)
     points = np.stack([keys // stride[0], keys % stride[0] // stride[1], keys % stride[1]], axis=1)
     tets = ids.reshape(-1, 4)
     a, b, c, d = (points[tets[:, k]] for k in range(4))
@@ -190,6 +196,7 @@ def _join_leaves(
     return points, tets
 
 
-def _contains(sorted_keys: NDArray, keys: NDArray) -> NDArray[np.bool_]:
+def _contains(sorted_keys: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.bool_]:
     found = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
-    return sorted_keys[found] == keys
+    result: NDArray[np.bool_] = sorted_keys[found] == keys
+    return result

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..diagnostics import GeodesicWindows, Note
 from ..discretization import discretize
-from ..errors import GeometryError
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..errors import GeometryError, UnsupportedTypeError
 from ..fields.vertex_field import VertexField
 from ..geometry.components import connected_components
 from ..geometry.curve_segments import CurveSegments, interpolation_at
@@ -18,18 +20,21 @@ from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in, concatenated, incident_faces
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..operators.linear_elements import LinearElements
-from .sharpening import Method, Progress, sharpen, sharpened
+from ..progress import Progress
+from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
 
 HALO = 4.0
 """Distance from a source without sides, over h, within which zeros of φ may come of that source alone."""
 
 
-@sharpen.register
+@sharpen_field.register
 def _(field: VertexField, method: Method | None = None, progress: Progress | None = None) -> VertexField:
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
-        raise TypeError(f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface")
+        raise UnsupportedTypeError(
+            f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface"
+        )
     elements = LinearElements.on_triangles(surface.triangles)
     new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), method, progress)
     values = new if surface.restriction is None else new[surface.restriction]
@@ -43,11 +48,12 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
     wanted = n if surface.restriction is None else len(surface.restriction)
     if values.shape != (wanted,) or not np.issubdtype(values.dtype, np.number):
         raise GeometryError(
-            f"the field has {values.dtype} values of shape {values.shape}, and its domain {wanted} vertices: give one "
-            "number for each"
+            f"the field has {values.dtype} values of shape {values.shape}, and its domain {wanted} vertices",
+            remedy="give one number for each",
         )
     if surface.restriction is None:
         return values.astype(np.float64)
+    assert not isinstance(field.domain, IntrinsicTriangulation)  # it has the vertices of its triangles
     values = field.domain.on_triangulation(field.values)
     if len(values) != n:
         values = np.full(n, np.nan)
@@ -58,13 +64,13 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
 @straight_distance.register
 def _(
     surface: SurfaceDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
-) -> tuple[NDArray[np.float64], dict[str, Any]]:
+) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Along the faces, from the line on which values vanish and from sources without sides."""
     parts = getattr(source, "parts", ())
     unsided = [part for part in parts if not part.oriented]
     if not unsided:
         distance, windows = distance_to_zero_line(surface.triangles, values, tolerance)
-        return distance, {"windows": windows}
+        return distance, (GeodesicWindows(int(windows)),)
     # They run along edges of triangles of their own, whose first vertices are those of the surface.
     near, windows = distance_to_segments(source.triangles, unsided, tolerance)
     near = near[: len(values)]
@@ -75,7 +81,7 @@ def _(
         lines = without_halos(surface.triangles, values, near < HALO * surface.spacing, sided[sided < len(values)])
         distance, more = distance_to_zero_line(surface.triangles, lines, tolerance)
         near, windows = np.minimum(near, distance), windows + more
-    return near, {"windows": windows}
+    return near, (GeodesicWindows(int(windows)),)
 
 
 def without_halos(
@@ -99,7 +105,8 @@ def without_halos(
     own[line[(~beside[corners] | is_sided[corners]).any(axis=1)]] = False
     result = values.copy()
     result[corners[own[line]]] = np.nan
-    return result
+    answer: NDArray[np.float64] = result
+    return answer
 
 
 def distance_to_segments(

@@ -1,1 +1,1 @@
-"""Results: values that know their domain."""
+"""Fields: the results, values of φ with the domain that they belong to."""

@@ -1,11 +1,10 @@
-"""How fields reach files, without a word about formats here."""
+"""Writing of fields, provided by `signedheat.io`."""
 
 from __future__ import annotations
 
 from os import PathLike
-from typing import Any
 
 from ..slots import Slot
 
-save_field: Slot[[Any, str | PathLike[str]], None] = Slot("save_field")
-"""Write a field of any kind in the format that the file's name ends with."""
+save_field: Slot[[object, str | PathLike[str]], None] = Slot("save_field")
+"""Write a field of any kind in the format given by the extension of the file."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import Any, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import Diagnostics
-from ..domains.grid import Grid
+from ..diagnostics import Diagnostics
+from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
@@ -20,7 +20,7 @@ from .files import save_field
 
 
 @dataclass(frozen=True, eq=False)
-class GridField:
+class GridField(Generic[Dimension]):
     """Signed distance at the nodes of a grid.
 
     Parameters
@@ -30,9 +30,9 @@ class GridField:
     values : (*grid.shape) float
         φ at the nodes, in the units of the grid: ``values[i, j, k]`` at ``grid.points[i, j, k]``. Positive on the
         side that the source normals point to, so negative inside a shape with outward normals. NaN at solid nodes, and
-        on parts of the grid that they cut off from every source.
+        on parts of the grid that solid nodes separate from every source.
     diagnostics : Diagnostics
-        What happened on the way.
+        Timings, diffusion time, and notes on the computation.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class GridField:
     True
     """
 
-    grid: Grid
+    grid: Grid[Dimension]
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
 
@@ -62,10 +62,10 @@ class GridField:
         object.__setattr__(self, "values", values)
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """φ at points in space, linear along each axis between nodes.
+        """φ at points in space, by multilinear interpolation between nodes.
 
-        Outside the grid φ continues straight from the nearest point of the grid's box, along the gradient there. For a
-        convex shape inside the box this is a lower bound of the distance; it is continuous everywhere.
+        Outside the grid φ is extrapolated linearly from the nearest point of the bounding box of the grid, along the
+        gradient there. This is continuous, and for a convex shape inside the box a lower bound of the distance.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class GridField:
         Returns
         -------
         (n,) float, or one float
-            Signed distances. Nodes without a value do not count; NaN where no node around has one.
+            Signed distances, interpolated from the nodes around that have a value; NaN where none has one.
         """
         points, inside = self._into_box(points)
         values = self._interpolate(inside)
@@ -89,7 +89,7 @@ class GridField:
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """∇φ at points in space: central differences of the nodes, interpolated.
 
-        Outside the grid it is the gradient at the nearest point of the grid's box.
+        Outside the grid it is the gradient at the nearest point of the bounding box of the grid.
 
         Parameters
         ----------
@@ -104,24 +104,36 @@ class GridField:
         _, inside = self._into_box(points)
         return self._slopes(inside)
 
+    @property
+    def domain(self) -> Grid[Dimension]:
+        """The grid."""
+        return self.grid
+
+    @overload
+    def contour(self: GridField[Literal[3]], level: float = 0.0) -> TriangleMesh: ...
+    @overload
+    def contour(self: GridField[Literal[2]], level: float = 0.0) -> list[Polyline]: ...
+    @overload
+    def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]: ...
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]:
-        """Where φ = level.
+        """The level set φ = level.
 
-        In space, a surface: closed, manifold, normals pointing to greater φ. Where it runs out of the grid, as it does
-        for an open shape whose completion has no end, it is closed along the box of the grid (1 % of a cell outside);
-        where it meets solid nodes, or others without a value, along the last nodes before them, likewise.
+        In space, a surface: closed, manifold, with normals pointing to greater φ. Where it leaves the grid, as the
+        completion of an open shape may do, it is closed along the box of the grid (1 % of a cell outside); where it
+        meets solid nodes, or others without a value, it is closed along the last nodes before them.
 
-        In the plane, polylines, one for each connected line: greater φ to the left, closed where they close; they end
-        at the box of the grid, and at nodes without a value.
+        In the plane, polylines, one for each connected component, open or closed, with greater φ to their left. Open
+        ones end at the box of the grid, and at nodes without a value.
 
         Parameters
         ----------
         level : float
-            In the units of the grid.
+            The level, in the units of the grid.
 
         Returns
         -------
         TriangleMesh, or list of Polyline
+            The surface in space, or the polylines in the plane.
 
         Raises
         ------
@@ -136,42 +148,52 @@ class GridField:
             return [Polyline(points, closed) for points, closed in lines]
         return TriangleMesh(*closed_surface(self.values, grid.origin, grid.spacing, level))
 
+    @overload
+    def offset(self: GridField[Literal[3]], distance: float) -> TriangleMesh: ...
+    @overload
+    def offset(self: GridField[Literal[2]], distance: float) -> list[Polyline]: ...
+    @overload
+    def offset(self, distance: float) -> TriangleMesh | list[Polyline]: ...
     def offset(self, distance: float) -> TriangleMesh | list[Polyline]:
-        """What lies at a signed distance from the shape: `contour`, but refused where the grid is too small for it.
+        """The offset of the shape at a signed distance: `contour`, but refused if the grid is too small for it.
 
         Parameters
         ----------
         distance : float
-            Positive outwards, in the units of the grid.
+            Signed distance, positive outward, in the units of the grid.
+
+        Returns
+        -------
+        TriangleMesh, or list of Polyline
+            As `contour`.
 
         Raises
         ------
         OutsideError
-            If φ does not take the value on the grid, or its level set leaves the grid although the shape itself does
-            not: the grid then needs more padding.
+            If φ does not take the value on the grid, or the offset leaves the grid although the shape itself does not:
+            the grid then needs more padding.
         """
         walls = self._wall_range()
         bounded = walls[0] > 0 or walls[1] < 0
         if bounded and walls[0] < distance < walls[1]:
             limit = walls[0] if walls[0] > 0 else walls[1]
             raise OutsideError(
-                f"what lies at distance {distance:g} leaves the grid, which holds distances up to {limit:g}: "
-                f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open"
+                f"what lies at distance {distance:g} leaves the grid, which holds distances up to {limit:g}",
+                remedy=f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open",
             )
         return self.contour(distance)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format that its name ends with; `signedheat.load_field` gives the field back."""
+        """Write to a file, in the format given by its extension; `signedheat.load_field` reads it."""
         save_field(self, path)
 
     def _wall_range(self) -> tuple[float, float]:
         """Least and greatest φ on the walls of the box."""
-        walls = [side for axis in range(self.grid.dimension) for side in self._walls(axis)]
-        values = np.concatenate([wall.ravel() for wall in walls])
+        values = np.concatenate([self._walls(axis).ravel() for axis in range(self.grid.dimension)])
         return float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
 
-    def _walls(self, axis: int) -> list[NDArray[np.float64]]:
-        return [self.values.take(end, axis=axis) for end in (0, -1)]
+    def _walls(self, axis: int) -> NDArray[np.float64]:
+        return self.values.take([0, -1], axis=axis)
 
     def _into_box(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         points = np.asarray(points, dtype=np.float64)
@@ -184,19 +206,20 @@ class GridField:
 
         index = ((points - self.grid.origin) / self.grid.spacing).T
         if self._known is None:
-            return map_coordinates(self.values, index, order=1, mode="nearest")
+            result: NDArray[np.float64] = map_coordinates(self.values, index, order=1, mode="nearest")
+            return result
         sums = map_coordinates(np.where(self._known, self.values, 0.0), index, order=1, mode="nearest")
         weights = map_coordinates(self._known.astype(np.float64), index, order=1, mode="nearest")
         return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
 
     @cached_property
     def _known(self) -> NDArray[np.bool_] | None:
-        """Nodes with a value, or nothing where all have one."""
+        """Nodes with a value, or None if all have one."""
         known = ~np.isnan(self.values)
         return None if known.all() else known
 
     def _slopes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Differences of the interpolant one cell apart to either side: those of the nodes, interpolated."""
+        """Central differences of the interpolant, which are those at the nodes, interpolated."""
         slopes = np.empty_like(points)
         for axis, step in enumerate(self.grid.spacing):
             ahead, behind = points.copy(), points.copy()

@@ -1,16 +1,18 @@
-"""Distance that may jump across edges."""
+"""Piecewise linear distance on a surface that may be discontinuous across edges."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization import Diagnostics
-from ..domains.curves import SurfacePoints
+from ..diagnostics import Diagnostics
+from ..domains.curves import Curve, SurfacePoints
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..geometry.components import connected_components
 from ..geometry.face_pairs import FacePairs, face_pairs
@@ -23,21 +25,21 @@ if TYPE_CHECKING:
 
 
 FAR = 3.0
-"""A cut has a jump of at least this many times the longest side of a typical triangle."""
+"""Somewhere on a cut the jump is at least this many times the longest side of a typical triangle."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """A line along edges of the surface across which a field jumps.
+    """A polyline along edges of the surface across which a field is discontinuous.
 
     Attributes
     ----------
     vertices : (k,) int
-        Vertices in order, those of `PiecewiseField.surface`; the first again at the end if the line is closed.
+        Vertices of `PiecewiseField.surface`, in order; the first is repeated at the end if the line is closed.
     points : (k, 3) float
-        Where they are.
+        Their positions.
     jumps : (k - 1, 2) float
-        How much higher the field is on one side of each edge than on the other, at the edge's two ends. Not negative.
+        Absolute difference of the field between the two sides of each edge, at the two ends of the edge.
     steps : (k - 1,) float
         Length of each edge, along the surface.
     """
@@ -49,12 +51,12 @@ class Cut:
 
     @property
     def length(self) -> float:
-        """Length of the line."""
+        """Length of the cut."""
         return float(self.steps.sum())
 
     @property
     def height(self) -> float:
-        """Mean jump along the line."""
+        """Mean jump along the cut."""
         return float(np.average(self.jumps.mean(axis=1), weights=self.steps))
 
     def __repr__(self) -> str:
@@ -63,31 +65,36 @@ class Cut:
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseField:
-    """Signed distance, linear in every triangle, that may jump from triangle to triangle.
+    """Signed distance that is linear in every triangle and may be discontinuous across edges.
 
     Attributes
     ----------
     domain : TriangleMesh, PolygonMesh or IntrinsicTriangulation
-        What distance was measured on.
+        The domain.
     surface : TriangleMesh or IntrinsicTriangulation
         Its triangles: the domain itself, or the virtual refinement of its polygons.
     values : (m, 3) float
         φ at the corners of the triangles, in the units of the vertices; NaN where no source is connected.
     triangles : IntrinsicMesh
-        The triangles as the method saw them.
+        The triangles as an intrinsic mesh.
     diagnostics : Diagnostics
-        What happened on the way; see `signedheat.piecewise_distance`.
+        Timings, diffusion time, and the notes described in `signedheat.piecewise_distance`.
     """
 
-    domain: Any
-    surface: Any
+    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation
+    surface: TriangleMesh | IntrinsicTriangulation
     values: NDArray[np.float64]
     triangles: IntrinsicMesh = field(repr=False)
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
 
+    def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
+        """(n, 3) ∇φ in the triangles that contain the points; see `__call__`."""
+        places = locate_points(self.triangles, points.faces, points.barycentric)
+        return self.face_gradients[places.faces]
+
     @property
-    def gradient(self) -> NDArray[np.float64]:
-        """(m, 3) slope of φ in each triangle, in space."""
+    def face_gradients(self) -> NDArray[np.float64]:
+        """(m, 3) ∇φ in each triangle, in space."""
         a, b, c = (self.surface.vertices[self.surface.faces[:, k]] for k in range(3))
         first, second = b - a, c - a
         rise_first, rise_second = self.values[:, 1] - self.values[:, 0], self.values[:, 2] - self.values[:, 0]
@@ -96,34 +103,37 @@ class PiecewiseField:
         area = np.where(area > 0, area, np.inf)
         along_first = (g * rise_first - f * rise_second) / area
         along_second = (e * rise_second - f * rise_first) / area
-        return along_first[:, None] * first + along_second[:, None] * second
+        result: NDArray[np.float64] = along_first[:, None] * first + along_second[:, None] * second
+        return result
 
     def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
-        """φ at points of the surface: on an edge or at a vertex, as seen from the face through which it is given.
+        """φ at points of the surface; on edges and at vertices, the value in the face through which the point is given.
 
         Raises
         ------
         SourceError
-            If a point names a face that does not exist.
+            If the face of a point does not exist.
         """
         places = locate_points(self.triangles, points.faces, points.barycentric)
-        return (self.values[places.faces] * places.barycentric).sum(axis=1)
+        result: NDArray[np.float64] = (self.values[places.faces] * places.barycentric).sum(axis=1)
+        return result
 
     @cached_property
     def jumps(self) -> NDArray[np.float64]:
-        """(p, 2) jump at both ends of the edge between each of `pairs`."""
+        """(p, 2) jump at the two ends of the edge between the faces of each of the `pairs`."""
         return self.pairs.ends(self.values)
 
     @cached_property
     def pairs(self) -> FacePairs:
-        """The triangles that meet, edge by edge."""
+        """The pairs of triangles that share an edge."""
         return face_pairs(self.triangles)
 
     @cached_property
     def is_cut(self) -> NDArray[np.bool_]:
-        """(p,) where φ jumps by more than it changes within a triangle, along lines on which it somewhere jumps by far.
+        """(p,) pairs separated by a cut.
 
-        Bad triangles err by about their size, which is no jump.
+        These are the pairs across which φ jumps by more than it changes within a triangle, on connected lines with a
+        jump of `FAR` times that somewhere. Errors in bad triangles are about their size, and no cuts.
         """
         longest = self.triangles.edge_lengths.max(axis=1)
         typical = float(np.average(longest, weights=self.triangles.face_areas))
@@ -140,7 +150,7 @@ class PiecewiseField:
 
     @cached_property
     def cut(self) -> list[Cut]:
-        """The lines across which φ jumps, longest first; none if it is continuous."""
+        """The lines across which φ is discontinuous, longest first; empty if it is continuous."""
         pairs = np.flatnonzero(self.is_cut)
         edges = self.pairs.edges[pairs]
         height = np.abs(self.jumps[pairs])
@@ -157,10 +167,10 @@ class PiecewiseField:
             lines.append(Cut(vertices, self.surface.vertices[vertices], jumps, lengths[edges[chain]]))
         return sorted(lines, key=lambda line: -line.length)
 
-    def split(self) -> VertexField:
+    def split(self) -> VertexField[TriangleMesh | PolygonMesh]:
         """The same field on a mesh whose vertices are doubled along the cut, for viewers and for contours.
 
-        Away from the cut, corners that meet take their mean. Faces keep their numbers.
+        Away from the cut, the values of all corners at a vertex are averaged. Faces keep their ids.
         """
         owner, vertices = self.glued
         count = np.bincount(owner)
@@ -170,19 +180,19 @@ class PiecewiseField:
 
     @cached_property
     def glued(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(3m,) who is who among corners that no cut parts, and the vertex at which each of them lies."""
+        """(3m,) vertex of the split mesh at each corner, and the original vertex of each vertex of the split mesh."""
         whole = ~self.is_cut
         ends = np.concatenate([self.pairs.tails[whole], self.pairs.heads[whole]])
         owner = connected_components(self.values.size, *ends.T)
         _, first = np.unique(owner, return_index=True)
         return owner, self.surface.faces.ravel()[first]
 
-    def contour(self, level: float = 0.0) -> list[Any]:
-        """The lines φ = level, as curves on the surface with higher values on their left; they end at the cut."""
+    def contour(self, level: float = 0.0) -> list[Curve]:
+        """The level set φ = level as curves on the surface, with greater values to their left; they end at the cut."""
         return self.split().contour(level)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write `split`, so that viewers show the jump; the extension says the format."""
+        """Write the field on `split`, so that viewers show the jump, in the format given by the extension."""
         self.split().save(path)
 
     def __repr__(self) -> str:
@@ -191,7 +201,7 @@ class PiecewiseField:
 
 
 def chains(edges: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
-    """Put edges in line, end to end; lines end where not exactly two edges meet.
+    """Join edges end to end into polylines, which end where not exactly two edges meet.
 
     Parameters
     ----------
@@ -201,7 +211,7 @@ def chains(edges: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np
     Returns
     -------
     list of ((j,) int, (j,) bool)
-        Edges of each line in order, and whether each is run from its first vertex to its second.
+        Edges of each polyline in order, and whether each is traversed from its first vertex to its second.
 
     Examples
     --------

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import Diagnostics
+from ..diagnostics import Diagnostics
+from ..discretization import SourceTerm
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
@@ -31,11 +31,11 @@ class TetField:
         The domain.
     values : (n_vertices,) float
         φ at the vertices, in the units of the mesh. Positive on the side that the source normals point to, so negative
-        inside a shape with outward normals. NaN on parts of the mesh that no source is connected to.
+        inside a shape with outward normals. NaN on parts of the mesh that are connected to no source.
     diagnostics : Diagnostics
-        What happened on the way.
-    source : SourceTerm
-        The source as the solver saw it.
+        Timings, diffusion time, and notes on the computation.
+    source : SourceTerm, optional
+        The lowered source, which `sharpen` needs.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class TetField:
     mesh: TetMesh
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
-    source: Any = field(default=None, repr=False)
+    source: SourceTerm | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float64)
@@ -71,9 +71,9 @@ class TetField:
         return self.mesh
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """φ at points in space: from the values at the corners of their tets, and the gradients there, to second order.
+        """φ at points in space, to second order, from values and gradients at the corners of their tets.
 
-        Outside the mesh φ continues straight from the nearest point of its boundary, along the gradient there.
+        Outside the mesh φ is extrapolated linearly from the nearest point of the boundary, along the gradient there.
 
         Parameters
         ----------
@@ -83,7 +83,7 @@ class TetField:
         Returns
         -------
         (n,) float, or one float
-            Signed distances; NaN where the nearest tet holds a vertex without a value.
+            Signed distances; NaN where the nearest tet has a vertex without a value.
         """
         points = _checked(points)
         places = points.reshape(-1, 3)
@@ -95,12 +95,13 @@ class TetField:
         if len(outside):
             slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
             values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
-        return values if points.ndim == 2 else values[0]
+        result: NDArray[np.float64] = values if points.ndim == 2 else values[0]
+        return result
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """∇φ at points in space: volume-weighted means at the vertices, interpolated.
 
-        Outside the mesh it is the gradient at the nearest point of its boundary.
+        Outside the mesh it is the gradient at the nearest point of the boundary.
 
         Parameters
         ----------
@@ -113,22 +114,28 @@ class TetField:
             Gradients; of length about 1, since φ is a distance.
         """
         corners, weights, _ = self._place(_checked(points).reshape(-1, 3))
-        return np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
+        result: NDArray[np.float64] = np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
+        return result
 
     @property
     def tet_gradients(self) -> NDArray[np.float64]:
-        """(m, 3) ∇φ on every tet, where it is constant."""
+        """(m, 3) ∇φ of the linear interpolant in every tet."""
         return self.mesh.geometry.gradients(self.values[self.mesh.tets])
 
     def contour(self, level: float = 0.0) -> TriangleMesh:
-        """The surface φ = level: closed, manifold, normals pointing to greater φ.
+        """The surface φ = level: closed, manifold, with normals pointing to greater φ.
 
-        Where the surface runs out of the mesh, it is closed along the mesh's boundary.
+        Where the surface leaves the mesh, it is closed along the boundary of the mesh.
 
         Parameters
         ----------
         level : float
-            In the units of the mesh.
+            The level, in the units of the mesh.
+
+        Returns
+        -------
+        TriangleMesh
+            The surface.
 
         Raises
         ------
@@ -138,17 +145,22 @@ class TetField:
         return TriangleMesh(*closed_level_set(self.mesh, self.values, self._vertex_gradients, level))
 
     def offset(self, distance: float) -> TriangleMesh:
-        """The surface at a signed distance from the shape: `contour`, but refused where the mesh is too small for it.
+        """The offset of the shape at a signed distance: `contour`, but refused if the mesh is too small for it.
 
         Parameters
         ----------
         distance : float
-            Positive outwards, in the units of the mesh.
+            Signed distance, positive outward, in the units of the mesh.
+
+        Returns
+        -------
+        TriangleMesh
+            As `contour`.
 
         Raises
         ------
         OutsideError
-            If φ does not take the value in the mesh, or its level set leaves the mesh although the shape does not.
+            If φ does not take the value in the mesh, or the offset leaves the mesh although the shape itself does not.
         """
         walls = self.values[np.unique(self.mesh.boundary.faces)]
         low, high = np.nanmin(walls), np.nanmax(walls)
@@ -156,8 +168,8 @@ class TetField:
         if bounded and low < distance < high:
             limit = low if low > 0 else high
             raise OutsideError(
-                f"the surface at distance {distance:g} leaves the tet mesh, which holds distances up to {limit:g}: "
-                f"use a mesh that reaches more than {abs(distance):g} beyond the shape"
+                f"the surface at distance {distance:g} leaves the tet mesh, which holds distances up to {limit:g}",
+                remedy=f"use a mesh that reaches more than {abs(distance):g} beyond the shape",
             )
         return self.contour(distance)
 
@@ -179,16 +191,19 @@ class TetField:
         return np.where(total[:, None] > 0, sums / np.where(total > 0, total, 1)[:, None], np.nan)
 
     @cached_property
-    def _planes(self) -> Any:
+    def _planes(self) -> Planes:
         return Planes.of(self.mesh)
 
     @cached_property
-    def _wall_tree(self) -> Any:
+    def _wall_tree(self) -> BoxTree:
         corners = self.mesh.vertices[self.mesh.boundary.faces]
         return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
     def _place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Vertices and weights that interpolate at each point or the nearest on the boundary, and the way from it."""
+        """(k, 4) vertices and weights that interpolate at each point, or at the closest point of the mesh, and offsets.
+
+        The offset is the vector (k, 3) from the closest point of the mesh to the point, zero inside the mesh.
+        """
         tets = containing_tets(self.mesh, self._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
         corners = np.zeros((len(points), 4), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""From the unknowns of a discretisation to the field that users see, one function for each kind of discretisation."""
+"""From the unknowns of a discretisation to a field on its domain, one function for each kind of discretisation."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization import Diagnostics
-from ..errors import UnreachedWarning, warn_user
+from ..diagnostics import Diagnostics, SampledSource, TetsTurned
+from ..errors import UnreachedWarning, UnsupportedTypeError, warn_user
 from ..lowering.grid.discretization import GridDiscretization
 from ..lowering.grid.masked import MaskedGridDiscretization
 from ..lowering.grid.masked_source import MaskedSource
@@ -23,21 +23,21 @@ from .grid_field import GridField
 from .tet_field import TetField
 from .vertex_field import VertexField
 
+Field = GridField | VertexField | TetField
+"""What a solver returns."""
+
 
 @singledispatch
-def to_field(
-    discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics
-) -> GridField | VertexField | TetField:
-    """The field whose values a discretisation found, with what it has to tell added to the diagnostics."""
-    raise TypeError(f"no field is known for {type(discretization).__name__}")
+def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> Field:
+    """The field with the values of a discretisation's unknowns, and with its notes added to the diagnostics."""
+    raise UnsupportedTypeError(f"no field is known for {type(discretization).__name__}")
 
 
 @to_field.register
 def _(
     discretization: GridDiscretization, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics
 ) -> GridField:
-    notes = {**diagnostics.notes, **_sampled(source)}
-    return GridField(discretization.grid, values, replace(diagnostics, notes=notes))
+    return GridField(discretization.grid, values, diagnostics.noting(_sampled(source)))
 
 
 @to_field.register
@@ -58,8 +58,8 @@ def _(
             "distance there is NaN",
             UnreachedWarning,
         )
-    notes = {**diagnostics.notes, **_sampled(source.whole)}
-    return GridField(grid, everywhere.reshape(grid.shape), replace(diagnostics, unreached=unreached, notes=notes))
+    told = replace(diagnostics, unreached=unreached).noting(_sampled(source.whole))
+    return GridField(grid, everywhere.reshape(grid.shape), told)
 
 
 @to_field.register
@@ -69,7 +69,7 @@ def _(
     source: SurfaceSource,
     diagnostics: Diagnostics,
 ) -> VertexField:
-    """φ at the vertices of the domain; NaN where nothing was diffused, beyond single vertices for instance."""
+    """φ at the vertices of the domain; NaN where diffusion did not reach, such as behind a single shared vertex."""
     values = np.where(discretization.reached_by(source.vectors), values, np.nan)
     if discretization.restriction is not None:
         values = values[discretization.restriction]
@@ -80,8 +80,8 @@ def _(
             f"{unreached[0]}: distance there is NaN. Put a source on every part, or join the parts",
             UnreachedWarning,
         )
-    notes = {**diagnostics.notes, **discretization.notes}
-    return VertexField(discretization.domain, values, replace(diagnostics, unreached=unreached, notes=notes), source)
+    told = replace(diagnostics, unreached=unreached).noting(*discretization.notes)
+    return VertexField(discretization.domain, values, told, source)
 
 
 @to_field.register
@@ -97,15 +97,10 @@ def _(
             "any source through faces: the distance there is NaN",
             UnreachedWarning,
         )
-    notes = {**diagnostics.notes, **source.notes}
-    if len(mesh.reoriented):
-        notes["tets turned"] = len(mesh.reoriented)
-    return TetField(mesh, at_vertices, replace(diagnostics, unreached=unreached, notes=notes), source)
+    turned = (TetsTurned(len(mesh.reoriented)),) if len(mesh.reoriented) else ()
+    told = replace(diagnostics, unreached=unreached).noting(*source.notes, *turned)
+    return TetField(mesh, at_vertices, told, source)
 
 
-def _sampled(source: GridSource) -> dict[str, float]:
-    return {
-        "samples": len(source.weights),
-        "area outside the grid": source.samples.outside,
-        "area that cancels": source.samples.cancelled,
-    }
+def _sampled(source: GridSource) -> SampledSource:
+    return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)

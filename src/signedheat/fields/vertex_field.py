@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Generic, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..discretization import Diagnostics
+from ..diagnostics import Diagnostics
+from ..discretization import SourceTerm
 from ..domains.curves import Curve, SurfacePoints
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..domains.kinds import EmbeddedSurface, SurfaceDomain
 from ..domains.projection import closest_points
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_rows
 from ..errors import OutsideError
 from .files import save_field
 
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    Surface = TypeVar("Surface", bound=SurfaceDomain, default=SurfaceDomain, covariant=True)
+else:
+    from typing import TypeVar
+
+    Surface = TypeVar("Surface", bound=SurfaceDomain, covariant=True)
+
+Embedded = TypeVar("Embedded", bound=EmbeddedSurface)
+
 
 @dataclass(frozen=True, eq=False)
-class VertexField:
-    """A scalar at every vertex of a surface.
+class VertexField(Generic[Surface]):
+    """Signed distance at the vertices of a surface, linear on its triangles.
 
     Attributes
     ----------
@@ -30,9 +44,9 @@ class VertexField:
     values : (n_vertices,) float
         φ, in the units of the vertices; NaN where no source is connected.
     diagnostics : Diagnostics
-        What happened on the way.
-    source : SourceTerm
-        The source as the solver saw it.
+        Timings, diffusion time, and notes on the computation.
+    source : SourceTerm, optional
+        The lowered source, which `sharpen` needs.
 
     Examples
     --------
@@ -47,10 +61,10 @@ class VertexField:
     [Curve(3 points, open, oriented)]
     """
 
-    domain: Any
+    domain: Surface
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
-    source: Any = field(default=None, repr=False)
+    source: SourceTerm | None = field(default=None, repr=False)
 
     def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
         """φ at points of the surface, linear between vertices.
@@ -58,27 +72,29 @@ class VertexField:
         Parameters
         ----------
         points : SurfacePoints, Curve or (n, 3) float
-            Where; for positions in space, the closest points of the surface count.
+            Points on the surface, or positions in space, for which the closest points of the surface are taken.
 
         Returns
         -------
         (n,) float
+            Signed distances.
         """
         mesh, values, faces, weights = self._at(points)
-        return np.einsum("ik,ik->i", weights, values[mesh.faces[faces]])
+        result: NDArray[np.float64] = np.einsum("ik,ik->i", weights, values[mesh.faces[faces]])
+        return result
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) ∇φ in the faces that points lie in; see `__call__`."""
+        """(n, 3) ∇φ in the faces of points; for `points` see `__call__`."""
         _, _, faces, _ = self._at(points)
         return self.face_gradients[faces]
 
     @cached_property
     def face_gradients(self) -> NDArray[np.float64]:
-        """(m, 3) ∇φ on the faces of the domain's triangulation; of length 1 wherever φ is a distance.
+        """(m, 3) ∇φ on the faces of the domain's triangulation, in space; of length about 1, since φ is a distance.
 
-        Degenerate faces have no gradient: theirs is zero.
+        Zero on degenerate faces.
         """
-        field = self.restrict()
+        field = self._embedded
         mesh = field.domain.triangulation
         rise = field.domain.on_triangulation(field.values)[mesh.faces]
         corners = mesh.vertices[mesh.faces]
@@ -87,37 +103,40 @@ class VertexField:
         square = np.einsum("ij,ij->i", doubled, doubled)
         turned = np.cross(doubled[:, None], opposite)
         sums = np.einsum("ik,ikj->ij", rise, turned)
-        return sums / np.where(square > 0, square, np.inf)[:, None]
+        result: NDArray[np.float64] = sums / np.where(square > 0, square, np.inf)[:, None]
+        return result
 
     def contour(self, level: float = 0.0) -> list[Curve]:
-        """Where φ takes a value.
+        """The level set φ = level, as curves on the surface.
 
         Parameters
         ----------
         level : float
-            The value.
+            The level, in the units of the vertices.
 
         Returns
         -------
         list of Curve
-            One for each connected line, closed where it closes; φ grows to its left.
+            One for each connected component, open or closed; greater φ is to its left.
 
         Raises
         ------
         OutsideError
-            If φ takes the value nowhere.
+            If φ does not take the level.
         """
-        field = self.restrict()
+        field = self._embedded
         known = field.values[np.isfinite(field.values)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
         if not low <= level <= high:
             raise OutsideError(
-                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}; choose a level between"
+                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}; choose a level between",
+                element=f"level {level:g}",
             )
-        return field.domain.level_set(field.values, level)
+        result: list[Curve] = field.domain.level_set(field.values, level)
+        return result
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the surface with φ at its vertices; the extension says the format.
+        """Write the surface with φ at its vertices, in the format given by the extension.
 
         ``.ply`` and ``.vtp`` have a property ``signed_distance`` per vertex, ``.obj`` a texture coordinate,
         ``.npz`` the arrays ``values``, ``vertices`` and ``faces``.
@@ -125,24 +144,34 @@ class VertexField:
         Parameters
         ----------
         path : str or path
-            Where to. Written under a temporary name and then renamed: a file that was there before survives a failure.
+            The file. It is written under a temporary name and renamed, so that an existing file survives a failure.
 
         Raises
         ------
         FileFormatError
             If the format is unknown or the file cannot be written.
         """
-        save_field(self.restrict(), path)
+        save_field(self._embedded, path)
 
-    def restrict(self) -> VertexField:
+    @overload
+    def restrict(self: VertexField[IntrinsicTriangulation]) -> VertexField[TriangleMesh]: ...
+    @overload
+    def restrict(self: VertexField[Embedded]) -> VertexField[Embedded]: ...
+    def restrict(self) -> VertexField[EmbeddedSurface]:
         """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself."""
-        mesh = getattr(self.domain, "mesh", self.domain)
-        return self if mesh is self.domain else replace(self, domain=mesh, values=self.values[: mesh.n_vertices])
+        return self._embedded
+
+    @property
+    def _embedded(self) -> VertexField[EmbeddedSurface]:
+        if isinstance(self.domain, IntrinsicTriangulation):
+            mesh = self.domain.mesh
+            return VertexField(mesh, self.values[: mesh.n_vertices], self.diagnostics, self.source)
+        return cast("VertexField[EmbeddedSurface]", self)
 
     def _at(
         self, points: Curve | SurfacePoints | ArrayLike
     ) -> tuple[TriangleMesh, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-        field = self.restrict()
+        field = self._embedded
         mesh = field.domain.triangulation
         values = field.domain.on_triangulation(field.values)
         if isinstance(points, (Curve, SurfacePoints)):
@@ -150,7 +179,9 @@ class VertexField:
             if len(outside):
                 raise OutsideError(
                     f"point {outside[0]} lies in face {points.faces[outside[0]]}, but face ids go from 0 to "
-                    f"{mesh.n_faces - 1}: was it made for another surface?"
+                    f"{mesh.n_faces - 1}",
+                    remedy="make it for this surface",
+                    element=f"point {outside[0]}",
                 )
             return mesh, values, points.faces, points.barycentric
         faces, weights, _ = closest_points(mesh, finite_rows(points, "points", 3))

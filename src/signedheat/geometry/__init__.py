@@ -1,1 +1,1 @@
-"""Arrays in, arrays out: edges, intrinsic meshes, surface points, closest points, level sets. No domain, no solver."""
+"""Geometry of plain arrays: edges, intrinsic meshes, surface points, closest points, level sets; no domains."""

@@ -1,4 +1,4 @@
-"""A tree of boxes, to find what is near a point or crosses a triangle."""
+"""A bounding volume hierarchy: a tree of axis-aligned boxes, for closest-point and intersection queries."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class BoxTree:
     Attributes
     ----------
     bounds : (2 · leaves, 6) float
-        Lower and upper corner of what lies below each node; an empty node has lower > upper.
+        Lower and upper corner of the box around everything below each node; an empty node has lower > upper.
     items : (leaves · LEAF,) int
         Boxes in each leaf, −1 where there are none.
     """
@@ -28,7 +28,7 @@ class BoxTree:
 
     @classmethod
     def of(cls, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> BoxTree:
-        """Build the tree of (n, 3) lower and upper corners, in time n log n.
+        """Build the tree over boxes given by (n, 3) lower and (n, 3) upper corners, in O(n log n) time.
 
         Examples
         --------
@@ -55,7 +55,7 @@ class BoxTree:
 
 
 def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """(n,) position of (n, 3) points along a space-filling curve, 21 bits per axis."""
+    """(n,) Morton codes of (n, 3) points: their positions along a space-filling curve, with 21 bits per axis."""
     lower = points.min(axis=0)
     extent = max(float((points.max(axis=0) - lower).max()), 1e-290)
     cells = ((points - lower) * ((2**21 - 1) / extent)).astype(np.uint64)
@@ -66,7 +66,7 @@ def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
 
 
 def _spread(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """The 21 low bits of x, three apart."""
+    """The 21 low bits of x, spread so that each is followed by two zero bits."""
     for shift, mask in (
         (32, 0x1F00000000FFFF),
         (16, 0x1F0000FF0000FF),

@@ -9,7 +9,7 @@ from ..compiled import compiled
 
 
 def same_positions(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n,) id of the first vertex at the same position.
+    """(n,) id of the first vertex at exactly the same position as each vertex.
 
     Examples
     --------

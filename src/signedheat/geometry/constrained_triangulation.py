@@ -1,4 +1,4 @@
-"""Cut one triangle along straight segments: a small constrained triangulation of points in the plane."""
+"""A constrained triangulation of one triangle: points inside it, and straight segments that must become edges."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def turn(a: Point, b: Point, c: Point) -> float:
 
 
 def arrange(points: list[Point], segments: Sequence[tuple[int, int]]) -> list[list[int]]:
-    """Cut segments where they cross or pass through points; crossings are appended to `points`.
+    """Subdivide segments where they cross each other or pass through points.
 
-    Returns the chain of points along each segment, from its start to its end.
+    Crossings are appended to `points`. Returns the points along each segment, from its start to its end.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def cells_along(p: Point, q: Point, size: float) -> list[Cell]:
 def triangulate(
     points: Sequence[Point], sides: Sequence[Sequence[int]], segments: Sequence[tuple[int, int]]
 ) -> list[tuple[int, int, int]]:
-    """Triangles between points in a triangle such that no segment crosses one of them.
+    """Triangulate points in a triangle so that every given segment is an edge.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def triangulate(
     sides : three sequences of int
         Points on each side, from its tail to its head, without the corners.
     segments : sequence of pairs
-        They meet only at points and have none inside them.
+        Pairs of points. Segments meet at points only, and no point lies in the interior of one.
 
     Examples
     --------
@@ -181,7 +181,7 @@ def triangulate(
 
 
 def rotated(u: int, v: int, w: int) -> tuple[int, int, int]:
-    """A triangle told from its least corner on."""
+    """The corners of a triangle in the same cyclic order, the smallest id first."""
     return min((u, v, w), (v, w, u), (w, u, v))
 
 

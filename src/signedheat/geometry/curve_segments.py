@@ -1,4 +1,4 @@
-"""Curves and points as a set of triangles sees them: straight segments in faces and along edges, and their ends."""
+"""Curves and points on an intrinsic mesh: straight segments inside faces and along edges, and their end points."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from .surface_points import EDGE, VERTEX, LocatedPoints, incident_faces
 
 @dataclass(frozen=True, eq=False)
 class CurveSegments:
-    """One source in segments.
+    """One source as straight segments, each of which lies in one face or along one edge.
 
     Attributes
     ----------
     nodes : LocatedPoints
         (s,) distinct points of the source, in order of first appearance.
     ends : (k, 2) int
-        The nodes that each piece joins; none for isolated points.
+        The nodes that each segment joins; no segments for isolated points.
     faces : (k,) int
-        A face that has the piece.
+        A face that contains the segment.
     edges : (k,) int
-        The edge that the piece runs along, or −1 for a piece inside its face.
+        The edge that the segment runs along, or −1 for a segment inside its face.
     vectors : (k,) complex
-        Direction in which φ grows, times length; in the layout of the face, or in the frame of the edge.
+        Normal times length: the direction in which φ grows, in the layout of the face, or in the frame of the edge.
     oriented : bool
-        Whether the two sides differ.
+        Whether the curve has a positive and a negative side.
     """
 
     nodes: LocatedPoints
@@ -43,12 +43,12 @@ class CurveSegments:
 
     @cached_property
     def lengths(self) -> NDArray[np.float64]:
-        """(k,) length of each piece."""
+        """(k,) length of each segment."""
         return np.abs(self.vectors)
 
     @property
     def is_conforming(self) -> bool:
-        """Whether the triangles can hold it: all but unoriented curves that leave the edges."""
+        """Whether the triangles can represent it as they are: all but unoriented curves that cross faces."""
         return self.oriented or bool((self.nodes.kinds[self.ends] == VERTEX).all() and (self.edges >= 0).all())
 
 
@@ -62,7 +62,8 @@ def given_directions(
 ) -> NDArray[np.complex128]:
     """(k,) unit vectors along given normals: in the layout of the face, or in the frame of the edge.
 
-    On an edge, each of its faces sees the normal in its own plane; their mean in the edge's frame counts.
+    On an edge the normal is projected into the plane of each of the edge's faces; the mean of these projections,
+    expressed in the frame of the edge, is used.
     """
     inside = np.flatnonzero(edges < 0)
     directions = np.zeros(len(faces), dtype=np.complex128)
@@ -82,8 +83,9 @@ def given_directions(
     flat = np.flatnonzero(length <= 1e-6 * scale)
     if len(flat):
         raise SourceError(
-            f"{name}: the normal {normals[flat[0]].tolist()} at face {faces[flat[0]]} does not lie along the surface: "
-            "give the direction, tangent to the surface, in which the distance grows"
+            f"{name}: the normal {normals[flat[0]].tolist()} at face {faces[flat[0]]} does not lie along the surface",
+            remedy="give the direction, tangent to the surface, in which the distance grows",
+            element=f"face {faces[flat[0]]}",
         )
     return directions / length
 
@@ -94,7 +96,7 @@ def in_layout(
     faces: NDArray[np.int64],
     vectors: NDArray[np.float64],
 ) -> NDArray[np.complex128]:
-    """(k,) vectors in space as their faces see them, in layout coordinates."""
+    """(k,) vectors in space projected into the planes of their faces, in layout coordinates."""
     of_faces = positions[faces] if positions.ndim == 3 else positions[triangles.corner_vertices[faces]]
     a, b, c = of_faces.transpose(1, 0, 2)
     first = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
@@ -107,7 +109,7 @@ def in_layout(
 
 
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
-    """(n, n_vertices) sparse: values at vertices → values at points."""
+    """(n, n_vertices) sparse: from values at vertices to values at points. The rows of A in Eq. 14."""
     weights = located.barycentric
     index = np.repeat(np.arange(len(located)), 3).reshape(-1, 3)
     used = weights > 0

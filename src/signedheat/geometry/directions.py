@@ -1,4 +1,4 @@
-"""Directions of vectors, however long or short they are."""
+"""Unit vectors, without underflow or overflow."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def unit(vectors: NDArray[Any]) -> NDArray[Any]:
     array([0.6+0.8j])
     """
     if np.iscomplexobj(vectors):
-        length = np.abs(vectors)  # NumPy's, too, neither overflows nor underflows on the way
+        length = np.abs(vectors)  # np.abs of complex numbers neither overflows nor underflows
         return vectors / np.where(length > 0, length, 1)
     result = np.empty_like(vectors)
     for block in _blocks(vectors.shape):
@@ -35,7 +35,7 @@ def unit(vectors: NDArray[Any]) -> NDArray[Any]:
 
 
 def _blocks(shape: tuple[int, ...], size: int = 2**16) -> list[Any]:
-    """Slices of the leading axes into blocks of about `size` vectors, which stay in the cache."""
+    """Slices of the first axes that make blocks of about `size` vectors, small enough for the processor's cache."""
     if len(shape) == 1 or np.prod(shape[:-1]) <= size:
         return [...]
     inner = int(np.prod(shape[1:-1], dtype=np.int64))

@@ -13,7 +13,7 @@ from .triangle_kernels import find_edges
 
 @dataclass(frozen=True, eq=False)
 class EdgeTable:
-    """Edges and how the faces run along them.
+    """Edges, and how faces and edges are incident.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class EdgeTable:
         return result
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Order that suits unknowns at edges, from a fill-reducing order of the vertices.
+        """Fill-reducing order of unknowns at edges, from one of the vertices: ``order[k]`` is eliminated k-th.
 
-        An edge goes with its end that is eliminated first. Edges from two parts that a set of vertices separates never
-        share a face, so the edges within that set separate them just as well: the order dissects edges as it does
-        vertices, for a fraction of the cost of finding one anew.
+        An edge is eliminated with its first eliminated end. Where a set of vertices separates two parts of the mesh, no
+        edge of one part shares a face with an edge of the other, so the edges within that set separate them too: the
+        order is a nested dissection of the edges, for a fraction of the cost of finding one anew.
         """
         rank = np.empty(len(vertex_order), dtype=np.int64)
         rank[vertex_order] = np.arange(len(vertex_order))
@@ -56,7 +56,7 @@ class EdgeTable:
 def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face).
 
-    Grows with the number of faces; a vertex that all faces share does no harm.
+    Time is linear in the number of faces, even if all of them share a vertex.
 
     Examples
     --------

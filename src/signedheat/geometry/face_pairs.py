@@ -14,21 +14,21 @@ from .intrinsic_mesh import IntrinsicMesh
 class FacePairs:
     """Pairs of faces that meet at an edge.
 
-    The faces round an edge of three or more are paired each with the next, round and round, and each pair counts half:
-    to part one face from all others then costs as much as to part two.
+    Around an edge with three or more faces each is paired with the next, cyclically, and each pair has weight ½:
+    separating one face from all others then costs as much as separating two faces at a manifold edge.
 
     Attributes
     ----------
     faces : (p, 2) int
         The two faces.
     sides : (p, 2) int
-        Which of its sides each face has there; side k runs from corner k to corner k + 1.
+        Local index of the edge in each of the two faces; side k runs from corner k to corner k + 1.
     edges : (p,) int
         The edge.
     tails, heads : (p, 2) int
-        In each face the corner at the edge's tail, and the one at its head; as index into raveled (m, 3) corners.
+        In each face the corner at the edge's tail, and the one at its head, as an index into raveled (m, 3) corners.
     shares : (p,) float
-        1, or ½ where three or more faces meet.
+        Weight of each pair: 1, or ½ where three or more faces meet.
     """
 
     faces: NDArray[np.int64]
@@ -39,7 +39,10 @@ class FacePairs:
     shares: NDArray[np.float64]
 
     def ends(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(p, 2) difference, first face less second, of (m, 3) corner values at the edge's tail and at its head."""
+        """(p, 2) difference, first face less second, of (m, 3) corner values at the edge's tail and at its head.
+
+        Of the values that a face field Y integrates to, the two differ by the edge's length times its curl (Eq. 15).
+        """
         flat = corner_values.ravel()
         at_tail, at_head = flat[self.tails], flat[self.heads]
         return np.stack([at_tail[:, 0] - at_tail[:, 1], at_head[:, 0] - at_head[:, 1]], axis=1)

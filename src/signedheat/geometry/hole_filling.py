@@ -1,4 +1,4 @@
-"""Small holes in a mesh of triangles, filled."""
+"""Fill small holes in a triangle mesh."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def hole_fillings(
 ) -> NDArray[np.int64]:
     """Triangles that fill holes of at most `MOST_SIDES` sides.
 
-    A boundary loop is a hole if it encloses what lies on its far side: an outer boundary, however short, stays. Ears of
-    least circumradius are cut off first; none makes an edge that exists.
+    A boundary loop is a hole if the faces lie outside it: an outer boundary, however short, is left open. Ears of least
+    circumradius are cut off first; an ear that would make an edge that exists already is not.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def hole_fillings(
 def next_around_gap(
     points: NDArray[np.float64], normals: NDArray[np.float64], tails: NDArray[np.int64], heads: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """(b,) boundary edge that follows each one across the gap beside it, or −1.
+    """(b,) boundary edge that follows each one around the gap to its right, or −1.
 
-    Where several leave a vertex, it is the first counter-clockwise from the way back: faces lie to the left.
+    Where several leave its head, it is the first one counter-clockwise from the reversed edge: faces lie to the left.
     """
     leaving = np.argsort(tails, kind="stable")
     begin = np.searchsorted(tails[leaving], heads)
@@ -74,14 +74,14 @@ def next_around_gap(
 
 
 def _touching(edges: NDArray[np.int64], vertices: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(e,) edges both of whose ends are among the vertices."""
+    """(e,) edges whose two ends are both among the vertices."""
     marked = np.zeros(int(edges.max(initial=0)) + 1, dtype=bool)
     marked[vertices] = True
     return marked[edges].all(axis=1)
 
 
 def _loop_from(start: int, following: NDArray[np.int64]) -> list[int]:
-    """Boundary edges from one round to itself again, or nothing if they lead elsewhere."""
+    """The boundary edges of the loop through one of them; empty if they do not close."""
     loop = [start]
     while len(loop) <= MOST_SIDES:
         onward = int(following[loop[-1]])
@@ -96,9 +96,9 @@ def _loop_from(start: int, following: NDArray[np.int64]) -> list[int]:
 def _ears(
     points: NDArray[np.float64], normals: NDArray[np.float64], loop: list[int], known: set[tuple[int, int]]
 ) -> list[tuple[int, int, int]]:
-    """Triangles that fill a loop of vertices, counter-clockwise round the hole; none if it is no hole.
+    """Triangles that fill a loop of vertices, counter-clockwise around the hole; none if it is not a hole.
 
-    Edges that they make are added to those known.
+    Edges of the new triangles are added to `known`.
     """
     if len(set(loop)) < max(len(loop), 3):
         return []

@@ -1,8 +1,8 @@
-"""Intrinsic mesh: all that the surface method knows of a surface.
+"""Intrinsic mesh: all that the surface method needs to know of a surface.
 
-Per face three vertex ids, three edge ids and the corners laid out in the plane as complex numbers. A triangle
-mesh, a virtually refined polygon mesh, a digital surface with corrected normals, an intrinsic triangulation and a
-point cloud's local triangulations are each such a set.
+Per face three vertex ids, three edge ids, and the three corners laid out in the plane as complex numbers. Triangle
+meshes, polygon meshes after virtual refinement, digital surfaces with corrected normals, intrinsic triangulations and
+the local triangulations of point clouds are all represented in this way.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Index = NDArray[np.int64] | slice
 
 @dataclass(frozen=True, eq=False)
 class IntrinsicMesh:
-    """Triangles known by their vertices, their edges and their shapes alone.
+    """Triangles given by their vertices, their edges and their shapes alone, without positions in space.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class IntrinsicMesh:
     n_vertices : int
         Number of vertices, used or not.
     leading_sides : (e,) int, optional
-        Side 3 f + k of each edge whose face f counts as the edge's first; by default that of the lowest number.
+        Halfedge 3 f + k of each edge whose face f counts as the first face of the edge; by default the lowest face.
     """
 
     corner_vertices: NDArray[np.int64]
@@ -118,15 +118,20 @@ class IntrinsicMesh:
 
     @cached_property
     def edge_directions(self) -> NDArray[np.complex128]:
-        """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout."""
+        """(m, 3) z_fe: unit vector of edge k, tail to head, in the face's layout.
+
+        Two edges e, g of a face differ by the rotation ``conj(z_fe) z_fg``, which is r of Eq. 8.
+        """
         return np.where(self.edges.forward, 1.0, -1.0) * self.edge_vectors / self.edge_lengths
 
     @cached_property
     def reflected(self) -> NDArray[np.bool_]:
-        """(m, 3) where the frame of edge k acts on the face with a conjugation.
+        """(m, 3) where the frame of edge k is a reflection, not a rotation, of the layout of the face.
 
-        The frame's second axis points into the first face of the edge and out of all others; a quarter turn from the
-        edge's direction points into the faces that run along it in that direction, and out of the others.
+        The second axis of an edge's frame points into the first face of the edge and out of all others. The direction
+        of the edge, turned by 90° in a face, points into the faces that run along the edge in its direction and out of
+        the others. Where the two disagree, vectors are conjugated between frame and layout. On a consistently oriented
+        manifold mesh they never do.
         """
         is_first = np.zeros(3 * self.n_faces, dtype=bool)
         is_first[self.first_halfedges] = True
@@ -134,7 +139,7 @@ class IntrinsicMesh:
 
     @cached_property
     def first_halfedges(self) -> NDArray[np.int64]:
-        """(k,) side 3 f + j of the first face of every edge that has one."""
+        """(k,) halfedge 3 f + j in the first face of every edge that has a face."""
         if self.leading_sides is not None:
             return self.leading_sides
         first = np.full(self.n_edges, -1, dtype=np.int64)
@@ -175,6 +180,6 @@ class IntrinsicMesh:
         return self.edge_directions[faces] * np.where(self.reflected[faces], np.conj(of_face), of_face)
 
     def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """(m,) sum of the vectors of an (e,) edge array at the three edges of each face, in its layout."""
+        """(m,) sum of the vectors at the three edges of each face, in its layout: three times the average of Sec. 6."""
         vectors = np.ascontiguousarray(vectors)
         return gather(self.edges.face_edges, self.edge_directions, self.reflected, vectors)

@@ -1,4 +1,4 @@
-"""Loops of the local triangulations of point clouds, compiled."""
+"""Kernels of the local triangulations of point clouds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled, prange
 
 MAX_SIDES = 64
-TOUCHING = 1e-7  # radians by which sectors may overlap
+TOUCHING = 1e-7  # radians by which the sectors of two triangles at a corner may overlap
 
 
 @compiled(parallel=True)
@@ -53,7 +53,7 @@ def voronoi_fans(
             if square > 4 * farthest or square < 1e-24 * r * r:
                 continue
             half = 0.5 * square
-            slack = 1e-9 * half  # a bisector that only touches a corner does not cut
+            slack = 1e-9 * half  # a bisector that only touches a corner of the cell does not cut it
             cut = False
             for c in range(m):
                 cut = cut or corner[c, 0] * px + corner[c, 1] * py > half + slack
@@ -85,7 +85,7 @@ def voronoi_fans(
 def accept_apart(
     triangles: NDArray[np.int64], starts: NDArray[np.float64], widths: NDArray[np.float64], n_points: int
 ) -> NDArray[np.bool_]:
-    """(m,) triangles whose sector overlaps no earlier accepted one at any of their three corners.
+    """(m,) triangles whose sector overlaps that of no triangle accepted earlier, at any of their three corners.
 
     At corner k of triangle f the sector goes from angle ``starts[f, k]`` counter-clockwise by ``widths[f, k]``.
     """
@@ -117,7 +117,7 @@ def accept_apart(
 def signs_from_parents(
     order: NDArray[np.int64], parents: NDArray[np.int64], relative: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """(n,) sign of each node: that of its parent, which comes earlier in the order, times its own relative to it."""
+    """(n,) sign of each node: the sign of its parent, which is earlier in the order, times its sign relative to it."""
     signs = np.ones(len(parents), dtype=np.int64)
     for node in order:
         if parents[node] >= 0:

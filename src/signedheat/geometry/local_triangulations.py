@@ -1,9 +1,9 @@
-"""A point cloud as triangles: local Delaunay triangulations in tangent planes, glued by agreement.
+"""Triangulation of a point cloud: local Delaunay triangulations in tangent planes, reconciled by votes.
 
 Every point triangulates its neighbours in its own tangent plane (as for the Laplacian of Sharp & Crane 2020) and
-offers the triangles around itself. Where the points agree, three corners offer the same triangle; where they do not,
-triangles that more corners offer, and then rounder ones, come first, and none is accepted that overlaps another around
-one of its corners. The result is a mesh whose edges have at most two faces each.
+proposes the triangles around itself. A triangle has one vote for each of its corners that proposes it. Triangles are
+accepted in order of votes, then of roundness, unless they overlap an accepted one around one of their corners. The
+result is a mesh with at most two faces at every edge.
 """
 
 from __future__ import annotations
@@ -41,21 +41,21 @@ class LocalTriangulations:
 def local_triangulations(
     points: NDArray[np.float64], normals: NDArray[np.float64] | None = None, n_neighbors: int = 30
 ) -> LocalTriangulations:
-    """Triangulate points on an unknown surface.
+    """Triangulate points sampled from an unknown surface, in O(n log n) time.
 
     Parameters
     ----------
     points : (n, 3) float
         Distinct points.
     normals : (n, 3) float, optional
-        Unit normals, of which only the side counts: the faces are oriented alike by themselves, each connected part to
-        the side to which most of its normals point, or else outward.
+        Unit normals, used for the orientation only. Faces are first oriented consistently; each connected component is
+        then turned to the side to which most of its normals point, or outward if there are none.
     n_neighbors : int
         Size of the neighbourhoods. No triangle has a circumradius beyond the distance to the last neighbour.
 
     Notes
     -----
-    Growth is n log n. Small holes that disagreement leaves are filled.
+    Small holes that are left where the local triangulations disagree are filled.
 
     Examples
     --------
@@ -78,9 +78,9 @@ def local_triangulations(
 def tangent_planes(
     points: NDArray[np.float64], n_neighbors: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-    """Axes (n, 3, 3) of each point's tangent plane, its normal last; neighbours (n, k); distance (n,) to the last.
+    """Axes (n, 3, 3) of each point's tangent plane, the normal last; neighbours (n, k); distance (n,) to the last.
 
-    Normals that come with scans are often those of a mesh that is gone: planes fitted to neighbours agree better.
+    Planes are fitted to the neighbours: normals that come with scans often belong to another mesh, and fit worse.
     """
     from scipy.spatial import cKDTree
 
@@ -98,7 +98,7 @@ def tangent_planes(
 
 
 def principal_axes(offsets: NDArray[np.float64], distances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3, 3) principal axes of each row of points, widest first; near points count more."""
+    """(n, 3, 3) principal axes of each row of offsets, longest first; near points have more weight."""
     weights = np.exp(-((2 * distances / distances[:, -1:]) ** 2))[..., None]
     offsets = offsets - (weights * offsets).sum(axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
     covariance = (weights * offsets).transpose(0, 2, 1) @ offsets
@@ -109,7 +109,7 @@ def principal_axes(offsets: NDArray[np.float64], distances: NDArray[np.float64])
 def offers(
     points: NDArray[np.float64], axes: NDArray[np.float64], neighbors: NDArray[np.int64], reach: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Triangles (m, 3) of all fans, each once, corners in increasing order; how many of its corners offer each."""
+    """(m, 3) triangles of all local triangulations, each once, corners in increasing order; (m,) votes for each."""
     triangles = []
     for begin in range(0, len(points), _CHUNK):
         chunk = slice(begin, begin + _CHUNK)
@@ -134,7 +134,7 @@ def offers(
 def plausible(
     points: NDArray[np.float64], triangles: NDArray[np.int64], votes: NDArray[np.int64], reach: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Triangles with area whose circumradius is within the reach of all their corners, with it."""
+    """Triangles with area whose circumradius is within the reach of all their corners; their votes, and the radii."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     u, v, w = b - a, c - b, a - c
     twice_area = np.linalg.norm(np.cross(u, w), axis=1)
@@ -146,9 +146,9 @@ def plausible(
 
 
 def agreed(points: NDArray[np.float64], axes: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The triangles that overlap no other around any of their corners, first come, first served.
+    """The triangles, in the given order, that overlap no earlier one around any of their corners.
 
-    Overlap is told by the sector that a triangle takes up in the tangent plane of its corner.
+    Two triangles overlap if the sectors that they occupy in the tangent plane of a common corner do.
     """
     starts, widths = np.empty(triangles.shape), np.empty(triangles.shape)
     for k in range(3):
@@ -168,10 +168,10 @@ def aligned(
     faces: NDArray[np.int64],
     given: NDArray[np.float64] | None,
 ) -> NDArray[np.int64]:
-    """(n,) signs that make normals agree along a minimum spanning tree of the edges (Hoppe et al. 1992).
+    """(n,) signs that make normals consistent along a minimum spanning tree of the edges (Hoppe et al. 1992).
 
-    Each connected part then points where most of its given normals do, or else outward: the side on which its volume,
-    seen from its centroid, is positive.
+    Each connected component is then turned to the side to which most of its given normals point, or outward: so that
+    its volume, computed from its centroid, is positive.
     """
     n = len(points)
     tail, head = edge_table(faces).vertices.T
@@ -203,7 +203,7 @@ def aligned(
 
 
 def facing(points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The faces, turned so that they run counter-clockwise seen from the side to which their corners' normals point."""
+    """The faces, turned to be counter-clockwise as seen from the side to which the normals of their corners point."""
     a, b, c = points[faces].transpose(1, 0, 2)
     against = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0
     return np.where(against[:, None], faces[:, [0, 2, 1]], faces)

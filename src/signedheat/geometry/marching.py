@@ -1,4 +1,4 @@
-"""Level sets on grids: surfaces fit for machines that want them closed and manifold; lines in the plane."""
+"""Level sets on grids: closed manifold surfaces in space, polylines in the plane."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from ..errors import GeometryError, OutsideError
 
 CLEARANCE = 1e-3
-"""Crossings keep this fraction of a cell from the nodes, so that no two vertices of a surface coincide."""
+"""Crossings stay this fraction of a cell away from the nodes, so that no two vertices of a surface coincide."""
 CAP = 0.01
-"""Fraction of a cell by which a surface closed along the box lies outside it."""
+"""Fraction of a cell by which a surface that is closed along the box lies outside the box."""
 
 
 def closed_surface(
@@ -25,12 +25,14 @@ def closed_surface(
     origin, spacing : (3,) float
         Of the grid.
     level : float
-        Which level set.
+        The level.
 
     Returns
     -------
     vertices : (n, 3) float
+        Positions.
     faces : (m, 3) int
+        Vertex ids, counter-clockwise as seen from the side of greater values.
     """
     from skimage.measure import marching_cubes
 
@@ -51,7 +53,7 @@ def level_lines(
 ) -> list[tuple[NDArray[np.float64], bool]]:
     """Marching squares: points (k, 2) of each line, greater values to the left, and whether it closes.
 
-    Lines are closed where they do not end at the box or at NaN.
+    Lines are closed, unless they end at the box or at NaN values.
 
     Examples
     --------
@@ -67,14 +69,21 @@ def level_lines(
 
 
 def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], level: float) -> NDArray[np.float64]:
-    """Values less the level, which some must reach and none comes closer to than `CLEARANCE`."""
+    """Values minus the level, kept away from zero so that crossings respect `CLEARANCE`.
+
+    Raises
+    ------
+    OutsideError
+        If the values do not take the level.
+    """
     height = values - level
     known = height[np.isfinite(height)]
     low, high = float(known.min(initial=np.inf)), float(known.max(initial=-np.inf))
     if not low < 0 < high:
         raise OutsideError(
-            f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}: "
-            "choose another level or a larger grid"
+            f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}",
+            remedy="choose another level or a larger grid",
+            element=f"level {level:g}",
         )
     least = CLEARANCE * float(spacing.min())
     height[(height >= 0) & (height < least)] = least
@@ -83,7 +92,7 @@ def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], lev
 
 
 def closed_at_unknown(height: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Nodes without a value made positive, such that crossings lie about `CAP` cells from the nodes beside them."""
+    """Nodes without a value made positive, so that crossings lie about `CAP` cells away from their known neighbours."""
     unknown = np.isnan(height)
     if not unknown.any():
         return height
@@ -98,13 +107,13 @@ def closed_at_unknown(height: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def wall_signs(height: NDArray[np.float64]) -> set[bool]:
-    """Which signs the nodes on the walls of the box have: {True} all positive, {False} all negative, or both."""
+    """Signs of the nodes on the walls of the box: {True} if all are positive, {False} if all are negative, or both."""
     walls = [height.take(end, axis=axis) for axis in range(height.ndim) for end in (0, -1)]
     return {bool(sign) for wall in walls for sign in ((wall > 0).any(), (wall > 0).all())}
 
 
 def capped(height: NDArray[np.float64]) -> NDArray[np.float64]:
-    """One more layer of nodes all around, positive, such that crossings lie `CAP` cells beyond the walls."""
+    """One more layer of nodes all around, positive, so that crossings lie `CAP` cells outside the walls."""
     padded = np.pad(height, 1, mode="edge")
     for axis in range(height.ndim):
         for end in (0, -1):

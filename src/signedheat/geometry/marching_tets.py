@@ -1,4 +1,4 @@
-"""Level sets in tet meshes, as closed manifold surfaces: marching tetrahedra with the boundary as lid."""
+"""Level sets in tet meshes, as closed manifold surfaces: marching tetrahedra, closed along the boundary of the mesh."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from .meshes import Tets
 from .tet_faces import face_table
 
 CLEARANCE = 1e-3
-"""Crossings keep this fraction of an edge from its ends, so that no two vertices of a surface coincide."""
+"""Crossings stay this fraction of an edge away from its ends, so that no two vertices of a surface coincide."""
 
-# Corners in an even order with those below the level first, and below how many of them are: by the bits of the mask.
+# By the bits of a mask of the corners below the level: an even permutation that puts these first, and their number.
 _ORDERS = np.zeros((16, 4), dtype=np.int64)
 _COUNTS = np.array([bin(mask).count("1") for mask in range(16)])
 _PAIRS = {(0, 1): (2, 3), (0, 2): (3, 1), (0, 3): (1, 2), (1, 2): (0, 3), (1, 3): (2, 0), (2, 3): (0, 1)}
@@ -22,13 +22,13 @@ for _k, _order in enumerate([(0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1,
 for (_i, _j), _rest in _PAIRS.items():
     _ORDERS[(1 << _i) | (1 << _j)] = (_i, _j, *_rest)
 
-# Triangles between crossings, each given by the two corners (in that order) of the edge that it lies on.
+# By the number of corners below the level: triangles between crossings, each crossing given by two corners of its edge.
 _CUTS = {
     1: [[(0, 1), (0, 2), (0, 3)]],
     2: [[(0, 2), (0, 3), (1, 3)], [(0, 2), (1, 3), (1, 2)]],
     3: [[(0, 1), (0, 3), (0, 2)]],
 }
-# The part of a boundary face below the level, whose corner (k, k) is the vertex itself.
+# The part of a boundary face below the level, likewise; (k, k) is corner k itself.
 _LIDS = {
     1: [[(0, 0), (0, 1), (0, 2)]],
     2: [[(0, 0), (1, 1), (1, 2)], [(0, 0), (1, 2), (2, 0)]],
@@ -39,11 +39,11 @@ _LIDS = {
 def closed_level_set(
     mesh: Tets, values: NDArray[np.float64], gradients: NDArray[np.float64], level: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices and triangles of the surface between the vertices below a level and the others, facing the others.
+    """Vertices and triangles of the surface that separates mesh vertices below a level from the others.
 
-    Its own vertices lie where φ takes the level to second order, by its gradients at the vertices. Where it meets the
-    boundary of the mesh it is closed along the boundary, on the side below the level. Tets with NaN count as outside
-    the mesh.
+    Normals point to the greater values. Vertices of the surface lie where φ takes the level, to second order, by its
+    values and gradients at the ends of edges. Where the surface meets the boundary of the mesh it is closed along the
+    boundary, on the side below the level. Tets with a NaN corner count as outside the mesh.
 
     Raises
     ------
@@ -56,8 +56,9 @@ def closed_level_set(
     if not used.any() or used.all():
         low, high = np.nanmin(values), np.nanmax(values)
         raise OutsideError(
-            f"level {level:g} is outside the values of the tet mesh, {low:g} to {high:g}: choose another level or a "
-            "larger mesh"
+            f"level {level:g} is outside the values of the tet mesh, {low:g} to {high:g}",
+            remedy="choose another level or a larger mesh",
+            element=f"level {level:g}",
         )
     keys, _ = _triangles(tets, used, mesh.n_vertices, _CUTS)
     faces = face_table(tets)
@@ -70,7 +71,7 @@ def closed_level_set(
 def level_triangles(
     vertices: NDArray[np.float64], tets: NDArray[np.int64], values: NDArray[np.float64], level: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """The level set of the linear interpolant: positions (n, 3), triangles (k, 3), their tets. No lids."""
+    """The level set of the linear interpolant, open at the boundary: positions (n, 3), triangles (k, 3), tets (k,)."""
     known = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
     keys, owners = _triangles(tets[known], (values < level)[tets[known]], len(vertices), _CUTS)
     return *_crossings(vertices, values, np.zeros_like(vertices), level, keys, 0.0), known[owners]
@@ -84,9 +85,10 @@ def _crossings(
     keys: NDArray[np.int64],
     clearance: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Where the edges that keys name take the level, and the triangles between.
+    """Positions at which edges take the level, and the index of the position of each key.
 
-    A fraction s along an edge e from a to b, φ is ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
+    A key is ``smaller · n + larger`` vertex id of an edge. At the fraction s of an edge e from a to b, φ is
+    ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
     """
     crossings, triangles = np.unique(keys, return_inverse=True)
     low, high = crossings // len(vertices), crossings % len(vertices)
@@ -123,9 +125,10 @@ def _triangles(
 def manifold(
     positions: NDArray[np.float64], triangles: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """A closed oriented surface with its vertices and edges split wherever it touches itself.
+    """A closed oriented surface made manifold: vertices and edges at which it touches itself are split.
 
-    Every halfedge is paired with one that runs the other way; corners that meet across a pair are one vertex.
+    Every halfedge is paired with one that runs in the opposite direction; corners that meet across a pair share a
+    vertex.
 
     Examples
     --------
@@ -136,7 +139,7 @@ def manifold(
     """
     m = len(triangles)
     tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    after = np.roll(np.arange(3 * m).reshape(m, 3), -1, axis=1).ravel()  # the corner at the head of each halfedge
+    after = np.roll(np.arange(3 * m).reshape(m, 3), -1, axis=1).ravel()  # corner at the head of each halfedge
     n = len(positions)
     undirected = np.minimum(tails, heads) * n + np.maximum(tails, heads)
     forward = np.flatnonzero(tails < heads)

@@ -1,4 +1,4 @@
-"""What geometry needs to know of a mesh: the arrays that every triangle and tet mesh has."""
+"""Protocols of triangle meshes and tet meshes: the arrays that algorithms need of them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Triangles(Protocol):
 
 
 class TetShapes(Protocol):
-    """Sizes and directions of tets."""
+    """Volumes and face area vectors of tets."""
 
     @property
     def area_vectors(self) -> NDArray[np.float64]:
@@ -77,8 +77,8 @@ class Tets(Protocol):
 
     @property
     def geometry(self) -> TetShapes:
-        """Sizes and directions."""
+        """Volumes and face area vectors."""
 
     @property
     def search_tree(self) -> BoxTree:
-        """Boxes of the tets."""
+        """Tree of the bounding boxes of the tets."""

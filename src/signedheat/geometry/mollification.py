@@ -1,4 +1,4 @@
-"""Triangles made thick enough to compute with, by lengths alone (Sharp & Crane 2020)."""
+"""Intrinsic mollification: degenerate triangles made slightly thicker, by edge lengths alone (Sharp & Crane 2020)."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from numpy.typing import NDArray
 
 
 def mollify(lengths: NDArray[np.float64], margin: float) -> tuple[NDArray[np.float64], float]:
-    """Add one length to all edges, the smallest for which every triangle inequality holds with a margin.
+    """Add one length δ to all edges, the smallest for which every triangle inequality holds with a margin.
 
     Parameters
     ----------
     lengths : (m, 3) float
         Edge lengths of every face.
     margin : float
-        As a fraction of the mean length.
+        Least ``a + b − c`` in every triangle, as a fraction of the mean length.
 
     Returns
     -------
     (m, 3) float
-        The very same array if nothing had to be added.
+        The new lengths; the given array itself if δ is zero.
     float
-        What was added.
+        δ.
 
     Examples
     --------

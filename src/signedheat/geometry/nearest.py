@@ -1,4 +1,4 @@
-"""The nearest point of many triangles."""
+"""Closest points on triangles in space."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .box_tree import LEAF, BoxTree
 def nearest_on_triangles(
     triangles: NDArray[np.float64], tree: BoxTree, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Triangle nearest to each of (k, 3) points, and barycentric coordinates of the nearest place in it.
+    """Closest triangle to each of (k, 3) points, and barycentric coordinates of the closest point in it.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def _nearest(triangles, bounds, items, points):
     leaves = len(bounds) // 2
     for p in range(len(points)):
         x, y, z = points[p]
-        near = found[p - 1] if p else 0  # the next point is often nearby
+        near = found[p - 1] if p else 0  # a first guess: consecutive points are often close to each other
         best, u, v, w = place_on_triangle(triangles[near], x, y, z)
         found[p] = near
         depth, stack[0], gaps[0] = 1, 1, 0.0
@@ -74,10 +74,10 @@ def _box_distance(box, x, y, z):
 
 @compiled
 def place_on_triangle(triangle, x, y, z):
-    """Squared distance of the nearest place in a triangle, and its barycentric coordinates.
+    """Squared distance of (x, y, z) from a triangle, and barycentric coordinates of its closest point.
 
-    Inside if the foot of the perpendicular is; on the nearest of the sides if not. Numbers instead of arrays, because
-    arrays would be made anew for every triangle.
+    The foot of the perpendicular if that lies inside, otherwise the closest point of the three sides. Scalars instead
+    of arrays, because arrays would be allocated for every triangle.
     """
     ax, ay, az = triangle[0]
     bx, by, bz = triangle[1, 0] - ax, triangle[1, 1] - ay, triangle[1, 2] - az
@@ -103,7 +103,7 @@ def place_on_triangle(triangle, x, y, z):
 
 @compiled
 def _on_side(px, py, pz, dx, dy, dz):
-    """Squared distance of p from the segment from 0 to d, and the fraction of it at which the nearest place lies."""
+    """Squared distance of p from the segment from 0 to d, and the fraction of the segment at the closest point."""
     length = dx * dx + dy * dy + dz * dz
     s = min(max((px * dx + py * dy + pz * dz) / length, 0.0), 1.0) if length > 0.0 else 0.0
     ex, ey, ez = px - s * dx, py - s * dy, pz - s * dz

@@ -1,4 +1,4 @@
-"""Segments joined end to end."""
+"""Polylines from segments."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 def assemble_polylines(
     tails: NDArray[np.int64], heads: NDArray[np.int64], directed: bool = True
 ) -> list[tuple[NDArray[np.int64], NDArray[np.bool_], bool]]:
-    """Join segments into chains as long as there is one way on.
+    """Join segments end to end into polylines, which end where not exactly two segments meet.
 
     Parameters
     ----------
     tails, heads : (k,) int
         The nodes that each segment joins.
     directed : bool
-        Whether segments keep their direction; if not, they are turned round where needed.
+        Whether segments keep their direction; if not, they are reversed where needed.
 
     Returns
     -------
     list of (segments, backwards, closed)
-        Segment ids in order, which of them run from head to tail, and whether the chain closes.
+        Segment ids in order, which of them run from head to tail, and whether the polyline is closed.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def assemble_polylines(
             segment = onward[0]
 
     found = []
-    for pass_through in (False, True):  # ends and junctions first; what is left are loops
+    for pass_through in (False, True):  # first from ends and junctions; the segments left form loops
         for segment in range(len(tails)):
             start = int(tails[segment])
             if not directed and not pass_through and through[start]:

@@ -1,4 +1,4 @@
-"""Where on a surface a point lies: at a vertex, on an edge or inside a face, through whatever face it was given."""
+"""Points on a surface: at a vertex, on an edge or inside a face, whichever face they are given through."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ SNAP = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class LocatedPoints:
-    """Points of a surface, each with the smallest element that holds it.
+    """Points of a surface, each with the lowest-dimensional element that contains it.
 
     Attributes
     ----------
     faces : (n,) int
-        A face that has the point.
+        A face that contains the point.
     barycentric : (n, 3) float
-        Where in that face; exact zeros on edges and at vertices.
+        Barycentric coordinates in that face; exact zeros on edges and at vertices.
     kinds : (n,) int
         `VERTEX`, `EDGE` or `FACE`.
     elements : (n,) int
         Id of the vertex, edge or face.
     along : (n,) float
-        On edges, the fraction of the way from tail to head; else 0.
+        On edges, the fraction of the way from tail to head; otherwise 0.
     """
 
     faces: NDArray[np.int64]
@@ -53,7 +53,7 @@ class LocatedPoints:
 def locate_points(
     triangles: IntrinsicMesh, faces: NDArray[np.int64], barycentric: NDArray[np.float64], name: str = "point"
 ) -> LocatedPoints:
-    """Recognise points that lie on edges or at vertices.
+    """Find the vertex, edge or face that contains each of n points, given by faces and barycentric coordinates.
 
     Raises
     ------
@@ -63,8 +63,9 @@ def locate_points(
     outside = np.flatnonzero((faces < 0) | (faces >= triangles.n_faces))
     if len(outside):
         raise SourceError(
-            f"{name} {outside[0]} lies in face {faces[outside[0]]}, but face ids go from 0 to {triangles.n_faces - 1}: "
-            "was it made for another mesh?"
+            f"{name} {outside[0]} lies in face {faces[outside[0]]}, but face ids go from 0 to {triangles.n_faces - 1}",
+            remedy="make it for this mesh",
+            element=f"face {faces[outside[0]]}",
         )
     inside = np.where(barycentric < SNAP, 0.0, barycentric)
     inside /= inside.sum(axis=1, keepdims=True)
@@ -77,7 +78,7 @@ def locate_points(
     elements[at_vertex] = triangles.corner_vertices[faces[at_vertex], inside[at_vertex].argmax(axis=1)]
 
     on_edge = np.flatnonzero(kinds == EDGE)
-    side = (np.argmin(inside[on_edge], axis=1) + 1) % 3  # the edge across from the corner that counts for nothing
+    side = (np.argmin(inside[on_edge], axis=1) + 1) % 3  # the edge opposite to the corner with coordinate zero
     of_face = faces[on_edge], side
     elements[on_edge] = triangles.edges.face_edges[of_face]
     forward = triangles.edges.forward[of_face]
@@ -100,7 +101,7 @@ def corners_at(
     Raises
     ------
     SourceError
-        If a vertex does not exist, or no face has it.
+        If a vertex does not exist or has no face.
     """
     if not np.issubdtype(vertices.dtype, np.integer):
         if len(vertices) == 0:
@@ -109,8 +110,9 @@ def corners_at(
     outside = np.flatnonzero((vertices < 0) | (vertices >= n_vertices))
     if len(outside):
         raise SourceError(
-            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to {n_vertices - 1}: "
-            "was it made for another mesh?"
+            f"{name} {outside[0]} is vertex {vertices[outside[0]]}, but vertex ids go from 0 to {n_vertices - 1}",
+            remedy="use ids of this mesh",
+            element=f"vertex {vertices[outside[0]]}",
         )
     wanted = np.zeros(n_vertices, dtype=bool)
     wanted[vertices] = True
@@ -120,13 +122,15 @@ def corners_at(
     alone = np.flatnonzero(first[vertices] < 0)
     if len(alone):
         raise SourceError(
-            f"{name} {alone[0]} is vertex {vertices[alone[0]]}, which no face has: choose a vertex of the surface"
+            f"{name} {alone[0]} is vertex {vertices[alone[0]]}, which no face has",
+            remedy="choose a vertex of the surface",
+            element=f"vertex {vertices[alone[0]]}",
         )
     return first[vertices]
 
 
 def contain(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: LocatedPoints) -> NDArray[np.bool_]:
-    """(n,) whether face k has place k."""
+    """(n,) whether face k contains point k."""
     return np.choose(
         located.kinds,
         [
@@ -138,7 +142,7 @@ def contain(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: Located
 
 
 def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: LocatedPoints) -> NDArray[np.float64]:
-    """(n, 3) where place k lies in face k, which must have it."""
+    """(n, 3) barycentric coordinates of point k in face k, which must contain it."""
     weights = located.barycentric.copy()
     moved = np.flatnonzero(faces != located.faces)
     kinds, elements, along, other = (a[moved] for a in (located.kinds, located.elements, located.along, faces))
@@ -158,7 +162,7 @@ def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: 
 
 
 def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints) -> NDArray[np.int64]:
-    """(k,) a face that has both ends, or −1; the face through which an end was given goes first."""
+    """(k,) a face that contains both ends, or −1; preferably a face through which one of them is given."""
     shared = np.where(contain(triangles, end.faces, start), end.faces, -1)
     shared = np.where(contain(triangles, start.faces, end), start.faces, shared)
     left = np.flatnonzero((shared < 0) & (start.kinds != FACE))
@@ -172,7 +176,7 @@ def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoi
 
 
 def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """All faces that have each place, as pairs: index of the place, and face."""
+    """All faces that contain each point, as pairs: index of the point, and face."""
     inside = np.flatnonzero(located.kinds == FACE)
     which, faces = [inside], [located.elements[inside]]
     for kind, table, count in (
@@ -195,7 +199,7 @@ def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[ND
 
 
 def unique_points(located: LocatedPoints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Points that coincide counted once, in order of first appearance: index of the first of each, and who is who."""
+    """Distinct points in order of first appearance: index of the first of each, and the inverse index of all points."""
     inner = np.where((located.kinds == FACE)[:, None], located.barycentric, 0.0)
     columns = [located.kinds, located.elements, located.along, inner[:, 0], inner[:, 1]]
     order = np.lexsort(columns[::-1])
@@ -213,5 +217,5 @@ def unique_points(located: LocatedPoints) -> tuple[NDArray[np.int64], NDArray[np
 
 
 def concatenated(parts: Sequence[LocatedPoints]) -> LocatedPoints:
-    """Located points one after another."""
+    """Several sets of located points in one."""
     return LocatedPoints(*(np.concatenate([getattr(p, f) for p in parts]) for f in LocatedPoints.__dataclass_fields__))

@@ -1,8 +1,8 @@
-"""Boundary faces of voxels, and normals that know better than they do.
+"""Boundary faces of voxels, and corrected normals for them.
 
-The faces of voxels that separate inside from outside, called surfels, are squares in six directions: as a surface they
-overestimate every length that runs askew to the axes, however small the voxels. Normals estimated over a wider
-neighbourhood tell how each square lies on the surface that was digitised (Coeurjolly & Lachaud 2022).
+The faces of voxels that separate inside from outside, called surfels, are squares with six possible normals: as a
+surface they overestimate the length of every curve that is not parallel to an axis, however small the voxels. Normals
+estimated over a wider neighbourhood approximate those of the surface that was digitised (Coeurjolly & Lachaud 2022).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .edges import EdgeTable
 
-_STEEPEST = 0.05  # no corrected normal is farther than the cosine of this from the square's own
+_STEEPEST = 0.05  # least cosine of the angle between a corrected normal and the square's own
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Surfels:
     axes : (m,) int
         Axis to which the surfel is orthogonal.
     signs : (m,) int
-        +1 where outside is on the far side along the axis, −1 where on the near one.
+        +1 where the outward normal points along the positive axis, −1 where along the negative one.
     """
 
     corners: NDArray[np.int64]
@@ -43,7 +43,7 @@ class Surfels:
 
 
 def boundary_surfels(volume: NDArray[np.bool_]) -> Surfels:
-    """Surfels of a volume; what lies beyond the array is outside. In order of their voxels.
+    """Surfels of a volume, in order of their voxels; everything beyond the array is outside.
 
     Examples
     --------
@@ -82,10 +82,10 @@ def boundary_surfels(volume: NDArray[np.bool_]) -> Surfels:
 def corrected_normals(
     volume: NDArray[np.bool_], surfels: Surfels, spacing: NDArray[np.float64], radius: float
 ) -> NDArray[np.float64]:
-    """(m, 3) unit normals: the mean area vector of the surfels around each, under a Gaussian of deviation radius/2.
+    """(m, 3) unit normals: mean area vectors of the surfels around each, by a Gaussian of standard deviation radius/2.
 
-    By the divergence theorem that mean is the negative gradient of the blurred volume, which is how it is computed.
-    A radius of zero takes each surfel's own normal.
+    By the divergence theorem that mean is the negative gradient of the blurred volume, which is how it is computed. A
+    radius of zero returns each surfel's own normal.
 
     Examples
     --------
@@ -119,15 +119,15 @@ def corrected_normals(
 
 
 def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
-    """The edges of four triangles to a surfel, with two where two voxels touch along one.
+    """The edges of the triangles of surfels, with two edges in place of one where two voxels touch along it.
 
-    Four surfels meet there. Those that face the same voxel outside go together, so that the surface leads from the
-    one voxel inside to the other: voxels that touch along an edge are connected.
+    Four surfels meet there. Surfels that face the same voxel outside share an edge, so that the surface connects the
+    two voxels inside: voxels that touch along an edge are connected.
 
     Parameters
     ----------
     edges : EdgeTable
-        Of triangles four to a surfel, edge 0 of each its side.
+        Of the triangles, four per surfel; edge 0 of each triangle is a side of the surfel.
     surfels : Surfels
         The surfels.
     """
@@ -142,7 +142,7 @@ def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
     n_edges = len(edges.vertices)
     ids = np.where(kept, key[first, 0], n_edges + np.cumsum(~kept) - 1)
 
-    leading = triangles[first[~kept]]  # the first triangle of each new edge gives it its direction
+    leading = triangles[first[~kept]]  # the first triangle of each new edge determines its direction
     direction = edges.vertices[edges.face_edges[leading, 0]]
     direction = np.where(edges.forward[leading, 0, None], direction, direction[:, ::-1])
     of_faces, forward = edges.face_edges.copy(), edges.forward.copy()
@@ -155,7 +155,7 @@ def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
 def flattened_sides(
     surfels: Surfels, spacing: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """First side and last side (m, 3) of each square, projected on the plane orthogonal to its normal."""
+    """The two sides (m, 3) of each square at its first corner, projected on the plane orthogonal to its normal."""
     lattice = surfels.vertices * spacing
     corner = lattice[surfels.corners]
     first, last = corner[:, 1] - corner[:, 0], corner[:, 3] - corner[:, 0]

@@ -1,8 +1,8 @@
-"""Oriented triangles cut by the tets that they cross, and points located in tets.
+"""Clipping of oriented triangles against the tets that they cross, and location of points in tets.
 
-A source in space need not follow the mesh in any way. Every triangle is cut into one convex piece for each tet that it
-crosses; the polygons' area vectors add up to the triangle's. A piece that lies in a face belongs to all tets there
-in equal parts.
+A source in space need not conform to the mesh. Every triangle is clipped to one convex polygon in each tet that it
+crosses; the area vectors of the polygons add up to that of the triangle. A polygon that lies in a face of the mesh is
+shared equally by the tets at that face.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from .box_tree import LEAF
 from .meshes import Tets
 
 FLAT = 1e-10
-"""Tets whose volume is below this, over the cube of the longest edge, hold no piece of a source."""
+"""Tets whose volume, over the cube of the longest edge, is below this contain no part of a source."""
 
 TOUCHING = 1e-9
-"""Distance, over the size of a face, within which a point counts as lying in its plane."""
+"""Distance, relative to the size of a face, within which a point counts as lying in its plane."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClippedPolygons:
-    """What a source leaves in each tet.
+    """Convex polygons, each the part of a source in one tet.
 
     Attributes
     ----------
     tets : (p,) int
-        Tet that each piece lies in.
+        Tet that each polygon lies in.
     parents : (p,) int
-        Triangle or point that it comes from.
+        Triangle or point of the source that it is part of.
     area_vectors : (p, 3) float
         Area times normal.
     areas : (p,) float
         Areas.
     barycentric : (p, 4) float
-        Where in the tet its centre lies.
+        Barycentric coordinates of its centroid in the tet.
     in_face : (p,) int
-        Corner opposite the face that it lies in, −1 inside the tet.
+        Corner opposite to the face that it lies in, −1 in the interior of the tet.
     """
 
     tets: NDArray[np.int64]
@@ -53,24 +53,24 @@ class ClippedPolygons:
 
 @dataclass(frozen=True, eq=False)
 class Planes:
-    """Unit normals of the planes of faces, the same to the last bit for all tets that share a face.
+    """The planes of the faces of a mesh, the same to the last bit for all tets that share a face.
 
     Attributes
     ----------
     normals : (f, 3) float
-        Out of the first tet; zero for faces without area.
+        Unit normals, out of the first tet; zero for faces without area.
     offsets : (f,) float
-        Value of ``normal · x`` on the plane, with x measured from the middle of the mesh.
+        Value of ``normal · x`` on the plane, with x relative to `center`.
     tolerances : (f,) float
         Distance within which a point counts as lying in the plane.
     signs : (m, 4) float
         +1 where the normal points out of the tet, −1 where into it.
     shares : (f,) float
-        One over the number of tets that can hold polygons at the face.
+        One over the number of tets at the face that are not flat.
     solid : (m,) bool
-        Tets that can hold polygons: those that are not flat.
+        Tets that are not flat, and can contain polygons.
     center : (3,) float
-        Middle of the mesh, from which coordinates are measured, for the sake of rounding.
+        Centre of the mesh; coordinates are taken relative to it to reduce rounding errors.
     """
 
     normals: NDArray[np.float64]
@@ -83,7 +83,7 @@ class Planes:
 
     @classmethod
     def of(cls, mesh: Tets) -> Planes:
-        """The planes of a tet mesh."""
+        """The planes of the faces of a tet mesh."""
         faces, geometry = mesh.faces, mesh.geometry
         center = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
         points = mesh.vertices - center
@@ -106,7 +106,7 @@ class Planes:
 
 
 def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -> ClippedPolygons:
-    """Cut (k, 3, 3) triangles by the tets that they cross; what lies outside the mesh is left out.
+    """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -
 
 
 def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(k,) a tet that each point lies in, −1 outside the mesh.
+    """(k,) a tet that contains each point, −1 outside the mesh.
 
     Examples
     --------
@@ -162,7 +162,7 @@ def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> 
 
 
 def barycentric(mesh: Tets, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k, 4) barycentric coordinates of points in given tets, none negative, each row with sum one."""
+    """(k, 4) barycentric coordinates of points in given tets, clamped to be nonnegative, each row with sum one."""
     from_corner = points[:, None] - mesh.vertices[mesh.tets[tets][:, [1, 0, 0, 0]]]  # on the face opposite each corner
     inward = -np.einsum("pki,pki->pk", mesh.geometry.area_vectors[tets], from_corner)
     weights = np.maximum(inward / (3 * mesh.geometry.volumes[tets])[:, None], 0)
@@ -312,7 +312,7 @@ def _clip(triangles, bounds, items, center, tet_faces, normals, offsets, toleran
 
 @compiled
 def _beyond(a, b, c, faces, normals, offsets, tolerances, signs):
-    """Whether a triangle lies wholly on the far side of one of the faces."""
+    """Whether a triangle lies entirely outside one of the faces."""
     for k in range(4):
         f, sign = faces[k], signs[k]
         x, y, z = normals[f, 0], normals[f, 1], normals[f, 2]
@@ -328,9 +328,9 @@ def _beyond(a, b, c, faces, normals, offsets, tolerances, signs):
 
 @compiled
 def _cut(polygon, n, other, heights, normal, offset, tolerance, sign):
-    """Keep what lies behind a plane. Also whether the whole polygon lay in it.
+    """Clip a polygon to the inner side of a plane. Also whether the whole polygon lies in the plane.
 
-    Heights and crossings come out the same, to the last bit, on both sides of the plane.
+    Heights and crossings are the same, to the last bit, for the tets on both sides of the plane.
     """
     most, least = 0.0, 0.0
     for i in range(n):
@@ -360,7 +360,7 @@ def _cut(polygon, n, other, heights, normal, offset, tolerance, sign):
 
 @compiled
 def _measure(polygon, n, normal, area_vector, center):
-    """Area vector and centre of a convex polygon; returns its area, negative if it is turned over by rounding."""
+    """Area vector and centroid of a convex polygon; returns its area, negative if rounding has turned it over."""
     area_vector[:] = 0.0
     center[:] = 0.0
     total = 0.0

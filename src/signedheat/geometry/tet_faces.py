@@ -1,4 +1,4 @@
-"""Faces of tets: which triangles lie between and around them."""
+"""The triangular faces of tets."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 @dataclass(frozen=True, eq=False)
 class FaceTable:
-    """Faces of tets.
+    """The faces of tets, and how tets and faces are incident.
 
     Attributes
     ----------
     vertices : (f, 3) int
-        Counter-clockwise as seen from outside the FIRST tet that has the face.
+        Vertex ids, counter-clockwise as seen from outside the FIRST tet at the face.
     tet_faces : (m, 4) int
         Face opposite each corner of each tet.
     """
@@ -36,7 +36,7 @@ class FaceTable:
 
 
 def face_table(tets: NDArray[np.int64]) -> FaceTable:
-    """Find the faces of tets, numbered by first appearance, in time linear in their number.
+    """Find the faces of tets, numbered by first appearance, in linear time.
 
     Examples
     --------
@@ -55,7 +55,7 @@ def face_table(tets: NDArray[np.int64]) -> FaceTable:
 
 @compiled
 def _number_triples(triples):
-    """Number of each triple by first appearance: a hash table with chains."""
+    """Number each distinct triple by first appearance, with a chained hash table."""
     n = len(triples)
     bits = 4
     while (1 << bits) < n:

@@ -1,4 +1,4 @@
-"""Loops over triangles, compiled at first use."""
+"""Kernels on triangles: edges, assembly of sparse matrices, fluxes, connected components."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from ..compiled import compiled
 
 @compiled
 def find_edges(faces, degrees):
-    """Edges are kept in one list per vertex, that of the end with fewer faces, so that no list gets long."""
+    """Edges of faces, by one list per vertex: an edge is in that of its end with fewer faces, so lists stay short."""
     first = np.full(len(degrees), -1)
     following = np.empty(faces.size, dtype=np.int64)
     vertices = np.empty((faces.size, 2), dtype=np.int64)
@@ -66,7 +66,7 @@ def add_up(unknowns, diagonal, coupling, n):
 
 @compiled
 def _merge(starts, columns, values):
-    """Sort every row by column and add up what falls together, in place."""
+    """Sort every row by column and sum entries with the same column, in place."""
     n, total = len(starts) - 1, 0
     merged = np.zeros(n + 1, dtype=np.int32)
     for i in range(n):
@@ -95,7 +95,7 @@ def _merge(starts, columns, values):
 
 @compiled
 def gather(face_edges, directions, reflected, vectors):
-    """Sum of the three edge vectors of each face, in its layout."""
+    """Sum of the vectors at the three edges of each face, in its layout."""
     sums = np.empty(len(face_edges), dtype=np.complex128)
     for f in range(len(face_edges)):
         total = 0j
@@ -108,7 +108,7 @@ def gather(face_edges, directions, reflected, vectors):
 
 @compiled
 def add_fluxes(corners, positions, directions, n):
-    """Half of each face's opposite edge, turned inward, times the face's direction, summed at every vertex."""
+    """``Σ ⟨½ opposite edge turned inward by 90°, Y⟩`` over the faces at every vertex, Y the direction of the face."""
     sums = np.zeros(n)
     for f in range(len(corners)):
         for k in range(3):

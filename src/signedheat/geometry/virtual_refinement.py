@@ -1,7 +1,7 @@
-"""Polygons as triangles, by one virtual vertex in each (Bunge, Herholz, Kazhdan & Botsch 2020).
+"""Virtual refinement: polygons as fans of triangles around a virtual vertex (Bunge, Herholz, Kazhdan & Botsch 2020).
 
-The virtual vertex minimises the sum of the squared areas of the fan of triangles that it spans with the sides of its
-polygon. It is an affine combination of the corners, so that functions on the corners prolong to the fan.
+The virtual vertex minimises the sum of the squared areas of the triangles that it spans with the sides of its polygon.
+It is an affine combination of the corners, so that functions on the corners can be prolonged to the fan.
 """
 
 from __future__ import annotations
@@ -12,23 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-_SLIVER = 1e-6  # a fan triangle smaller than this part of its polygon has turned over
+_SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its polygon's counts as turned over
 
 
 @dataclass(frozen=True, eq=False)
 class VirtualRefinement:
-    """Triangles that cover polygons.
+    """Triangles that subdivide polygons.
 
     Attributes
     ----------
     faces : (m, 3) int
         Vertex ids; virtual vertices follow the given ones. Polygon after polygon, side after side.
     face_polygons : (m,) int
-        Polygon that each triangle covers a part of.
+        Polygon that each triangle is part of.
     virtual_vertices : (q, 3) float
         Positions.
     prolongation : (n + q, n) sparse
-        P: the given vertices, then each virtual vertex as an affine combination of the corners of its polygon.
+        P: identity on the given vertices; each virtual vertex is an affine combination of the corners of its polygon.
     """
 
     faces: NDArray[np.int64]
@@ -40,17 +40,17 @@ class VirtualRefinement:
 def virtual_refinement(
     vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
 ) -> VirtualRefinement:
-    """Cover polygons with triangles.
+    """Subdivide polygons into triangles.
 
-    Triangles stay as they are, and so do results on meshes of triangles alone. A polygon so far from convex that a
-    triangle of its fan turns over is cut along diagonals instead.
+    Triangles are not subdivided, so that results on triangle meshes are those of the triangles. A polygon so far from
+    convex that a triangle of its fan would turn over is cut along diagonals instead.
 
     Parameters
     ----------
     vertices : (n, 3) float
         Positions.
     corners, offsets : (c,) int, (p + 1,) int
-        Polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``; corners that repeat the one before are
+        Polygon k has the vertices ``corners[offsets[k]:offsets[k + 1]]``; a corner that equals the one before it is
         skipped.
 
     Examples
@@ -141,9 +141,9 @@ def area_vectors(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.f
 
 
 def cut_into_triangles(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Cut a simple polygon along diagonals, the best-shaped ear first; (k − 2, 3) corners, or none if no ear is left.
+    """Cut a simple polygon along diagonals, best-shaped ears first: (k − 2, 3) corners; empty if it runs out of ears.
 
-    Growth is cubic in the number of corners.
+    Takes cubic time in the number of corners.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def cut_into_triangles(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
 def _without_repeats(
     corners: NDArray[np.int64], offsets: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Corners that differ from the one before in their polygon, and their polygons."""
+    """Corners that differ from the one before them in their polygon, and the polygon of each."""
     polygons = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     before = np.roll(corners, 1)
     before[offsets[:-1]] = corners[offsets[1:] - 1]
@@ -198,7 +198,7 @@ def _sums(values: NDArray[np.float64], groups: NDArray[np.int64], n_groups: int)
 
 
 def _solve_symmetric(matrices: NDArray[np.float64], loads: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solutions of semidefinite systems, nearly of least norm: a flat polygon knows no way out of its plane."""
+    """Nearly minimum-norm solutions of semidefinite systems: a flat polygon does not determine x along its normal."""
     size = np.trace(matrices, axis1=1, axis2=2)
     held = matrices + (1e-11 * np.where(size > 0, size, 1))[:, None, None] * np.eye(3)
     return np.linalg.solve(held, loads[..., None])[..., 0]

@@ -1,4 +1,4 @@
-"""What straight lines through tets reach, and what lies behind corners."""
+"""Visibility along straight lines in tet meshes, and steepest ascent from cells that are not visible."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def visible(
     Parameters
     ----------
     starts, targets : (m, 3) float
-        Where the lines begin, one in each tet, and where they end.
+        Start points, one in each tet, and end points of the lines.
     neighbors : (m, 4) int
         From `tet_neighbors`.
     tet_faces, normals, offsets, signs
-        The planes of the faces, as `sources.clipping.Planes` has them.
+        The planes of the faces: see `tet_clipping.Planes`.
     """
     return _visible(starts, targets, neighbors, tet_faces, normals, offsets, signs)
 
@@ -82,7 +82,7 @@ def _visible(starts, targets, neighbors, tet_faces, normals, offsets, signs):
 def uphill_roots(
     heights: NDArray[np.float64], neighbors: NDArray[np.int64], settled: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """(m,) the settled tet, or the summit, that the steepest way up from tet to tet leads to.
+    """(m,) the settled tet, or the local maximum, that steepest ascent from tet to tet leads to.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def uphill_roots(
     best = beside.argmax(axis=1)
     higher = ~settled & (beside[own, best] > heights)
     roots = np.where(higher, neighbors[own, best], own)
-    while True:  # every round doubles the length of the ways that are known
+    while True:  # every round doubles the length of the paths followed
         further = roots[roots]
         if (further == roots).all():
             return roots

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve
+from ..domains.kinds import EmbeddedSurface
+from ..domains.polygon_mesh import PolygonMesh
 from ..domains.projection import closest_points
 from ..errors import FileFormatError, SourceError
 from ..geometry.polylines import assemble_polylines
@@ -34,16 +36,17 @@ class Group(NamedTuple):
     nodes: list[Node]
 
 
-def edge_vertices(domain: Any) -> NDArray[np.int64]:
+def edge_vertices(domain: EmbeddedSurface) -> NDArray[np.int64]:
     """(e, 2) tails and heads of the edges of a domain, by first appearance in its faces."""
-    if not hasattr(domain, "next_corners"):
-        return domain.triangulation.edges.vertices
+    if not isinstance(domain, PolygonMesh):
+        result: NDArray[np.int64] = domain.triangulation.edges.vertices
+        return result
     ends = np.stack([domain.corners, domain.next_corners], axis=1)
     first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)[1]
     return ends[np.sort(first)]
 
 
-def read_text(path: PathLike, domain: Any) -> list[Group]:
+def read_text(path: PathLike, domain: EmbeddedSurface) -> list[Group]:
     """Both text formats."""
     lines = [line.split() for line in text(path).splitlines()]
     if any(words and words[0] in (SIGNED, UNSIGNED, POINTS) for words in lines):
@@ -51,7 +54,7 @@ def read_text(path: PathLike, domain: Any) -> list[Group]:
     return read_segments(path, lines, domain)
 
 
-def read_groups(path: PathLike, lines: list[list[str]], domain: Any) -> list[Group]:
+def read_groups(path: PathLike, lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
     """The published demo's format."""
     groups: list[tuple[Group, bool]] = []
     edges = None
@@ -75,7 +78,7 @@ def read_groups(path: PathLike, lines: list[list[str]], domain: Any) -> list[Gro
     return [Group(g.kind, g.nodes[::-1] if reverse else g.nodes) for g, reverse in groups]
 
 
-def read_segments(path: PathLike, lines: list[list[str]], domain: Any) -> list[Group]:
+def read_segments(path: PathLike, lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
     """Nodes, and oriented segments between them."""
     nodes: list[Node] = []
     segments: list[tuple[int, int]] = []
@@ -97,7 +100,7 @@ def read_segments(path: PathLike, lines: list[list[str]], domain: Any) -> list[G
     return polylines_of_segments(path, SIGNED, nodes, segments)
 
 
-def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: Any) -> Node:
+def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: EmbeddedSurface) -> Node:
     """A node from ``v i``, ``e i s`` or ``f i a b [c]``."""
     kind, index, numbers = words[0], int(words[1]), [float(word) for word in words[2:]]
     if kind == "v":
@@ -123,14 +126,16 @@ def polylines_of_segments(
     bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
     if bad:
         raise FileFormatError(
-            f"{path}: segment {list(bad[0])} names a node that does not exist: there are {len(nodes)}"
+            f"segment {list(bad[0])} names a node that does not exist: there are {len(nodes)}",
+            element=f"segment {list(bad[0])}",
+            path=path,
         )
     if not len(segments):
         return []
     consecutive = [(k, k + 1) for k in range(len(nodes) - 1)]
     if list(segments) in (consecutive, [*consecutive, (len(nodes) - 1, 0)]):
-        order = [*range(len(nodes))] + [0] * (len(segments) == len(nodes))
-        return [Group(kind, [nodes[i] for i in order])]
+        run = [*range(len(nodes))] + [0] * (len(segments) == len(nodes))
+        return [Group(kind, [nodes[i] for i in run])]
     rank: dict[Node, int] = {}
     place = np.array([rank.setdefault(node, len(rank)) for node in nodes])
     ends = place[np.array([s for s in segments if place[s[0]] != place[s[1]]], dtype=np.int64).reshape(-1, 2)]
@@ -143,7 +148,7 @@ def polylines_of_segments(
     return groups
 
 
-def read_json(path: PathLike, domain: Any) -> list[Any]:
+def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Curve]:
     """Vertex ids and weights, independent of any order of edges; or polylines in space."""
     try:
         content = json.loads(text(path))
@@ -171,17 +176,22 @@ def read_json(path: PathLike, domain: Any) -> list[Any]:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         if isinstance(error, (FileFormatError, SourceError)):
             raise
-        raise FileFormatError(f"{path}: these are no curves with vertex ids and weights ({error!r})") from error
+        raise FileFormatError(
+            f"these are no curves with vertex ids and weights ({error!r})",
+            path=path,
+        ) from error
 
 
-def read_csv(path: PathLike, domain: Any) -> list[Curve]:
+def read_csv(path: PathLike, domain: EmbeddedSurface) -> list[Curve]:
     """Polylines in space, as tables of points."""
     return [domain.polyline(points, closed=closed) for points, closed in read_point_lists(path, 3)]
 
 
-def read_obj(path: PathLike, domain: Any) -> Iterable[Group | Curve]:
+def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]:
     """Line and point elements of an OBJ file."""
-    vertices, lines, points = [], [], []
+    vertices: list[list[float]] = []
+    lines: list[list[int]] = []
+    points: list[list[int]] = []
     for number, words in enumerate((line.split() for line in text(path).splitlines()), start=1):
         try:
             if words[:1] == ["v"]:
@@ -195,14 +205,18 @@ def read_obj(path: PathLike, domain: Any) -> Iterable[Group | Curve]:
     positions = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     bad = [i for ids in lines + points for i in ids if not 0 <= i < len(positions)]
     if bad:
-        raise FileFormatError(f"{path}: vertex {bad[0] + 1} of an element does not exist: there are {len(positions)}")
+        raise FileFormatError(
+            f"vertex {bad[0] + 1} of an element does not exist: there are {len(positions)}",
+            element=f"vertex {bad[0] + 1}",
+            path=path,
+        )
     corners = domain.triangulation.vertices
     scale = 1e-6 * float(np.ptp(corners, axis=0).max())
     n = min(len(positions), len(corners))
     if len(positions) <= len(corners) and n and np.abs(positions - corners[:n]).max() <= scale:
         groups = [Group(SIGNED, [Node((i,), (1.0,)) for i in ids]) for ids in lines]
         return groups + [Group(POINTS, [Node((i,), (1.0,)) for i in ids]) for ids in points]
-    found: list[Any] = []
+    found: list[Group | Curve] = []
     for ids in lines:
         closed = len(ids) > 2 and ids[0] == ids[-1]
         found.append(domain.polyline(positions[ids[:-1] if closed else ids], closed=closed))
@@ -211,7 +225,7 @@ def read_obj(path: PathLike, domain: Any) -> Iterable[Group | Curve]:
     return found
 
 
-def projected_nodes(domain: Any, points: NDArray[np.float64]) -> list[Node]:
+def projected_nodes(domain: EmbeddedSurface, points: NDArray[np.float64]) -> list[Node]:
     """Closest points of a surface, as nodes."""
     faces, weights, _ = closest_points(domain.triangulation, points)
     return nodes_of(faces, weights, domain)
@@ -219,10 +233,14 @@ def projected_nodes(domain: Any, points: NDArray[np.float64]) -> list[Node]:
 
 def damaged(path: PathLike, number: int, words: list[str], reason: str) -> FileFormatError:
     """The error for a line that makes no sense."""
-    return FileFormatError(f"{path}: line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})")
+    return FileFormatError(
+        f"line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})",
+        element=f"line {number}",
+        path=path,
+    )
 
 
-def nodes_of(faces: NDArray[np.int64], weights: NDArray[np.float64], domain: Any) -> list[Node]:
+def nodes_of(faces: NDArray[np.int64], weights: NDArray[np.float64], domain: EmbeddedSurface) -> list[Node]:
     """Points on faces, as vertices and weights."""
     corners = domain.triangulation.faces[faces]
     return [

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.curves import Curve, SurfacePoints
+from ..domains.curves import Curve, CurveOrPoints, SurfacePoints
+from ..domains.kinds import EmbeddedSurface
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, SourceError
 from ..geometry.geodesics.paths import gaps
@@ -36,7 +36,7 @@ from .curve_readers import (
 from .files import PathLike, extension, replacing, unknown_extension
 
 
-def read_curves(path: PathLike, domain: Any, strict: bool = False) -> list[Curve | SurfacePoints]:
+def read_curves(path: PathLike, domain: EmbeddedSurface, strict: bool = False) -> list[CurveOrPoints]:
     """Read curves and points on a surface.
 
     Parameters
@@ -83,13 +83,17 @@ def read_curves(path: PathLike, domain: Any, strict: bool = False) -> list[Curve
         if strict:
             refuse_gaps(sources, domain.triangulation)
     except SourceError as error:
-        raise SourceError(f"{path}: {error}") from error
+        raise error.at(path) from error
     if not sources:
-        raise FileFormatError(f"{path}: there is no curve and no point: check that it is a file of curves")
+        raise FileFormatError(
+            "there is no curve and no point",
+            remedy="check that it is a file of curves",
+            path=path,
+        )
     return sources
 
 
-def refuse_gaps(sources: Sequence[Curve | SurfacePoints], mesh: TriangleMesh) -> None:
+def refuse_gaps(sources: Sequence[CurveOrPoints], mesh: TriangleMesh) -> None:
     """Raise a `SourceError` if consecutive points of a curve share no face."""
     lengths = mesh.edge_lengths[mesh.edges.face_edges]
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
@@ -99,12 +103,14 @@ def refuse_gaps(sources: Sequence[Curve | SurfacePoints], mesh: TriangleMesh) ->
             apart = gaps(triangles, places, source.closed)
             if len(apart):
                 raise SourceError(
-                    f"curve {number}: points {apart[0]} and {(apart[0] + 1) % source.n_points} share no face, nor do "
-                    f"the ends of {len(apart) - 1} more segments: add points, or read without strict to join them"
+                    f"curve {number}: points {apart[0]} and {(apart[0] + 1) % source.n_points} share no face, "
+                    f"nor do the ends of {len(apart) - 1} more segments",
+                    remedy="add points, or read without strict to join them",
+                    element=f"curve {number}",
                 )
 
 
-def write_curves(path: PathLike, curves: Any, domain: Any) -> None:
+def write_curves(path: PathLike, curves: CurveOrPoints | Sequence[CurveOrPoints], domain: EmbeddedSurface) -> None:
     """Write curves and points on a surface; the extension says the format.
 
     ``.txt`` (published demo) and ``.json`` (portable) keep everything but given normals, and read back the same;
@@ -132,7 +138,7 @@ def write_curves(path: PathLike, curves: Any, domain: Any) -> None:
         temporary.write_text(content, encoding="utf-8")
 
 
-def placed(group: Group, domain: Any) -> Curve | SurfacePoints:
+def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
     """A group of a file on its surface."""
     faces, weights = on_faces(group.nodes, domain)
     if group.kind == POINTS:
@@ -142,28 +148,31 @@ def placed(group: Group, domain: Any) -> Curve | SurfacePoints:
     return Curve(faces[:end], weights[:end], closed=closed, oriented=group.kind == SIGNED)
 
 
-def on_faces(nodes: Sequence[Node], domain: Any) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Face and barycentric coordinates of nodes."""
     mesh = domain.triangulation
     count = np.array([len(node.vertices) for node in nodes])
     faces, weights = np.zeros(len(nodes), dtype=np.int64), np.zeros((len(nodes), 3))
-    alone = np.flatnonzero(count == 1)
-    points = domain.points_at([nodes[k].vertices[0] for k in alone]) if len(alone) else None
+    alone = np.flatnonzero(count == 1).tolist()
+    points = domain.points_at([nodes[k].vertices[0] for k in alone]) if alone else None
     if points is not None:
         faces[alone], weights[alone] = points.faces, points.barycentric
-    several = np.flatnonzero(count > 1)
+    several = np.flatnonzero(count > 1).tolist()
     wanted = np.zeros(mesh.n_vertices + 1, dtype=bool)
     known = np.array([v for k in several for v in nodes[k].vertices], dtype=np.int64)
     wanted[known[(known >= 0) & (known < mesh.n_vertices)]] = True
     around: dict[int, list[int]] = {}
-    for face in np.flatnonzero(wanted[mesh.faces].any(axis=1)).tolist() if len(several) else []:
+    for face in np.flatnonzero(wanted[mesh.faces].any(axis=1)).tolist() if several else []:
         for v in mesh.faces[face].tolist():
             around.setdefault(v, []).append(face)
-    for k in several.tolist():
+    for k in several:
         ids = nodes[k].vertices
         shared = set.intersection(*(set(around.get(v, ())) for v in ids))
         if not shared:
-            raise SourceError(f"point {k} lies between vertices {list(ids)}, which no face has in common")
+            raise SourceError(
+                f"point {k} lies between vertices {list(ids)}, which no face has in common",
+                element=f"point {k}",
+            )
         faces[k] = min(shared)
         corners = mesh.faces[faces[k]].tolist()
         for v, w in zip(ids, nodes[k].weights, strict=True):
@@ -171,13 +180,14 @@ def on_faces(nodes: Sequence[Node], domain: Any) -> tuple[NDArray[np.int64], NDA
     return faces, weights
 
 
-def groups_of(curves: Sequence[Any], domain: Any) -> list[Group]:
+def groups_of(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> list[Group]:
     """Curves and points, as a file has them; closed curves end with their first point."""
     groups = []
     for number, curve in enumerate(curves):
         if not isinstance(curve, (Curve, SurfacePoints)):
             raise SourceError(
-                f"item {number} is a {type(curve).__name__}: files of curves hold Curve and SurfacePoints"
+                f"item {number} is a {type(curve).__name__}: files of curves hold Curve and SurfacePoints",
+                element=f"item {number}",
             )
         nodes = nodes_of(curve.faces, curve.barycentric, domain)
         if isinstance(curve, Curve):
@@ -188,7 +198,7 @@ def groups_of(curves: Sequence[Any], domain: Any) -> list[Group]:
     return groups
 
 
-def write_text(curves: Sequence[Any], domain: Any) -> str:
+def write_text(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
     """The published demo's format."""
     table = edge_vertices(domain)
     number = {tuple(sorted(e)): (k, e[0]) for k, e in enumerate(table.tolist())}
@@ -208,7 +218,7 @@ def write_text(curves: Sequence[Any], domain: Any) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_json(curves: Sequence[Any], domain: Any) -> str:
+def write_json(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
     """Portable JSON."""
     groups = []
     for group in groups_of(curves, domain):
@@ -218,9 +228,11 @@ def write_json(curves: Sequence[Any], domain: Any) -> str:
     return json.dumps({"index_base": 0, "groups": groups}) + "\n"
 
 
-def write_obj(curves: Sequence[Any], domain: Any) -> str:
+def write_obj(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
     """Polylines in space."""
-    mesh, vertices, elements = domain.triangulation, [], []
+    mesh = domain.triangulation
+    vertices: list[str] = []
+    elements: list[str] = []
     for curve in curves:
         points = np.einsum("ik,ikj->ij", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]])
         ids = [len(vertices) + k + 1 for k in range(len(points))]

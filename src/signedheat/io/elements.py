@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from .files import PathLike, extension
+
+SurfaceShape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud
+"""What most files of shapes hold."""
 
 
 def assemble(
@@ -24,7 +27,7 @@ def assemble(
     return PolygonMesh(vertices, np.split(corners, np.cumsum(counts)[:-1]))
 
 
-def faces_of(shape: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def faces_of(shape: SurfaceShape) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The opposite of `assemble`: all corners, and the number of corners of each face; none for points."""
     if isinstance(shape, TriangleMesh):
         return shape.faces.ravel(), np.full(shape.n_faces, 3)
@@ -33,20 +36,23 @@ def faces_of(shape: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
 
-def points_of(shape: Any) -> NDArray[np.float64]:
+def points_of(shape: SurfaceShape) -> NDArray[np.float64]:
     """Vertices of a mesh, points of a cloud."""
     return shape.points if isinstance(shape, PointCloud) else shape.vertices
 
 
-def face_lists(shape: Any) -> Sequence[Sequence[int]]:
+def face_lists(shape: SurfaceShape) -> Sequence[Sequence[int]]:
     """Corners of each face, as lists; none for points."""
     if isinstance(shape, TriangleMesh):
-        return shape.faces.tolist()
+        result: Sequence[Sequence[int]] = shape.faces.tolist()
+        return result
     return [] if isinstance(shape, PointCloud) else [polygon.tolist() for polygon in shape.polygons]
 
 
-def refuse(shape: Any, path: PathLike, holds: str, instead: str) -> FileFormatError:
+def refuse(shape: object, path: PathLike, holds: str, instead: str) -> FileFormatError:
     """The error for a format that cannot hold a kind of shape."""
     return FileFormatError(
-        f"{path}: {extension(path)} files hold {holds}, not a {type(shape).__name__}: save it as {instead}"
+        f"{extension(path)} files hold {holds}, not a {type(shape).__name__}",
+        remedy=f"save it as {instead}",
+        path=path,
     )

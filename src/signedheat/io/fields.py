@@ -17,6 +17,7 @@ from ..errors import FileFormatError, GeometryError
 from ..fields.files import save_field as save_any_field
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
+from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
@@ -34,13 +35,19 @@ Parts = tuple[Any, ...]
 
 
 @save_any_field.provide
-def _(field: GridField | TetField | VertexField, path: PathLike) -> None:
+def _(field: object, path: PathLike) -> None:
     if isinstance(field, GridField):
         save_field(field, path)
     elif isinstance(field, TetField):
         save_tet_field(field, path)
-    else:
+    elif isinstance(field, VertexField):
         save_vertex_field(field, path)
+    else:
+        raise FileFormatError(
+            f"a {type(field).__name__} is no field",
+            remedy="pass what a solver returned",
+            path=path,
+        )
 
 
 def save_field(field: GridField, path: PathLike) -> None:
@@ -62,9 +69,16 @@ def save_field(field: GridField, path: PathLike) -> None:
         If the format is unknown, has no room for the field's dimension, or the file cannot be written.
     """
     if not isinstance(field, GridField):
-        raise FileFormatError(f"{path}: a {type(field).__name__} is no field on a grid: it has formats of its own")
+        raise FileFormatError(
+            f"a {type(field).__name__} is no field on a grid: it has formats of its own",
+            path=path,
+        )
     if field.grid.dimension not in _DIMENSIONS.get(extension(path), (field.grid.dimension,)):
-        raise FileFormatError(f"{path}: the field has {field.grid.dimension} axes, too many or few: save it as .npz")
+        raise FileFormatError(
+            f"the field has {field.grid.dimension} axes, too many or few",
+            remedy="save it as .npz",
+            path=path,
+        )
     ensure_field_writable(path)
     write, _ = _FORMATS[extension(path)]
     if extension(path) == ".npy":
@@ -89,7 +103,7 @@ def ensure_field_writable(path: PathLike) -> None:
         _openvdb(path)
 
 
-def load_field(path: PathLike) -> GridField | TetField | VertexField:
+def load_field(path: PathLike) -> Field:
     """Read a field that `save_field` wrote, exactly as it was: values and transform.
 
     Parameters
@@ -128,10 +142,13 @@ def load_field(path: PathLike) -> GridField | TetField | VertexField:
     try:
         values, origin, spacing, *mask = read(path)
         if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
-            raise FileFormatError(f"{path}: the values are no real numbers but {values.dtype}: it holds no field")
+            raise FileFormatError(
+                f"the values are no real numbers but {values.dtype}: it holds no field",
+                path=path,
+            )
         return GridField(Grid(origin, spacing, values.shape, *mask), np.ascontiguousarray(values))
     except GeometryError as error:
-        raise FileFormatError(f"{path}: {error}") from error
+        raise FileFormatError(error.cause, remedy=error.remedy, element=error.element, path=path) from error
 
 
 def _description(grid: Grid) -> dict[str, Any]:
@@ -139,6 +156,7 @@ def _description(grid: Grid) -> dict[str, Any]:
 
 
 def _write_npz(field: GridField, path: Path) -> None:
+    mask: dict[str, Any] = {} if field.grid.mask is None else {"mask": field.grid.mask}
     with path.open("wb") as file:
         np.savez(
             file,
@@ -146,7 +164,7 @@ def _write_npz(field: GridField, path: Path) -> None:
             origin=field.grid.origin,
             spacing=field.grid.spacing,
             convention=np.array(CONVENTION),
-            **({} if field.grid.mask is None else {"mask": field.grid.mask}),
+            **mask,
         )
 
 
@@ -156,11 +174,18 @@ def _read_npz(path: PathLike) -> Parts:
             solid = [file["mask"]] if "mask" in file else []
             return file["values"], file["origin"], file["spacing"], *solid
     except KeyError as error:
-        raise FileFormatError(f"{path}: {error}: a field has values, origin and spacing") from error
+        raise FileFormatError(
+            f"{error}: a field has values, origin and spacing",
+            path=path,
+        ) from error
     except FileFormatError:
         raise
     except Exception as error:
-        raise FileFormatError(f"{path}: it is no .npz file, or is truncated ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no .npz file, or is truncated ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
 
 
 def _write_npy(field: GridField, path: Path) -> None:
@@ -172,7 +197,11 @@ def _read_npy(path: PathLike) -> Parts:
     try:
         values = np.load(io.BytesIO(contents(path)), allow_pickle=False)
     except ValueError as error:
-        raise FileFormatError(f"{path}: it is no .npy file, or is truncated ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no .npy file, or is truncated ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     beside = Path(path).with_suffix(".json")
     try:
         about = json.loads(contents(beside))
@@ -180,7 +209,11 @@ def _read_npy(path: PathLike) -> Parts:
     except (ValueError, KeyError, TypeError) as error:
         if isinstance(error, FileFormatError):
             raise
-        raise FileFormatError(f"{beside}: origin and spacing cannot be read ({error}): write them again") from error
+        raise FileFormatError(
+            f"origin and spacing cannot be read ({error})",
+            remedy="write them again",
+            path=beside,
+        ) from error
 
 
 def _write_vti(field: GridField, path: Path) -> None:
@@ -210,11 +243,19 @@ def _read_nrrd(path: PathLike) -> Parts:
     try:
         values, header = nrrd.read(str(path), index_order="F")
     except Exception as error:
-        raise FileFormatError(f"{path}: it is no NRRD file, or is truncated ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no NRRD file, or is truncated ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     directions = np.atleast_2d(header.get("space directions", np.diag(header.get("spacings", np.ones(values.ndim)))))
     spacing = np.diag(directions) if directions.shape == (values.ndim, values.ndim) else np.zeros(values.ndim)
     if not np.array_equal(directions, np.diag(spacing)):
-        raise FileFormatError(f"{path}: its axes are not x, y, z: resample the image along them")
+        raise FileFormatError(
+            "its axes are not x, y, z",
+            remedy="resample the image along them",
+            path=path,
+        )
     return values, np.asarray(header.get("space origin", np.zeros(values.ndim))), spacing
 
 
@@ -225,8 +266,9 @@ def _openvdb(path: PathLike) -> ModuleType:
         except ImportError:
             continue
     raise FileFormatError(
-        f"{path}: .vdb needs OpenVDB's Python module, which is not installed: conda install -c conda-forge openvdb, "
-        "or save as .vti"
+        ".vdb needs OpenVDB's Python module, which is not installed",
+        remedy="conda install -c conda-forge openvdb, or save as .vti",
+        path=path,
     )
 
 
@@ -259,7 +301,11 @@ def _read_vdb(path: PathLike) -> Parts:
         same = written.shape == spacing.shape and np.allclose(written, spacing, rtol=1e-9, atol=0)
         return values, origin, written if same else spacing
     except Exception as error:
-        raise FileFormatError(f"{path}: it cannot be read as a VDB volume ({error}): write it again") from error
+        raise FileFormatError(
+            f"it cannot be read as a VDB volume ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
 
 
 _FORMATS: dict[str, tuple[Callable[[GridField, Path], None], Callable[[PathLike], Parts]]] = {

@@ -26,7 +26,11 @@ def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> F
     """The error for a name that tells no format we know."""
     ending = extension(path)
     cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
-    return FileFormatError(f"{path}: {cause} for {purpose}: use one of {' '.join(sorted(known))}")
+    return FileFormatError(
+        f"{cause} for {purpose}",
+        remedy=f"use one of {' '.join(sorted(known))}",
+        path=path,
+    )
 
 
 def contents(path: PathLike) -> bytes:
@@ -40,13 +44,29 @@ def contents(path: PathLike) -> bytes:
     try:
         data = Path(path).read_bytes()
     except FileNotFoundError:
-        raise FileFormatError(f"{path}: there is no such file: check the name") from None
+        raise FileFormatError(
+            "there is no such file",
+            remedy="check the name",
+            path=path,
+        ) from None
     except IsADirectoryError:
-        raise FileFormatError(f"{path}: this is a folder: name a file in it") from None
+        raise FileFormatError(
+            "this is a folder",
+            remedy="name a file in it",
+            path=path,
+        ) from None
     except OSError as error:
-        raise FileFormatError(f"{path}: cannot be read ({error.strerror}): check its permissions") from error
+        raise FileFormatError(
+            f"cannot be read ({error.strerror})",
+            remedy="check its permissions",
+            path=path,
+        ) from error
     if not data:
-        raise FileFormatError(f"{path}: the file is empty: write or download it again")
+        raise FileFormatError(
+            "the file is empty",
+            remedy="write or download it again",
+            path=path,
+        )
     return data
 
 
@@ -75,7 +95,11 @@ def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> Non
     if extension(path) not in known:
         raise unknown_extension(path, known, purpose)
     if Path(path).is_dir():
-        raise FileFormatError(f"{path}: this is a folder: name a file in it")
+        raise FileFormatError(
+            "this is a folder",
+            remedy="name a file in it",
+            path=path,
+        )
     with _writing(path):
         trial = _unused_name(path)
         trial.touch(exist_ok=False)
@@ -113,7 +137,9 @@ def _writing(path: PathLike) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise FileFormatError(
-            f"{path}: cannot be written ({reason}): choose a folder that exists, is yours and has room"
+            f"cannot be written ({reason})",
+            remedy="choose a folder that exists, is yours and has room",
+            path=path,
         ) from error
 
 
@@ -122,4 +148,8 @@ def numbers(tokens: list[Any], path: PathLike, what: str, kind: type = float) ->
     try:
         return np.array(tokens, dtype=np.float64 if kind is float else np.int64)
     except (ValueError, OverflowError) as error:
-        raise FileFormatError(f"{path}: {what} are not all numbers ({error}): the file is damaged") from error
+        raise FileFormatError(
+            f"{what} are not all numbers ({error}): the file is damaged",
+            remedy="write or download it again",
+            path=path,
+        ) from error

@@ -20,9 +20,17 @@ def read_glb(path: PathLike) -> TriangleMesh:
         scene = trimesh.load_scene(str(Path(path)), file_type=extension(path)[1:], process=False)
         bodies = [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
     except Exception as error:
-        raise FileFormatError(f"{path}: cannot be read as glTF ({error}): the file is damaged") from error
+        raise FileFormatError(
+            f"cannot be read as glTF ({error}): the file is damaged",
+            remedy="write or download it again",
+            path=path,
+        ) from error
     if not bodies:
-        raise FileFormatError(f"{path}: the scene holds no triangles: export the shape as a mesh")
+        raise FileFormatError(
+            "the scene holds no triangles",
+            remedy="export the shape as a mesh",
+            path=path,
+        )
     starts = np.cumsum([0] + [len(body.vertices) for body in bodies])
     faces = [np.asarray(body.faces) + start for body, start in zip(bodies, starts, strict=False)]
     return TriangleMesh(np.concatenate([body.vertices for body in bodies]), np.concatenate(faces))

@@ -15,7 +15,7 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
-from .elements import faces_of, points_of
+from .elements import SurfaceShape, faces_of, points_of
 
 _SIDES = {"triangle": 3, "quad": 4}
 
@@ -27,21 +27,27 @@ def from_trimesh(kind: type, thing: Any) -> Any:
     return _build(kind, np.asarray(thing.vertices), corners.ravel(), np.full(len(corners), 3))
 
 
-def to_trimesh(shape: Any) -> Any:
+def to_trimesh(shape: SurfaceShape) -> Any:
     """As a `trimesh.Trimesh` (not processed: nothing is merged) or `trimesh.PointCloud`."""
     import trimesh
 
     if isinstance(shape, PointCloud):
-        return trimesh.PointCloud(np.array(shape.points))
+        return trimesh.PointCloud(np.array(shape.points))  # type: ignore[no-untyped-call]
     if isinstance(shape, PolygonMesh):
-        raise GeometryError("trimesh holds triangles only, and this is a PolygonMesh: use to_pyvista or to_meshio")
+        raise GeometryError(
+            "trimesh holds triangles only, and this is a PolygonMesh",
+            remedy="use to_pyvista or to_meshio",
+        )
     return trimesh.Trimesh(np.array(shape.vertices), np.array(shape.faces), process=False)
 
 
 def from_pyvista(kind: type, thing: Any) -> Any:
     """From a `pyvista.PolyData`; points with point data ``Normals`` have normals."""
     if getattr(thing, "n_strips", 0):
-        raise GeometryError("the mesh holds triangle strips: call its triangulate() first")
+        raise GeometryError(
+            "the mesh holds triangle strips",
+            remedy="call its triangulate() first",
+        )
     faces = np.asarray(thing.faces, dtype=np.int64)
     starts, at = [], 0
     while at < len(faces):
@@ -52,7 +58,7 @@ def from_pyvista(kind: type, thing: Any) -> Any:
     return _build(kind, np.asarray(thing.points), np.delete(faces, starts), counts, normals)
 
 
-def to_pyvista(shape: Any) -> Any:
+def to_pyvista(shape: SurfaceShape) -> Any:
     """As a `pyvista.PolyData`; normals of points are point data ``Normals``."""
     import pyvista
 
@@ -76,7 +82,7 @@ def from_meshio(kind: type, thing: Any) -> Any:
     return _build(kind, thing.points, flat, counts, normals if kind is PointCloud else None)
 
 
-def to_meshio(shape: Any) -> Any:
+def to_meshio(shape: SurfaceShape) -> Any:
     """As a `meshio.Mesh`; normals of points are point data ``nx``, ``ny``, ``nz``."""
     import meshio
 
@@ -107,7 +113,11 @@ def _build(
         return PolygonMesh(points, np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else [])
     wrong = np.flatnonzero(counts != 3)
     if len(wrong):
-        raise GeometryError(f"face {wrong[0]} has {counts[wrong[0]]} corners, not 3: use PolygonMesh instead")
+        raise GeometryError(
+            f"face {wrong[0]} has {counts[wrong[0]]} corners, not 3",
+            remedy="use PolygonMesh instead",
+            element=f"face {wrong[0]}",
+        )
     return TriangleMesh(points, corners.reshape(-1, 3))
 
 

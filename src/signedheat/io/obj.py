@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import assemble, face_lists, points_of, refuse
+from .elements import SurfaceShape, assemble, face_lists, points_of, refuse
 from .files import PathLike, numbers, text
 
 
-def read_obj(path: PathLike) -> Any:
+def read_obj(path: PathLike) -> SurfaceShape:
     """The faces of an OBJ file, or its points where it has none; texture and faces' normals play no part."""
     lines = _lines_by_keyword(path)
     vertices = _coordinates(lines.get("v", []), path, "vertices")
@@ -23,7 +22,9 @@ def read_obj(path: PathLike) -> Any:
         return assemble(vertices, corners, counts)
     if "l" in lines:
         raise FileFormatError(
-            f"{path}: there are {len(lines['l'])} line elements and no face: read them with sh.read_curves(path, mesh)"
+            f"there are {len(lines['l'])} line elements and no face",
+            remedy="read them with sh.read_curves(path, mesh)",
+            path=path,
         )
     normals = _coordinates(lines["vn"], path, "normals") if "vn" in lines else None
     return PointCloud(vertices, normals)
@@ -37,7 +38,7 @@ def read_obj_lines(path: PathLike) -> tuple[NDArray[np.float64], list[NDArray[np
     return vertices, np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else []
 
 
-def write_obj(shape: Any, path: PathLike) -> bytes:
+def write_obj(shape: SurfaceShape, path: PathLike) -> bytes:
     """OBJ text; points become ``v`` lines, and ``vn`` lines where they have normals."""
     rows = ["v {!r} {!r} {!r}".format(*p) for p in points_of(shape).tolist()]
     if isinstance(shape, PointCloud) and shape.normals is not None:
@@ -46,7 +47,7 @@ def write_obj(shape: Any, path: PathLike) -> bytes:
     return ("\n".join(rows) + "\n").encode()
 
 
-def write_pc(shape: Any, path: PathLike) -> bytes:
+def write_pc(shape: SurfaceShape, path: PathLike) -> bytes:
     """Oriented points, as OBJ text."""
     if not isinstance(shape, PointCloud):
         raise refuse(shape, path, "points", ".obj or .ply")
@@ -60,7 +61,10 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[str]]]:
         if words and words[0] in lines:
             lines[words[0]].append(words[1:])
     if not lines["v"]:
-        raise FileFormatError(f"{path}: there is no line 'v x y z': this holds no shape in OBJ format")
+        raise FileFormatError(
+            "there is no line 'v x y z': this holds no shape in OBJ format",
+            path=path,
+        )
     return {keyword: rest for keyword, rest in lines.items() if rest}
 
 
@@ -69,7 +73,10 @@ def _coordinates(rows: list[list[str]], path: PathLike, what: str) -> NDArray[np
     short = next((k for k, row in enumerate(rows) if len(row) < 3), None)
     if short is not None:
         raise FileFormatError(
-            f"{path}: number {short} of the {what} has {len(rows[short])} coordinates instead of 3: is it truncated?"
+            f"number {short} of the {what} has {len(rows[short])} coordinates instead of 3",
+            remedy="it may be truncated, so write or download it again",
+            element=f"number {short}",
+            path=path,
         )
     return numbers([row[:3] for row in rows], path, what).reshape(-1, 3)
 
@@ -82,5 +89,9 @@ def _elements(words: list[list[str]], n_vertices: int, path: PathLike) -> tuple[
         flat = [word.partition("/")[0] for word in flat]
     ids = numbers(flat, path, "vertex ids", int)
     if (ids == 0).any():
-        raise FileFormatError(f"{path}: a face names vertex 0, but OBJ counts from 1: the file is damaged")
+        raise FileFormatError(
+            "a face names vertex 0, but OBJ counts from 1: the file is damaged",
+            remedy="write or download it again",
+            path=path,
+        )
     return np.where(ids > 0, ids - 1, ids + n_vertices), counts

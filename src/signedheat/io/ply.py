@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import assemble, faces_of, points_of
+from .elements import SurfaceShape, assemble, faces_of, points_of
 from .files import PathLike, contents, numbers
 
 _TYPES = {
@@ -38,7 +38,7 @@ class _Element:
     properties: dict[str, str | tuple[str, str]] = field(default_factory=dict)
 
 
-def read_ply(path: PathLike) -> Any:
+def read_ply(path: PathLike) -> SurfaceShape:
     """The faces of a PLY file, strips unrolled; or its points, with ``nx ny nz`` and ``area`` where they are given."""
     data = contents(path)
     form, elements, body = _header(data, path)
@@ -46,7 +46,10 @@ def read_ply(path: PathLike) -> Any:
     tables = {element.name: read_element(element) for element in elements}
     vertex = tables.get("vertex", {})
     if not {"x", "y", "z"} <= vertex.keys():
-        raise FileFormatError(f"{path}: there is no element 'vertex' with x, y and z: this holds no shape")
+        raise FileFormatError(
+            "there is no element 'vertex' with x, y and z: this holds no shape",
+            path=path,
+        )
     vertices = _columns(vertex, "xyz")
     face = tables.get("face", {})
     lists = face.get("vertex_indices", face.get("vertex_index"))
@@ -59,7 +62,7 @@ def read_ply(path: PathLike) -> Any:
     return PointCloud(vertices, normals, vertex.get("area"))
 
 
-def write_ply(shape: Any, path: PathLike) -> bytes:
+def write_ply(shape: SurfaceShape, path: PathLike) -> bytes:
     """Binary PLY in double precision."""
     names, columns = ["x", "y", "z"], [points_of(shape)]
     if isinstance(shape, PointCloud) and shape.normals is not None:
@@ -93,11 +96,18 @@ def _unrolled(strip: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _header(data: bytes, path: PathLike) -> tuple[str, list[_Element], bytes]:
     if not data.startswith(b"ply"):
-        raise FileFormatError(f"{path}: it does not begin with 'ply': this is no PLY file")
+        raise FileFormatError(
+            "it does not begin with 'ply': this is no PLY file",
+            path=path,
+        )
     end = data.find(b"end_header")
     newline = data.find(b"\n", end)
     if end < 0 or newline < 0:
-        raise FileFormatError(f"{path}: the header has no end: the file is truncated")
+        raise FileFormatError(
+            "the header has no end: the file is truncated",
+            remedy="write or download it again",
+            path=path,
+        )
     form, elements = "", []
     for line in data[:end].decode("ascii", errors="replace").splitlines()[1:]:
         words = line.split()
@@ -112,15 +122,25 @@ def _header(data: bytes, path: PathLike) -> tuple[str, list[_Element], bytes]:
                 case ["property"]:
                     elements[-1].properties[words[2]] = _TYPES[words[1]]
         except (IndexError, KeyError, ValueError):
-            raise FileFormatError(f"{path}: the header line '{line}' makes no sense: the file is damaged") from None
+            raise FileFormatError(
+                f"the header line '{line}' makes no sense: the file is damaged",
+                remedy="write or download it again",
+                path=path,
+            ) from None
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise FileFormatError(f"{path}: the format '{form}' is none that PLY has: the file is damaged")
+        raise FileFormatError(
+            f"the format '{form}' is none that PLY has: the file is damaged",
+            remedy="write or download it again",
+            path=path,
+        )
     return form, elements, data[newline + 1 :]
 
 
 def _truncated(path: PathLike, element: _Element) -> FileFormatError:
     return FileFormatError(
-        f"{path}: the data end within the {element.count} announced of element '{element.name}': the file is truncated"
+        f"the data end within the {element.count} announced of element '{element.name}': the file is truncated",
+        remedy="write or download it again",
+        path=path,
     )
 
 

@@ -52,7 +52,9 @@ def read_polylines(path: PathLike) -> list[Polyline]:
         try:
             lines.append(Polyline(points, closed))
         except GeometryError as error:
-            raise GeometryError(f"{path}: polyline {number}: {error}") from error
+            raise GeometryError(
+                f"polyline {number}: {error.cause}", remedy=error.remedy, element=f"polyline {number}", path=path
+            ) from error
     return lines
 
 
@@ -100,9 +102,17 @@ def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
             closed = abs(subpath.end - subpath.start) <= 1e-9 * max(map(abs, places), default=0.0)
             found.append((np.array(places if closed else [*places, subpath.end]), closed))
     except Exception as error:  # the parser lets through whatever it stumbles on
-        raise FileFormatError(f"{path}: it is no SVG drawing, or is damaged ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no SVG drawing, or is damaged ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     if not found:
-        raise FileFormatError(f"{path}: there is no line in the drawing: convert text and images to paths first")
+        raise FileFormatError(
+            "there is no line in the drawing",
+            remedy="convert text and images to paths first",
+            path=path,
+        )
     return [(np.stack([points.real, -points.imag], axis=1), closed) for points, closed in found]
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
+from ..domains.digital_surface import DigitalSurface
 from ..domains.exchange import save_shape
+from ..domains.kinds import Shape
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
+from .elements import SurfaceShape
 from .files import PathLike, extension, replacing, unknown_extension
 from .glb import read_glb
 from .obj import read_obj, write_obj, write_pc
@@ -20,7 +22,7 @@ from .volumes import read_volume
 from .vtk_xml import read_vtp, write_vtp
 from .xyz import read_xyz, write_xyz
 
-READERS: dict[str, Callable[[PathLike], Any]] = {
+READERS: dict[str, Callable[[PathLike], Shape]] = {
     ".glb": read_glb,
     ".gltf": read_glb,
     ".npy": read_volume,
@@ -36,7 +38,7 @@ READERS: dict[str, Callable[[PathLike], Any]] = {
     **dict.fromkeys(TET_FORMATS, read_tets),
 }
 
-WRITERS: dict[str, Callable[[Any, PathLike], bytes]] = {
+WRITERS: dict[str, Callable[[SurfaceShape, PathLike], bytes]] = {
     ".obj": write_obj,
     ".off": write_off,
     ".pc": write_pc,
@@ -49,7 +51,7 @@ WRITERS: dict[str, Callable[[Any, PathLike], bytes]] = {
 SHAPE_FORMATS = frozenset(WRITERS)
 
 
-def read(path: PathLike) -> Any:
+def read(path: PathLike) -> Shape:
     """Read a shape; the extension says the format.
 
     STL, OBJ, PLY, OFF, VTP and GLB hold surfaces; PLY, XYZ, PC, OBJ, OFF and VTP without faces hold points. Vertices
@@ -89,11 +91,10 @@ def read(path: PathLike) -> Any:
     try:
         return reader(path)
     except GeometryError as error:
-        raise GeometryError(f"{path}: {error}") from error
+        raise error.at(path) from error
 
 
-@save_shape.provide
-def save(shape: Any, path: PathLike) -> None:
+def save(shape: Shape, path: PathLike) -> None:
     """Write a shape; the extension says the format.
 
     OBJ, OFF, PLY, VTP, XYZ and PC keep every bit of the coordinates; STL holds single precision. The file is written
@@ -116,5 +117,12 @@ def save(shape: Any, path: PathLike) -> None:
     writer = WRITERS.get(extension(path))
     if writer is None:
         raise unknown_extension(path, WRITERS, "a shape")
+    if isinstance(shape, DigitalSurface):
+        shape = shape.squares
     with replacing(path) as temporary:
         temporary.write_bytes(writer(shape, path))
+
+
+@save_shape.provide
+def _(shape: object, path: PathLike) -> None:
+    save(shape, path)  # type: ignore[arg-type]  # methods of shapes call it, and nothing else

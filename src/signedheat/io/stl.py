@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
-from .elements import refuse
+from .elements import SurfaceShape, refuse
 from .files import PathLike, contents, numbers
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -29,15 +27,16 @@ def read_stl(path: PathLike) -> TriangleMesh:
         corners = _text_corners(data, path)
     elif len(data) < _HEADER + 50 * announced or len(data) < _HEADER:
         raise FileFormatError(
-            f"{path}: {announced} facets need {_HEADER + 50 * announced} bytes, the file has {len(data)}: it is "
-            "truncated, or no STL file"
+            f"{announced} facets need {_HEADER + 50 * announced} bytes, the file has {len(data)}: it "
+            "is truncated, or no STL file",
+            path=path,
         )
     else:
         corners = np.frombuffer(data, _FACET, announced, _HEADER)["corners"].astype(np.float64)
     return _indexed(corners.reshape(-1, 3))
 
 
-def write_stl(shape: Any, path: PathLike) -> bytes:
+def write_stl(shape: SurfaceShape, path: PathLike) -> bytes:
     """Binary STL, in single precision."""
     if not isinstance(shape, TriangleMesh):
         kinds = ".ply or .xyz" if isinstance(shape, PointCloud) else ".obj, .ply, .off or .vtp"
@@ -45,19 +44,32 @@ def write_stl(shape: Any, path: PathLike) -> bytes:
     facets = np.zeros(shape.n_faces, dtype=_FACET)
     facets["corners"] = shape.vertices[shape.faces]
     if not np.isfinite(facets["corners"]).all():
-        raise FileFormatError(f"{path}: coordinates are too large for the single precision of STL: save it as .ply")
+        raise FileFormatError(
+            "coordinates are too large for the single precision of STL",
+            remedy="save it as .ply",
+            path=path,
+        )
     lengths = np.maximum(2 * shape.face_areas, np.finfo(float).tiny)
     facets["normal"] = 2 * shape.face_area_vectors / lengths[:, None]
-    return b"signedheat".ljust(80) + np.uint32(shape.n_faces).astype("<u4").tobytes() + facets.tobytes()
+    result: bytes = b"signedheat".ljust(80) + np.uint32(shape.n_faces).astype("<u4").tobytes() + facets.tobytes()
+    return result
 
 
 def _text_corners(data: bytes, path: PathLike) -> NDArray[np.float64]:
     words = data.lower().split()
     if words.count(b"solid") and b"endsolid" not in words[-40:]:
-        raise FileFormatError(f"{path}: the last solid has no end: the file is truncated")
+        raise FileFormatError(
+            "the last solid has no end: the file is truncated",
+            remedy="write or download it again",
+            path=path,
+        )
     at = [k for k, word in enumerate(words) if word == b"vertex"]
     if len(at) % 3 or (at and at[-1] + 3 >= len(words)):
-        raise FileFormatError(f"{path}: a facet has fewer than 3 vertices: the file is truncated or damaged")
+        raise FileFormatError(
+            "a facet has fewer than 3 vertices: the file is truncated or damaged",
+            remedy="write or download it again",
+            path=path,
+        )
     return numbers([words[k + 1 : k + 4] for k in at], path, "vertices").reshape(-1, 3)
 
 

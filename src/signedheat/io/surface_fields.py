@@ -12,12 +12,13 @@ from zipfile import BadZipFile, ZipFile, is_zipfile
 
 import numpy as np
 
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..fields.vertex_field import VertexField
-from .elements import faces_of, points_of
+from .elements import SurfaceShape, faces_of, points_of
 from .files import PathLike, contents, extension, replacing, unknown_extension
 from .vtk_xml import _Writer
 
@@ -29,11 +30,19 @@ def save_vertex_field(field: VertexField, path: PathLike) -> None:
     writer = WRITERS.get(extension(path))
     if writer is None:
         raise unknown_extension(path, WRITERS, "a field on a surface")
-    if not isinstance(field.domain, (TriangleMesh, PolygonMesh, PointCloud)):
-        field = VertexField(field.domain.triangulation, field.domain.on_triangulation(field.values))
-    content = writer(field)
+    content = writer(_on_simple_surface(field))
     with replacing(path) as temporary:
         temporary.write_bytes(content)
+
+
+def _on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
+    """The field on what files hold: voxels as triangles."""
+    domain = field.domain
+    if isinstance(domain, TriangleMesh | PolygonMesh | PointCloud):
+        return VertexField(domain, field.values)
+    if isinstance(domain, IntrinsicTriangulation):
+        return _on_simple_surface(field.restrict())
+    return VertexField(domain.triangulation, domain.on_triangulation(field.values))
 
 
 def load_vertex_field(path: PathLike) -> VertexField:
@@ -43,19 +52,30 @@ def load_vertex_field(path: PathLike) -> VertexField:
             arrays = dict(file)
         vertices, values = arrays["vertices"], arrays["values"]
         if "offsets" in arrays:
-            domain: Any = PolygonMesh(vertices, np.split(arrays["faces"], arrays["offsets"][1:-1]))
+            domain: SurfaceShape = PolygonMesh(vertices, np.split(arrays["faces"], arrays["offsets"][1:-1]))
         elif "faces" in arrays:
             domain = TriangleMesh(vertices, arrays["faces"])
         else:
             domain = PointCloud(vertices, arrays.get("normals"))
     except KeyError as error:
-        raise FileFormatError(f"{path}: {error}: a field on a surface has values and vertices") from error
+        raise FileFormatError(
+            f"{error}: a field on a surface has values and vertices",
+            path=path,
+        ) from error
     except FileFormatError:
         raise
     except (ValueError, OSError, EOFError, BadZipFile) as error:
-        raise FileFormatError(f"{path}: it is no .npz file, or is damaged ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no .npz file, or is damaged ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     if values.shape != (len(vertices),):
-        raise FileFormatError(f"{path}: {values.shape} values for {len(vertices)} vertices: the file is damaged")
+        raise FileFormatError(
+            f"{values.shape} values for {len(vertices)} vertices: the file is damaged",
+            remedy="write or download it again",
+            path=path,
+        )
     return VertexField(domain, values)
 
 
@@ -67,10 +87,10 @@ def is_vertex_field(path: PathLike) -> bool:
         return {"values.npy", "vertices.npy"} <= set(file.namelist())
 
 
-def write_npz(field: VertexField) -> bytes:
+def write_npz(field: VertexField[SurfaceShape]) -> bytes:
     """Arrays, exact to the last bit."""
     domain, buffer = field.domain, io.BytesIO()
-    arrays = {"values": field.values, "vertices": points_of(domain)}
+    arrays: dict[str, Any] = {"values": field.values, "vertices": points_of(domain)}
     if isinstance(domain, TriangleMesh):
         arrays["faces"] = domain.faces
     elif isinstance(domain, PolygonMesh):
@@ -81,7 +101,7 @@ def write_npz(field: VertexField) -> bytes:
     return buffer.getvalue()
 
 
-def write_ply(field: VertexField) -> bytes:
+def write_ply(field: VertexField[SurfaceShape]) -> bytes:
     """Binary, in double precision."""
     corners, counts = faces_of(field.domain)
     table = np.column_stack([points_of(field.domain), field.values]).astype("<f8")
@@ -92,7 +112,7 @@ def write_ply(field: VertexField) -> bytes:
     return ("\n".join([*lines, "end_header"]) + "\n").encode() + table.tobytes() + listed.tobytes()
 
 
-def write_vtp(field: VertexField) -> bytes:
+def write_vtp(field: VertexField[SurfaceShape]) -> bytes:
     """For ParaView."""
     points, (corners, counts) = points_of(field.domain), faces_of(field.domain)
     group = "Polys" if len(counts) else "Verts"
@@ -107,7 +127,7 @@ def write_vtp(field: VertexField) -> bytes:
     return writer.file("PolyData", f"<PolyData><Piece {sizes}>{data}{xyz}{cells}</Piece></PolyData>")
 
 
-def write_obj(field: VertexField) -> bytes:
+def write_obj(field: VertexField[SurfaceShape]) -> bytes:
     """φ as the first texture coordinate, in the units of the surface."""
     corners, counts = faces_of(field.domain)
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points_of(field.domain).tolist()]
@@ -118,7 +138,7 @@ def write_obj(field: VertexField) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-WRITERS: dict[str, Callable[[VertexField], bytes]] = {
+WRITERS: dict[str, Callable[[VertexField[SurfaceShape]], bytes]] = {
     ".npz": write_npz,
     ".obj": write_obj,
     ".ply": write_ply,

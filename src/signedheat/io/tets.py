@@ -32,7 +32,7 @@ MODULES = {
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 
 
-def read_tets(path: PathLike) -> Any:
+def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     """Read a `TetMesh`; or, from a file without tets, the surface that it holds.
 
     Raises
@@ -48,7 +48,10 @@ def read_tets(path: PathLike) -> Any:
         return TetMesh.from_meshio(mesh)
     if kinds & {"tetra10", "hexahedron", "wedge", "hierarchy"} or not kinds & {"triangle", "quad"}:
         found = ", ".join(sorted(kinds)) or "no cells"
-        raise GeometryError(f"{path} holds no tets, but {found}: convert it to linear tetrahedra first")
+        raise GeometryError(
+            f"{path} holds no tets, but {found}",
+            remedy="convert it to linear tetrahedra first",
+        )
     return (TriangleMesh if "quad" not in kinds else PolygonMesh).from_meshio(mesh)
 
 
@@ -74,11 +77,14 @@ def load_tet_field(path: PathLike) -> TetField:
     """
     mesh = _load(path)
     if NAME not in mesh.point_data:
-        raise FileFormatError(f"{path}: it has no point data '{NAME}': it was not written as a field")
+        raise FileFormatError(
+            f"it has no point data '{NAME}': it was not written as a field",
+            path=path,
+        )
     try:
         return TetField(TetMesh.from_meshio(mesh), np.asarray(mesh.point_data[NAME], dtype=np.float64))
     except GeometryError as error:
-        raise FileFormatError(f"{path}: {error}") from error
+        raise FileFormatError(error.cause, remedy=error.remedy, element=error.element, path=path) from error
 
 
 def _load(path: PathLike) -> Any:
@@ -91,7 +97,10 @@ def _load(path: PathLike) -> Any:
             return module.read(str(path))
     except Exception as error:  # meshio lets through whatever its parsers stumble on
         reason = str(error) or type(error).__name__
-        raise FileFormatError(f"{path}: the file is damaged, or is of another kind ({reason})") from error
+        raise FileFormatError(
+            f"the file is damaged, or is of another kind ({reason})",
+            path=path,
+        ) from error
 
 
 def _store(mesh: Any, path: PathLike) -> None:

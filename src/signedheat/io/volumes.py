@@ -46,7 +46,10 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     """
     values, origin, spacing = _read(path, VOLUME_READERS, "a volume")
     if values.ndim != 3:
-        raise FileFormatError(f"{path}: the image has {values.ndim} axes, and a volume has 3")
+        raise FileFormatError(
+            f"the image has {values.ndim} axes, and a volume has 3",
+            path=path,
+        )
     return DigitalSurface(values if level is None else values > level, spacing, origin, radius)
 
 
@@ -94,7 +97,10 @@ def _read(
         raise unknown_extension(path, readers, what)
     values, origin, spacing = reader(path)
     if values.dtype.kind not in "biuf":
-        raise FileFormatError(f"{path}: the values are no real numbers but {values.dtype}: it holds no image")
+        raise FileFormatError(
+            f"the values are no real numbers but {values.dtype}: it holds no image",
+            path=path,
+        )
     return values, origin, spacing
 
 
@@ -105,7 +111,11 @@ def _read_plain_npy(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], 
     try:
         values = np.load(io.BytesIO(contents(path)), allow_pickle=False)
     except ValueError as error:
-        raise FileFormatError(f"{path}: it is no .npy file, or is truncated ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no .npy file, or is truncated ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     return values, np.zeros(values.ndim), np.ones(values.ndim)
 
 
@@ -118,7 +128,11 @@ def _read_picture(path: PathLike) -> tuple[NDArray[np.float64], NDArray[np.float
         white = Image.new("RGBA", picture.size, "white")
         brightness = np.asarray(Image.alpha_composite(white, picture).convert("L")) / 255
     except (OSError, Image.DecompressionBombError) as error:
-        raise FileFormatError(f"{path}: it is no picture, or is damaged ({error}): write it again") from error
+        raise FileFormatError(
+            f"it is no picture, or is damaged ({error})",
+            remedy="write it again",
+            path=path,
+        ) from error
     return brightness[::-1].T, np.zeros(2), np.ones(2)
 
 

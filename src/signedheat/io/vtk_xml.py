@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import assemble, faces_of, points_of
+from .elements import SurfaceShape, assemble, faces_of, points_of
 from .files import PathLike, contents, numbers
 
 _TYPES = {
@@ -61,12 +61,25 @@ def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray
     """Values (first scalar array), origin and spacing of image data."""
     root, arrays = _parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
-    extent = numbers(image.get("WholeExtent", "").split(), path, "extent", int)
-    if piece is None or len(extent) != 6 or piece.get("Extent", "").split() != image.get("WholeExtent", "").split():
-        raise FileFormatError(f"{path}: the image is not in one piece: write it anew as a single .vti file")
+    extent = numbers(image.get("WholeExtent", "").split() if image is not None else [], path, "extent", int)
+    if (
+        image is None
+        or piece is None
+        or len(extent) != 6
+        or piece.get("Extent", "").split() != image.get("WholeExtent", "").split()
+    ):
+        raise FileFormatError(
+            "the image is not in one piece",
+            remedy="write it anew as a single .vti file",
+            path=path,
+        )
     direction = image.get("Direction", "1 0 0 0 1 0 0 0 1")
     if numbers(direction.split(), path, "direction").tolist() != np.eye(3).ravel().tolist():
-        raise FileFormatError(f"{path}: the axes of the image are turned ({direction}): resample it along x, y, z")
+        raise FileFormatError(
+            f"the axes of the image are turned ({direction})",
+            remedy="resample it along x, y, z",
+            path=path,
+        )
     shape = extent[1::2] - extent[::2] + 1
     dimension = 3 if shape[2] > 1 else 2 if shape[1] > 1 else 1
     spacing = numbers(image.get("Spacing", "1 1 1").split(), path, "spacing")
@@ -76,14 +89,21 @@ def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray
     nodes = piece.find("PointData")
     element = nodes.find("DataArray") if nodes is not None else None
     if element is None:
-        raise FileFormatError(f"{path}: there are no values at the nodes: save them as point data")
+        raise FileFormatError(
+            "there are no values at the nodes",
+            remedy="save them as point data",
+            path=path,
+        )
     values = arrays.of(element)
     if values.size != shape.prod():
-        raise FileFormatError(f"{path}: {values.size} values for {shape.prod()} nodes: it is truncated or no scalar")
+        raise FileFormatError(
+            f"{values.size} values for {shape.prod()} nodes: it is truncated or no scalar",
+            path=path,
+        )
     return values.reshape(shape[:dimension], order="F"), origin[:dimension], spacing[:dimension]
 
 
-def write_vtp(shape: Any, path: PathLike) -> bytes:
+def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:
     """Polygons, or points with their normals as point data."""
     points, (corners, counts) = points_of(shape), faces_of(shape)
     writer = _Writer()
@@ -105,7 +125,7 @@ def write_vtp(shape: Any, path: PathLike) -> bytes:
     return writer.file("PolyData", f"<PolyData>{piece}</PolyData>")
 
 
-def read_vtp(path: PathLike) -> Any:
+def read_vtp(path: PathLike) -> SurfaceShape:
     """The polygons of all pieces, or the points where there is no polygon."""
     root, arrays = _parse(path, "PolyData")
     points, corners, counts, normals, areas, n_points = [], [], [], [], [], 0
@@ -116,7 +136,11 @@ def read_vtp(path: PathLike) -> Any:
             for element in group.iter("DataArray")
         }
         if int(piece.get("NumberOfStrips", 0)):
-            raise FileFormatError(f"{path}: there are triangle strips: turn them into triangles before saving")
+            raise FileFormatError(
+                "there are triangle strips",
+                remedy="turn them into triangles before saving",
+                path=path,
+            )
         own = next((values for (tag, _), values in table.items() if tag == "Points"), np.empty(0)).reshape(-1, 3)
         offsets = table.get(("Polys", "offsets"), np.empty(0)).astype(np.int64)
         corners.append(table.get(("Polys", "connectivity"), np.empty(0)).astype(np.int64) + n_points)
@@ -126,7 +150,10 @@ def read_vtp(path: PathLike) -> Any:
         points.append(own.astype(np.float64))
         n_points += len(own)
     if not n_points:
-        raise FileFormatError(f"{path}: there are no points: the file holds no shape")
+        raise FileFormatError(
+            "there are no points: the file holds no shape",
+            path=path,
+        )
     positions = np.concatenate(points)
     if any(len(c) for c in counts):
         return assemble(positions, np.concatenate(corners), np.concatenate(counts))
@@ -181,7 +208,11 @@ class _Arrays:
         """The numbers of a DataArray element."""
         code = _TYPES.get(element.get("type", ""))
         if code is None:
-            raise FileFormatError(f"{self.path}: arrays of type '{element.get('type')}' are not supported: use Float64")
+            raise FileFormatError(
+                f"arrays of type '{element.get('type')}' are not supported",
+                remedy="use Float64",
+                path=self.path,
+            )
         form, inline = element.get("format"), (element.text or "").split()
         if form == "ascii":
             return numbers(inline, self.path, "values").astype(code)
@@ -193,7 +224,9 @@ class _Arrays:
             return np.frombuffer(data, self.order + code).astype(code, copy=False)
         except (ValueError, IndexError, zlib.error, binascii.Error) as error:
             raise FileFormatError(
-                f"{self.path}: an array cannot be decoded ({error}): the file is truncated"
+                f"an array cannot be decoded ({error}): the file is truncated",
+                remedy="write or download it again",
+                path=self.path,
             ) from error
 
     def _block(self, data: bytes, is_base64: bool) -> bytes:
@@ -218,7 +251,11 @@ class _Arrays:
             (size,), at = sizes(1)
             return (take(0, width + size)[0])[width:] if is_base64 else take(at, size)[0]
         if "ZLib" not in self.compressor:
-            raise FileFormatError(f"{self.path}: compressed by {self.compressor}: save it without compression")
+            raise FileFormatError(
+                f"compressed by {self.compressor}",
+                remedy="save it without compression",
+                path=self.path,
+            )
         n_blocks = sizes(1)[0][0]
         packed, at = sizes(3 + n_blocks)
         everything, _ = take(at, sum(packed[3:]))
@@ -238,9 +275,17 @@ def _parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
-        raise FileFormatError(f"{path}: it is no XML ({error}): the file is truncated or damaged") from error
+        raise FileFormatError(
+            f"it is no XML ({error}): the file is truncated or damaged",
+            remedy="write or download it again",
+            path=path,
+        ) from error
     if root.tag != "VTKFile" or root.get("type") != kind:
-        raise FileFormatError(f"{path}: it holds {root.get('type', root.tag)}, not {kind}: check the extension")
+        raise FileFormatError(
+            f"it holds {root.get('type', root.tag)}, not {kind}",
+            remedy="check the extension",
+            path=path,
+        )
     order = "<" if root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
     header = np.dtype(order + _TYPES[root.get("header_type", "UInt32")])
     return root, _Arrays(path, order, header, root.get("compressor"), encoding, appended)

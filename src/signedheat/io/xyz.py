@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import refuse
+from .elements import SurfaceShape, refuse
 from .files import PathLike, numbers, text
 
 
@@ -16,20 +14,30 @@ def read_xyz(path: PathLike) -> PointCloud:
     """Lines of 3 numbers (positions) or 6 (positions and normals), divided by blanks or commas."""
     rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].replace(",", " ").split())]
     if not rows:
-        raise FileFormatError(f"{path}: there is no line of numbers: the file holds no points")
+        raise FileFormatError(
+            "there is no line of numbers: the file holds no points",
+            path=path,
+        )
     columns = len(rows[0])
     odd = next((k for k, row in enumerate(rows) if len(row) != columns), None)
     if odd is not None:
         raise FileFormatError(
-            f"{path}: line {odd} of the points has {len(rows[odd])} numbers, the first has {columns}: is it truncated?"
+            f"line {odd} of the points has {len(rows[odd])} numbers, the first has {columns}",
+            remedy="it may be truncated, so write or download it again",
+            element=f"line {odd}",
+            path=path,
         )
     if columns not in (3, 6):
-        raise FileFormatError(f"{path}: {columns} numbers a line: write 3 (x y z) or 6 (x y z nx ny nz)")
+        raise FileFormatError(
+            f"{columns} numbers a line",
+            remedy="write 3 (x y z) or 6 (x y z nx ny nz)",
+            path=path,
+        )
     table = numbers(rows, path, "coordinates")
     return PointCloud(table[:, :3], table[:, 3:] if columns == 6 else None)
 
 
-def write_xyz(shape: Any, path: PathLike) -> bytes:
+def write_xyz(shape: SurfaceShape, path: PathLike) -> bytes:
     """A line for each point."""
     if not isinstance(shape, PointCloud):
         raise refuse(shape, path, "points", ".obj or .ply")

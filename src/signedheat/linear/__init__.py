@@ -1,4 +1,4 @@
-"""Sparse factorisations: one file per back end, one chooser."""
+"""Sparse linear solvers: one module per factorisation back end, a function that chooses one, and Krylov methods."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SignedHeatError
 from . import cholmod, pardiso
 from .cholmod import CholmodFactor
 from .matrices import upper_triangle, whole
@@ -29,7 +30,7 @@ class Factor(Protocol):
 
 
 def available_backends() -> list[str]:
-    """Names of the back ends that this machine has, best first."""
+    """Names of the back ends available on this machine, fastest first."""
     return [
         *(["pardiso"] if pardiso.is_available() else []),
         *(["cholmod"] if cholmod.is_available() else []),
@@ -45,18 +46,23 @@ def factorize(
     Parameters
     ----------
     matrix : (n, n) sparse, float64 or complex128
-        Only the diagonal and what is above it are read.
+        Only the upper triangle, diagonal included, is read.
     backend : str, optional
         One of `available_backends`; by default the environment variable ``SIGNEDHEAT_BACKEND``, or else the best.
     order : (n,) int, optional
-        Fill-reducing elimination order, where one is known: ``order[k]`` is the unknown eliminated k-th.
+        Fill-reducing elimination order, if one is known: ``order[k]`` is the unknown eliminated k-th.
     reused : bool
-        Whether many solutions are wanted. PARDISO then finds an order of its own, for which it solves on all cores.
+        Whether many systems will be solved. PARDISO then finds an order of its own, with which it solves on all cores.
+
+    Returns
+    -------
+    Factor
+        Solves ``matrix @ x = rhs``.
 
     Raises
     ------
     FactorizationError
-        If the matrix is not positive definite, or memory does not suffice.
+        If the matrix is not positive definite, or the factor does not fit into memory.
 
     Examples
     --------
@@ -67,7 +73,10 @@ def factorize(
     available = available_backends()
     name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
     if name not in available:
-        raise ValueError(f"the solver {name!r} is not available here: choose one of {', '.join(available)}")
+        raise SignedHeatError(
+            f"the solver {name!r} is not available here",
+            remedy=f"choose one of {', '.join(available)}",
+        )
     upper = upper_triangle(matrix)
     if name == "pardiso":
         return PardisoFactor(upper, None if reused else order)

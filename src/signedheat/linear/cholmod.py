@@ -1,4 +1,4 @@
-"""CHOLMOD through scikit-sparse, where that is installed."""
+"""CHOLMOD, through the optional package scikit-sparse."""
 
 from __future__ import annotations
 

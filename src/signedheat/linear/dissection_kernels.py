@@ -1,4 +1,4 @@
-"""Nested dissection by breadth-first levels, compiled at first use."""
+"""Kernels: nested dissection by the levels of breadth-first searches."""
 
 import numpy as np
 
@@ -7,14 +7,15 @@ from ..compiled import compiled
 
 @compiled
 def dissect(starts, neighbors, leaf):
-    """Elimination order: both sides of a small separator first, then the separator; the sides likewise.
+    """Elimination order: both sides of a small separator, each ordered in the same way, then the separator.
 
-    A separator is the smallest level near the middle of a breadth-first search from the end of a long path, less what
-    does not touch the level after it (George 1973). `order` is split in place; a region is a range of it.
+    A separator is the smallest level near the middle of a breadth-first search from the end of a long path, without the
+    unknowns that have no neighbour in the level after it (George 1973). `order` is partitioned in place; a region is a
+    range of it.
     """
     n = len(starts) - 1
     order = np.arange(n)
-    region = np.zeros(n, dtype=np.int64)  # which unfinished region each unknown lies in
+    region = np.zeros(n, dtype=np.int64)  # the unfinished region that each unknown lies in
     level = np.empty(n, dtype=np.int64)
     queue = np.empty(n, dtype=np.int64)
     stack = [(0, n)]
@@ -34,10 +35,10 @@ def dissect(starts, neighbors, leaf):
             if last <= depth or reached < end - begin:
                 break
             depth, seed = last, queue[reached - 1]
-        if reached < end - begin:  # several parts
+        if reached < end - begin:  # several connected components
             first = 0
             for p in range(begin, end + 1):
-                if first < reached:  # a part is complete
+                if first < reached:  # a component is complete
                     for q in range(first, reached):
                         region[queue[q]] = regions
                     regions += 1
@@ -62,7 +63,7 @@ def dissect(starts, neighbors, leaf):
                         break
                 if not touches:
                     level[i] = cut - 1
-        low, high = begin, end  # below the cut to the front, the cut to the back, above it between
+        low, high = begin, end  # levels below the separator to the front, the separator to the back, the rest between
         for p in range(reached):
             if level[queue[p]] < cut:
                 order[low] = queue[p]
@@ -90,7 +91,7 @@ def dissect(starts, neighbors, leaf):
 
 @compiled
 def _levels(starts, neighbors, region, here, seed, level, queue, begin):
-    """Breadth-first search within a region, into the queue from `begin` on; where the queue then ends."""
+    """Breadth-first search within a region, into the queue from `begin` on; returns the end of the queue."""
     level[seed] = 0
     queue[begin] = seed
     head, tail = begin, begin + 1
@@ -108,7 +109,7 @@ def _levels(starts, neighbors, region, here, seed, level, queue, begin):
 
 @compiled
 def _thinnest(level, queue, reached, last):
-    """The smallest level that leaves at least 40 % on either side, or the median level."""
+    """The smallest level that leaves at least 40 % of the unknowns on either side, or the median level."""
     best, size, median = -1, reached, level[queue[reached // 2]]
     p = 0
     while p < reached:

@@ -1,7 +1,6 @@
 """Incomplete Cholesky factors without fill, IC(0), which precondition conjugate gradients.
 
-For systems too large to factorise. The factor takes as much memory as half the matrix, so everything here grows
-linearly, but for the number of iterations.
+For systems too large to factorise. The factor takes as much memory as half the matrix; time per iteration is linear.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from .conjugate_gradients import conjugate_gradients
 from .matrices import whole
 
 SMALLEST = 1e-290
-"""Unknowns below this have lost bits to underflow and stop nothing."""
+"""Unknowns below this have lost bits to underflow, and are left out of the stopping criterion."""
 
 MOST_ITERATIONS = 5000
 
@@ -29,11 +28,11 @@ class IncompleteCholesky:
     Attributes
     ----------
     order : (k,) int
-        Unknowns to solve for; the others stay zero.
+        Unknowns to solve for, in this order; the others stay zero.
     indptr, indices : int arrays
-        Rows of the strictly lower triangle, in that order.
+        Sparsity pattern (CSR) of the strictly lower triangle, rows and columns in that order.
     diagonal, lower : float arrays
-        The matrix.
+        Diagonal and strictly lower triangle of the matrix.
     pivots, factor : float arrays
         Inverse diagonal and strictly lower triangle of the factor.
     n : int
@@ -51,7 +50,7 @@ class IncompleteCholesky:
 
     @classmethod
     def of(cls, matrix: sparse.csr_matrix, order: NDArray[np.int64]) -> IncompleteCholesky:
-        """Factorise; where a pivot would not be positive, with a larger diagonal (Manteuffel 1980).
+        """Factorise; if a pivot is not positive, again with a larger diagonal (Manteuffel 1980).
 
         Examples
         --------
@@ -70,7 +69,7 @@ class IncompleteCholesky:
             shift = max(1e-3, 2 * shift)
 
     def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> NDArray[np.float64]:
-        """Solve for one right-hand side (n,) or several (n, k), as one system.
+        """Solve by conjugate gradients for one right-hand side (n,) or several (n, k), as one block-diagonal system.
 
         Conjugate gradients on all columns at once. They stop once ``‖r‖ ≤ relative · ‖b‖``, or once
         ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row (an entrywise backward error, Oettli & Prager 1964): the
@@ -105,7 +104,7 @@ class IncompleteCholesky:
 
 
 def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The unknowns that the seeds reach through the matrix, by graph distance from them.
+    """The unknowns that are connected to the seeds in the graph of the matrix, in order of distance from them.
 
     Examples
     --------
@@ -149,7 +148,7 @@ def _breadth_first(indptr, indices, data, seeds):
 
 @compiled
 def _lower_triangle(indptr, indices, data, order, n):
-    """Diagonal and strictly lower triangle, rows and columns in `order`, columns sorted."""
+    """Diagonal and strictly lower triangle (CSR), rows and columns in `order`, columns sorted."""
     place = np.full(n, -1, dtype=np.int64)
     for i in range(len(order)):
         place[order[i]] = i
@@ -184,7 +183,7 @@ def _lower_triangle(indptr, indices, data, order, n):
 
 @compiled
 def _factorize(indptr, indices, factor, pivots):
-    """IC(0) in place; `pivots` becomes the inverse diagonal. False where a pivot is not clearly positive."""
+    """IC(0) in place; `pivots` becomes the inverse diagonal. Returns False if a pivot is not clearly positive."""
     for i in range(len(pivots)):
         own = pivots[i]
         rest = own

@@ -1,4 +1,4 @@
-"""Sparse Hermitian matrices, of which solvers read one half."""
+"""Sparse Hermitian matrices, stored whole or by their upper triangle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy import sparse
 
 
 def upper_triangle(matrix: Any) -> sparse.csr_matrix:
-    """The diagonal and what is above it, as sorted CSR: the whole or the upper triangle of a Hermitian matrix will do.
+    """Upper triangle, diagonal included, as sorted CSR, from a whole Hermitian matrix or its upper triangle.
 
     Examples
     --------
@@ -22,7 +22,7 @@ def upper_triangle(matrix: Any) -> sparse.csr_matrix:
     upper = sparse.triu(matrix, format="csr")
     upper.sum_duplicates()
     missing = upper.diagonal() == 0
-    if missing.any():  # solvers want every diagonal entry stored, a zero one too
+    if missing.any():  # solvers need every diagonal entry to be stored, zeros included
         upper = sparse.csr_matrix(upper + sparse.diags_array(np.where(missing, 1.0, 0.0)))
         upper.sort_indices()
         upper.data[upper.indptr[:-1][missing]] = 0
@@ -30,7 +30,7 @@ def upper_triangle(matrix: Any) -> sparse.csr_matrix:
 
 
 def whole(upper: sparse.csr_matrix) -> sparse.csr_matrix:
-    """The Hermitian matrix whose upper triangle this is.
+    """The whole Hermitian matrix from its upper triangle.
 
     Examples
     --------
@@ -42,7 +42,7 @@ def whole(upper: sparse.csr_matrix) -> sparse.csr_matrix:
 
 
 def _is_upper(matrix: sparse.csr_matrix) -> bool:
-    """Whether every row starts with its diagonal entry and goes on in strictly increasing columns."""
+    """Whether every row starts with its diagonal entry and has strictly increasing columns."""
     starts = matrix.indptr[:-1]
     if (np.diff(matrix.indptr) == 0).any() or (matrix.indices[starts] != np.arange(matrix.shape[0])).any():
         return False

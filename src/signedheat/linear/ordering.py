@@ -1,4 +1,4 @@
-"""Fill-reducing elimination orders for matrices that couple what is close on a surface."""
+"""Fill-reducing elimination orders for sparse matrices on surfaces."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 from .dissection_kernels import dissect
 from .matrices import whole
 
-_LEAF = 3  # unknowns that are not dissected further
+_LEAF = 3  # regions of so many unknowns are not dissected further
 
 
 def elimination_order(upper: Any) -> NDArray[np.int64]:
     """Nested dissection of a sparse symmetric matrix, from its upper triangle: ``order[k]`` is eliminated k-th.
 
-    On surfaces it leaves as much fill as METIS on even meshes, up to twice as much on very uneven ones, and takes a
-    fifth of its time; time grows as n log n times the number of levels of a search. For unknowns that fill space METIS,
+    On surfaces the fill is that of METIS on even meshes, up to twice as much on very uneven ones, in a fifth of the
+    time; the time is n log n times the number of levels of a breadth-first search. For unknowns in a volume METIS,
     which PARDISO runs by itself, is better.
 
     Examples
     --------
     >>> from scipy import sparse
     >>> path = sparse.diags_array([np.ones(20), np.ones(19)], offsets=[0, 1], format="csr")
-    >>> bool(8 <= elimination_order(path)[-1] <= 12)  # what separates two halves comes last
+    >>> bool(8 <= elimination_order(path)[-1] <= 12)  # the separator of the two halves comes last
     True
     """
     graph = whole(upper)

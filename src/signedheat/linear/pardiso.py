@@ -1,4 +1,4 @@
-"""Intel MKL PARDISO, called in the shared library that the ``mkl`` wheel brings."""
+"""Intel MKL PARDISO, called through ctypes in the shared library of the ``mkl`` wheel."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _CAUSES = {
 
 
 class PardisoFactor:
-    """Cholesky factor of a Hermitian positive definite matrix, freed with the object.
+    """Cholesky factor of a Hermitian positive definite matrix; its memory is released with the object.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class PardisoFactor:
 
 
 class _Call:
-    """The arguments that every phase of one factorisation shares."""
+    """The arguments that all PARDISO calls on one factorisation share."""
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None) -> None:
         wide = upper.nnz >= 2**31
@@ -76,10 +76,10 @@ class _Call:
         self._kind, self._n = _POSITIVE_DEFINITE[upper.dtype], upper.shape[0]
         self._order = np.zeros(1, dtype=index) if order is None else np.ascontiguousarray(order, dtype=index)
         self.parameters = np.zeros(64, dtype=index)
-        self.parameters[0] = 1  # nothing by default
+        self.parameters[0] = 1  # take no parameter from the defaults
         self.parameters[1] = 3  # nested dissection in parallel
         self.parameters[4] = 0 if order is None else 1
-        self.parameters[17] = -1  # report the nonzeros of the factor
+        self.parameters[17] = -1  # report the number of nonzeros of the factor
         self.parameters[23] = 1 if order is None else 0  # two levels solve in parallel, to the same bits every time
         self.parameters[34] = 1  # indices count from zero
         self._threads = _library().MKL_Get_Max_Threads()
@@ -89,7 +89,7 @@ class _Call:
         one, status = integer(1), integer(0)
         n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])
         empty = np.zeros(1, dtype=self._matrix[0].dtype)
-        # two-level factors solve wrongly, and silently, on one thread if made on several, and the other way round
+        # a two-level factor made on several threads gives wrong solutions on one, without an error, and vice versa
         others = _library().MKL_Set_Num_Threads_Local(self._threads)
         self._function(
             _address(self._handle),
@@ -122,7 +122,7 @@ def _address(array: NDArray[Any]) -> ctypes.c_void_p:
 
 @cache
 def _library() -> ctypes.CDLL:
-    """``mkl_rt``, from the wheel, the environment's prefix or the system."""
+    """The library ``mkl_rt``, from the wheel, the prefix of the environment, or the system."""
     names = {"win32": "mkl_rt*.dll", "darwin": "libmkl_rt*.dylib"}.get(sys.platform, "libmkl_rt.so*")
     try:
         installed = [Path(f.locate()) for f in importlib.metadata.files("mkl") or [] if f.match(names)]
@@ -139,7 +139,7 @@ def _library() -> ctypes.CDLL:
 
 
 def is_available() -> bool:
-    """Whether the library can be loaded."""
+    """Whether the MKL library can be loaded."""
     try:
         _library()
     except ImportError:

@@ -1,7 +1,7 @@
-"""SciPy's SuperLU: there on every platform.
+"""SciPy's SuperLU, available on every platform.
 
-With nested dissection and one BLAS thread it takes as much work as PARDISO at 100 000 unknowns, 2.5 times as much at
-500 000; PARDISO also uses all cores.
+With nested dissection and one BLAS thread it takes as much CPU time as PARDISO at 100 000 unknowns, 2.5 times as much
+at 500 000; PARDISO also uses all cores.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class SuperLUFactor:
         Upper triangle.
     order : (n,) int, optional
         Elimination order: ``order[k]`` is the unknown eliminated k-th. Without it, nested dissection finds one: with
-        SuperLU's own minimum degree, surfaces of 100 000 unknowns take minutes in place of a second.
+        SuperLU's own minimum degree, surfaces of 100 000 unknowns take minutes instead of a second.
     """
 
     backend = "superlu"
@@ -38,7 +38,7 @@ class SuperLUFactor:
         self.n, self.dtype = upper.shape[0], upper.dtype
         self._order = elimination_order(upper) if order is None else order
         matrix = whole(upper)[self._order][:, self._order]
-        with threadpool_limits(1, "blas"):  # its dense blocks are tiny: threads cost ten times what they bring
+        with threadpool_limits(1, "blas"):  # its dense blocks are tiny: threads cost ten times what they gain
             try:
                 self._factor = splu(
                     sparse.csc_matrix(matrix),

@@ -1,8 +1,8 @@
-"""Oriented area elements: what a shape in space is to the method, whatever it was made of.
+"""Oriented area elements: what a shape in space is to the method, whatever it was made of (Eq. 11 in space).
 
-Triangles, fans of polygons, segments of a polyline and oriented points are all simplices that carry a vector: their
-area times their normal. They are bisected until they are small beside a cell, and merged again per cell and connected
-component, so that neither huge nor millions of tiny faces cost more than the cells they pass through.
+Triangles, fans of polygons, segments of a polyline and oriented points are all simplices with a vector: area times
+normal. They are bisected until they are no larger than a cell, and merged again per cell and connected component, so
+that neither huge faces nor millions of tiny ones cost more than the cells that they pass through.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
+from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..geometry.components import element_components, same_positions
@@ -29,12 +30,12 @@ from .grid.binning import merge_in_cells
 NEIGHBOURS = 8
 """Neighbours from which the area of an oriented point is estimated."""
 ROUNDING = 1e-9
-"""Where less of the area than this is left of normals that cancel, the rest is rounding."""
+"""Where normals cancel up to less than this fraction of the area, what is left is rounding error."""
 
 
 @dataclass(frozen=True, eq=False)
 class AreaElements:
-    """Simplices with vectors.
+    """Simplices with area vectors.
 
     Attributes
     ----------
@@ -47,7 +48,7 @@ class AreaElements:
     components : (m,) int
         Connected component of the shape, from 0.
     spacing : float
-        Mean distance between elements that bisection cannot bring closer: 0 where there is a surface between them.
+        Mean distance between points of a cloud; 0 for simplices, which can be sampled as densely as needed.
     """
 
     corners: NDArray[np.float64]
@@ -69,17 +70,17 @@ class AreaSamples:
         Sum of area times unit normal.
     weights : (s,) float
         Sum of areas.
-    components, owners : (s,) int
+    components, source_ids : (s,) int
         Connected component, and source, that each sample belongs to.
     spacing : float
         h_source: the largest of the sources' mean spacings.
     outside : float
         Fraction of the area that lies outside the grid.
     cancelled : float
-        Fraction of the area inside whose normals cancel others of the same cell and component: sheets thinner than a
-        cell, and faces given twice with opposite orientations.
+        Fraction of the area inside the grid whose normals cancel with others of the same cell and component: sheets
+        thinner than a cell, and faces given twice with opposite orientations.
     nodes : NodeSources
-        The vectors brought to the nodes, up to a common factor.
+        X₀: the vectors spread to the nodes by linear interpolation, up to a common factor.
     """
 
     positions: NDArray[np.float64]
@@ -95,7 +96,7 @@ class AreaSamples:
 
 @singledispatch
 def area_elements(shape: Any) -> AreaElements:
-    """Lower a shape in space to simplices with vectors."""
+    """Lower a shape in space or in the plane to simplices with area vectors; further kinds of shapes register here."""
     raise SourceError(
         f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
         f"Polyline, not to a {type(shape).__name__}"
@@ -110,8 +111,14 @@ def _(shape: TriangleMesh) -> AreaElements:
 
 
 @area_elements.register
+def _(shape: TetMesh) -> AreaElements:
+    """The boundary of the tets."""
+    return area_elements(shape.boundary)
+
+
+@area_elements.register
 def _(shape: PolygonMesh) -> AreaElements:
-    """Fans around the centroids: their vector areas add up to the polygon's, planar and convex or not."""
+    """Fans around centroids, whose area vectors add up to that of the polygon, planar and convex or not."""
     polygon = shape.corner_polygons
     fans = np.stack([shape.corners, shape.next_corners], axis=1)
     corners = np.concatenate([shape.polygon_centroids[polygon][:, None], shape.vertices[fans]], axis=1)
@@ -127,11 +134,12 @@ def _(shape: PolygonMesh) -> AreaElements:
 def _(shape: PointCloud) -> AreaElements:
     if shape.normals is None:
         raise SourceError(
-            "the point cloud has no normals, which say what is inside: give them, or estimate and orient them first"
+            "the point cloud has no normals, which say what is inside",
+            remedy="give them, or estimate and orient them first",
         )
     areas = point_areas(shape.points) if shape.areas is None else shape.areas
     components = np.zeros(shape.n_points, dtype=np.int64)
-    sides = shape.points.shape[1] - 1  # on a line a point is a whole boundary, with no gap to the next
+    sides = shape.points.shape[1] - 1  # dimension of the boundary; on a line single points bound, and have no spacing
     spacing = float(np.mean(areas)) ** (1.0 / sides) if sides else 0.0
     return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
 
@@ -157,9 +165,9 @@ def bounds_around(shapes: Sequence[Any]) -> NDArray[np.float64]:
 
 
 def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> NDArray[np.float64]:
-    """(n,) area that each point stands for: that of the disk which reaches its k-th neighbour, divided by k.
+    """(n,) area that each point represents: that of the disk around it up to its k-th neighbour, divided by k.
 
-    Points that coincide share one place. In d dimensions the disk is a ball of dimension d − 1.
+    Points that coincide share the area of one. In d dimensions the disk is a ball of dimension d − 1.
     """
     from scipy.spatial import cKDTree
 
@@ -179,12 +187,12 @@ def components_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> ND
 
 
 def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSamples:
-    """Bisect the elements of shapes until no edge is longer than `size` cells, and merge them per cell and component.
+    """Bisect the elements of shapes until no edge is longer than `size` cells; merge them per cell and component.
 
     Raises
     ------
     SourceError
-        If a shape cannot be used on this grid, or nothing of any lies within it.
+        If a shape cannot be used on this grid, no part of any lies within it, or their normals cancel.
     """
     steps = np.zeros(4)
     steps[4 - grid.dimension :] = grid.spacing
@@ -196,7 +204,8 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         elements = area_elements(shape)
         if elements.corners.shape[2] != grid.dimension:
             raise SourceError(
-                f"source {owner} lives in {elements.corners.shape[2]} dimensions, and the grid in {grid.dimension}"
+                f"source {owner} lives in {elements.corners.shape[2]} dimensions, and the grid in {grid.dimension}",
+                element=f"source {owner}",
             )
         order = np.argsort(elements.components, kind="stable")
         corners = (elements.corners - grid.origin) / grid.spacing
@@ -222,13 +231,14 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         raise SourceError("the source has no area: every face is degenerate")
     if not len(joined[2]) or not joined[1].any():
         raise SourceError(
-            f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape: move or enlarge it"
+            f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape",
+            remedy="move or enlarge it",
         )
     left = float(np.linalg.norm(joined[1], axis=1).sum() / joined[2].sum())
     if left < ROUNDING:
         raise SourceError(
-            "the normals of the source cancel each other everywhere, so that nothing tells inside from outside: "
-            "remove or turn one of its coinciding sides"
+            "the normals of the source cancel each other everywhere, so that nothing tells inside from outside",
+            remedy="remove or turn one of its coinciding sides",
         )
     outside = max(0.0, 1.0 - inside / total)
     return AreaSamples(*joined, spacing=spacing, outside=outside, cancelled=max(0.0, 1.0 - left), nodes=nodes)

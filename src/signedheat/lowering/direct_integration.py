@@ -1,4 +1,4 @@
-"""Step 3 by factorising C: unknowns at the vertices of a mesh, constraints at any samples."""
+"""Step 3 by a factorisation of C: unknowns at the vertices of a mesh, constraints at any sample points."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class DirectIntegration:
     Parameters
     ----------
     stiffness : (n, n) sparse
-        Upper triangle of C, as `upper_triangle` makes it; a constant on each connected part is its kernel.
+        Upper triangle of C, as `upper_triangle` makes it. Its kernel are the constants on each connected component.
     factorize : callable
-        Makes what solves a system from its upper triangle; anything with a ``solve`` will do.
+        From the upper triangle of a matrix to an object with a method ``solve``.
     spring : float
-        Stiffness of the springs behind exact constraints, times the largest diagonal entry of C. Stiffer springs need
-        fewer rounds, and solvers that bear them.
+        ρ of the augmented Lagrangian behind exact constraints, relative to the largest diagonal entry of C. Larger
+        values need fewer rounds, and worsen the condition of the matrix.
     """
 
     stiffness: sparse.csr_matrix
@@ -44,16 +44,16 @@ class DirectIntegration:
 
     @cached_property
     def components(self) -> NDArray[np.int64]:
-        """(n,) connected part of the domain that each unknown lies in."""
+        """(n,) connected component of the domain that each unknown lies in."""
         return sparse.csgraph.connected_components(self.stiffness, directed=False)[1].astype(np.int64)
 
     @cached_property
     def factor(self) -> Factor:
-        """Factor of C, with one vertex of each part grounded."""
+        """Factor of C, made definite by grounding one vertex of each connected component."""
         return self.factorize(_grounded(self.stiffness, self._first_vertices))
 
     def solve(self, divergence: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
-        """Minimise ∫|∇φ − Y|² with nothing imposed."""
+        """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
         return self.solve_many([divergence], [source])[0]
 
     def solve_many(
@@ -64,20 +64,20 @@ class DirectIntegration:
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels exactly, but only where the source asks for it: see `SurfaceSource.pinned`."""
+        """Impose levels exactly (Eq. 14), but only where the source asks for it: see `SurfaceSource.pinned`."""
         return self._impose(divergence, source, levels, source.pinned)
 
     def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels exactly at every sample."""
+        """Impose levels exactly at every sample (Eq. 14)."""
         return self._impose(divergence, source, levels, np.ones(len(source.weights), dtype=bool))
 
     def _impose(
         self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels, chosen: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
-        """Impose levels at the chosen samples, or levels up to one unknown constant for each group of samples.
+        """Impose levels at the chosen samples, or levels up to one unknown constant for each group of samples (Eq. 14).
 
-        The constants are those at which no group pulls: the multipliers of each add up to zero. One constant per
-        connected part of the domain stays free, and is chosen by the mean.
+        The constants are those at which the multipliers of each group add up to zero. On each connected component of
+        the domain one constant is arbitrary; it is fixed by the mean over the samples.
         """
         rows, values = source.interpolation[chosen], levels.values[chosen]
         if levels.groups is None:
@@ -85,7 +85,7 @@ class DirectIntegration:
             _refuse_contradictions(rows, values, fitted[:, 0])
             return self._reached(fitted[:, 0], rows)
         group = levels.groups[chosen]
-        bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a sample alone is bound to nothing
+        bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a group of one sample constrains nothing
         rows, values, group = rows[bound], values[bound], np.unique(group[bound], return_inverse=True)[1]
         fixed = group[np.unique(self._component_of(rows), return_index=True)[1]]
         free = np.setdiff1d(group, fixed)
@@ -104,7 +104,7 @@ class DirectIntegration:
         return self._centered(fitted[:, 0], source)
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
-        """``(C + λ Aᵀ W A) φ = b``."""
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements of the samples."""
         rows = source.interpolation
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
 
@@ -113,18 +113,18 @@ class DirectIntegration:
         return self._pulled_factor(source.interpolation, self.springs(source))
 
     def springs(self, source: SourceTerm) -> NDArray[np.float64]:
-        """(s,) stiffness that holds φ at each sample as firmly as it should be."""
+        """(s,) stiffness of the springs that hold φ at the samples."""
         return np.full(len(source.weights), self.spring * self.stiffness.diagonal().max())
 
     def _interpolate(
         self, rows: sparse.csr_matrix, forces: NDArray[np.float64], levels: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f``.
+        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``; also the multipliers μ of ``C φ + Aᵀ μ = f`` (Eq. 14).
 
-        An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite however many rows repeat each other, and
-        stiff springs leave two or three rounds to do. Every round starts from true residuals, which also mends what
-        the springs cost in accuracy. Rows that almost repeat each other give way slowly; where they do, conjugate
-        gradients find the displacements of the springs that close the gaps.
+        An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and with stiff
+        springs ρ two or three rounds suffice. Every round starts from the true residuals, which also corrects rounding
+        errors due to ρ. Along nearly dependent rows convergence is slow; there, conjugate gradients find the
+        displacements of the springs that close the remaining gaps.
         """
         stiffness = whole(self.stiffness)
         spring = self.spring * self.stiffness.diagonal().max()
@@ -161,19 +161,19 @@ class DirectIntegration:
 
     @cached_property
     def _first_vertices(self) -> NDArray[np.int64]:
-        """One vertex of each part."""
+        """The first vertex of each connected component."""
         return np.unique(self.components, return_index=True)[1]
 
     def _component_of(self, rows: sparse.csr_matrix) -> NDArray[np.int64]:
-        """(s,) part of the domain that each sample lies in."""
+        """(s,) connected component of the domain that each sample lies in."""
         return self.components[rows.indices[rows.indptr[:-1]]]
 
     def _reached(self, values: NDArray[np.float64], rows: sparse.csr_matrix) -> NDArray[np.float64]:
-        """NaN on parts without samples."""
+        """The values, with NaN on connected components without samples."""
         return np.where(np.isin(self.components, self._component_of(rows)), values, np.nan)
 
     def _centered(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
-        """The weighted mean over the samples of each part made zero; NaN where a part has none."""
+        """Shift φ to a weighted mean of zero over the samples of each connected component; NaN on those without any."""
         rows = source.interpolation
         part, n_parts = self._component_of(rows), len(self._first_vertices)
         weight = np.bincount(part, source.weights, n_parts)
@@ -188,7 +188,10 @@ class DirectIntegration:
 
 
 def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.csr_matrix:
-    """The matrix made definite: since b sums to zero on each part, grounded vertices come out as zero."""
+    """The matrix, made definite by larger entries at the vertices given.
+
+    Since b sums to zero on each connected component, the solution is zero at these vertices.
+    """
     data = matrix.data.copy()
     diagonal = matrix.indptr[vertices]
     data[diagonal] += np.where(data[diagonal] > 0, data[diagonal], 1.0)
@@ -200,6 +203,7 @@ def _refuse_contradictions(rows: sparse.csr_matrix, levels: NDArray[np.float64],
     worst = int(gap.argmax())
     if np.ptp(levels) > 0 and gap[worst] > 1e-4 * (np.abs(levels).max() + np.ptp(values)):
         raise ConstraintError(
-            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: sources that meet or "
-            "cross need the same level"
+            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: "
+            "sources that meet or cross need the same level",
+            element=f"vertex {rows.indices[rows.indptr[worst]]}",
         )

@@ -1,4 +1,4 @@
-"""Polylines as sources on grids in the plane: every segment carries its normal, which points to the left."""
+"""Polylines as sources on grids in the plane: their area elements are segments, with normals that point to the left."""
 
 from __future__ import annotations
 

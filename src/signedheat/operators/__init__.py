@@ -1,1 +1,1 @@
-"""Discrete operators: arrays in, sparse matrices or kernels out. No domain, no solver."""
+"""Discrete differential operators: sparse matrices and matrix-free kernels from plain arrays; no domains."""

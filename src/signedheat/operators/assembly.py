@@ -1,4 +1,4 @@
-"""Sums of 3 × 3 matrices, one per triangle, as sorted sparse matrices."""
+"""Assembly of sparse matrices from 3 × 3 element matrices, one per triangle."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ..geometry.triangle_kernels import add_up
 def assemble(
     unknowns: NDArray[np.int64], diagonal: NDArray[np.float64], coupling: NDArray[Any], n: int
 ) -> sparse.csr_matrix:
-    """Upper triangle of a Hermitian matrix, its whole diagonal stored.
+    """Upper triangle of the Hermitian matrix that element matrices add up to, with its whole diagonal stored.
 
     Parameters
     ----------
     unknowns : (m, 3) int
         The three unknowns of each triangle.
     diagonal : (m, 3) float
-        Entries that go to the diagonal.
+        Diagonal entries of each element matrix.
     coupling : (m, 3) float or complex
-        Entry in the row of unknown k and the column of unknown k + 1.
+        Entry of each element matrix in row k and column k + 1 (cyclically).
     n : int
         Number of unknowns.
 

@@ -1,4 +1,4 @@
-"""The cotan Laplacian and the divergence of face fields (Sec. 5.5)."""
+"""The cotan Laplacian (Eq. 10) and the divergence of face fields (Sec. 5.5)."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .assembly import assemble
 
 
 def cotan_matrix(triangles: IntrinsicMesh) -> sparse.csr_matrix:
-    """Upper triangle of C, positive semidefinite, one unknown per vertex, its whole diagonal stored.
+    """Upper triangle of C (Eq. 10), one unknown per vertex, its whole diagonal stored.
 
-    ``φᵀ C φ = ∫ |∇φ|²``.
+    Positive semidefinite, ``φᵀ C φ = ∫ |∇φ|²``: the negative of the paper's matrix.
 
     Examples
     --------
@@ -30,8 +30,9 @@ def cotan_matrix(triangles: IntrinsicMesh) -> sparse.csr_matrix:
 
 
 def divergence(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """b with ``C φ = b`` for the φ whose gradient is closest to a face field: ``b_i = ∫ ⟨∇λ_i, Y⟩``.
+    """b of Eq. 13: with ``C φ = b`` the gradient of φ is closest to a face field Y. ``b_i = ∫ ⟨∇λ_i, Y⟩`` (Sec. 5.5).
 
+    The negative of the divergence in the paper, as C is the negative of its Laplacian.
     The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
     """
     directions = np.ascontiguousarray(directions)

@@ -1,4 +1,4 @@
-"""Vector heat on the edges of intrinsic mesh: the Crouzeix–Raviart connection Laplacian and mass (Eqs. 8–9)."""
+"""Vector heat on the edges of an intrinsic mesh: the Crouzeix–Raviart connection Laplacian and mass (Eq. 8, Eq. 9)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ from .assembly import assemble
 
 
 def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matrix:
-    """Upper triangle of ``M + t L``, one vector unknown per edge, in the frame of the edge.
+    """Upper triangle of ``M + t L``, the matrix of Eq. 12: one vector unknown per edge, in the frame of the edge.
+
+    L is the connection Laplacian of Eq. 9, positive semidefinite here: ``2 (cot α + cot β)`` on the diagonal, α and β
+    the corners of a face at the two ends of the edge, and ``−2 cot θ conj(z_fe) z_fg`` between edges e and g that meet
+    in the corner θ; ``conj(z_fe) z_fg`` is the rotation of Eq. 8. M is diagonal: a third of the area of each face.
 
     Complex Hermitian (e, e) where all frames agree with their faces; otherwise, since a reflection is not a complex
-    number, the real form (2e, 2e) whose unknowns are real and imaginary parts by turns.
+    number, the real form (2e, 2e) with the real and imaginary part of each unknown in turn.
 
     Parameters
     ----------
@@ -33,7 +37,7 @@ def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matr
 def vector_heat_forces(
     triangles: IntrinsicMesh, time: float, vectors: NDArray[np.complex128], faces: NDArray[np.int64]
 ) -> NDArray[np.complex128]:
-    """(M + t L) times the (e,) vectors, as far as some faces add to it: complete at edges all of whose faces do."""
+    """``(M + t L) X`` of Eq. 12, summed over some faces only: complete at edges all of whose faces are among them."""
     diagonal, factor = _local_entries(triangles, time, faces)
     x = triangles.in_face_frames(vectors, faces)
     forces = diagonal * x + factor * np.roll(x, -1, axis=1) + np.roll(factor * x, 1, axis=1)
@@ -43,14 +47,14 @@ def vector_heat_forces(
 
 
 def _local_entries(triangles: IntrinsicMesh, time: float, faces: NDArray[np.int64] | slice) -> tuple:
-    """What each edge of a face has to itself, and what it shares with the edge after it, before turning."""
+    """(m, 3) diagonal entries of M + tL; (m, 3) entries between each edge and the next, before the turn of Eq. 8."""
     cot = triangles.corner_cotangents[faces]
     following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1
     return triangles.face_areas[faces, None] / 3.0 + 2.0 * time * (cot + following), -2.0 * time * following
 
 
 def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
-    """Blocks ``B_feᵀ B_fg``, where the columns of B_fe are the axes of the edge's frame in the face."""
+    """The real matrix of blocks ``B_feᵀ B_fg``; the columns of B_fe are the axes of the edge's frame in the face."""
     edge, z = triangles.edges.face_edges, triangles.edge_directions
     rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
     second = np.where(triangles.reflected, -1j, 1j) * z

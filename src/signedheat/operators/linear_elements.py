@@ -1,4 +1,4 @@
-"""Functions that are linear in every cell: all that the convex problem of Sec. 7.3 knows of a domain."""
+"""Functions that are linear in every cell: all that the convex problem of Eq. 17 and Eq. 18 needs of a domain."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from .tetrahedral import Tetrahedra
 
 @dataclass(frozen=True, eq=False)
 class LinearElements:
-    """Triangles or tets with one value at each corner.
+    """Linear finite elements on triangles or tets.
 
     Attributes
     ----------
     corners : (m, d + 1) int
         Unknown at each corner of each cell.
     sizes : (m,) float
-        Areas or volumes.
+        Areas or volumes of the cells.
     slope_matrix : (m d, n) sparse
-        Takes values to the components of ∇φ in every cell, one cell after the other.
+        Maps values at the unknowns to the d components of ∇φ in every cell, cell after cell.
     """
 
     corners: NDArray[np.int64]
@@ -32,7 +32,7 @@ class LinearElements:
 
     @classmethod
     def of(cls, corners: NDArray[np.int64], sizes: NDArray[np.float64], hats: NDArray[np.float64], n: int):
-        """From the gradients (m, d + 1, d) of the functions that are one at a corner and zero at the others.
+        """From the gradients (m, d + 1, d) of the hat functions of each cell, one at a corner and zero at the others.
 
         Examples
         --------
@@ -49,26 +49,26 @@ class LinearElements:
 
     @classmethod
     def on_triangles(cls, triangles: IntrinsicMesh) -> LinearElements:
-        """A surface; slopes are in the layout of each face."""
+        """Elements of a surface; gradients are in the layout of each face."""
         hats = 1j * np.roll(triangles.edge_vectors, -1, axis=1) / (2.0 * triangles.face_areas)[:, None]
         hats = np.stack([hats.real, hats.imag], axis=2)
         return cls.of(triangles.corner_vertices, triangles.face_areas, hats, triangles.n_vertices)
 
     @classmethod
     def on_tets(cls, tets: Tetrahedra, corners: NDArray[np.int64], n: int) -> LinearElements:
-        """Tets; thin ones count less, as they do in C, and flat ones not at all."""
+        """Elements of a tet mesh; thin tets have a reduced weight, as they have in C, and flat ones none."""
         flat = tets.thickness < 1e-10
         hats = tets.area_vectors / np.where(flat, -np.inf, -3.0 * tets.volumes)[:, None, None]
         return cls.of(corners, np.where(flat, 0.0, tets.weights * tets.volumes), hats, n)
 
     @property
     def masses(self) -> NDArray[np.float64]:
-        """(n,) integral of the function that is one at an unknown and zero at the others."""
+        """(n,) integrals of the hat functions: A_i of Eq. 18."""
         share = np.repeat(self.sizes / self.corners.shape[1], self.corners.shape[1])
         return np.bincount(self.corners.ravel(), share, self.slope_matrix.shape[1])
 
     def slopes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, d) ∇φ in every cell."""
+        """(m, d) ∇φ in every cell, whose length Eq. 17 bounds by one."""
         return (self.slope_matrix @ values).reshape(len(self.sizes), -1)
 
     def divergence(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:

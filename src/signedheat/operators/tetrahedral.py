@@ -1,4 +1,4 @@
-"""Operators on tetrahedra: Crouzeix–Raviart on faces for diffusion, P1 on vertices for integration (Sec. 8.1, App. B).
+"""Operators on tets: Crouzeix–Raviart on faces for diffusion, linear on vertices for integration (Sec. 8.1, App. B).
 
 Everything follows from the area vectors N_k of the face opposite corner k, pointing out of the tet T: the barycentric
 coordinate λ_k has gradient ``−N_k / (3|T|)``, the Crouzeix–Raviart function ``ψ_k = 1 − 3λ_k`` has ``N_k / |T|``.
@@ -17,15 +17,15 @@ from ..compiled import compiled
 from ..geometry.tet_faces import FaceTable
 
 THIN = 1e-2
-"""Volume, over the cube of the longest edge, below which a tet counts less; 0.118 for a regular one."""
+"""Volume over the cube of the longest edge below which a tet has a reduced weight; it is 0.118 for a regular tet."""
 
 FLAT = 1e-6
-"""Volume, over the cube of the longest edge, below which a tet is as good as flat."""
+"""Volume over the cube of the longest edge below which a tet counts as flat."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tetrahedra:
-    """Tets by their corners, for the operators below.
+    """Areas, volumes and operators of tets.
 
     Attributes
     ----------
@@ -64,15 +64,15 @@ class Tetrahedra:
 
     @cached_property
     def thickness(self) -> NDArray[np.float64]:
-        """(m,) volume over the cube of the longest edge; zero for tets that are a single point."""
+        """(m,) volume over the cube of the longest edge; zero for tets whose corners coincide."""
         cubes = self.longest_edges**3
         return np.maximum(self.volumes, 0) / np.where(cubes > 0, cubes, 1)
 
     @cached_property
     def stiffness_factors(self) -> NDArray[np.float64]:
-        """(m,) w / |T|, where thin tets count with w < 1 in every term of their own.
+        """(m,) w / |T|, w the `weights`, by which every term of thin tets is reduced.
 
-        Any positive weights leave the equations consistent. These keep the stiffness of flat tets bounded.
+        The equations stay consistent with any positive weights. These keep the stiffness of flat tets bounded.
         """
         thick = self.thickness >= THIN
         cubes = np.where(self.longest_edges > 0, self.longest_edges, 1) ** 3
@@ -80,36 +80,45 @@ class Tetrahedra:
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:
-        """(m,) w: one, less for thin tets, zero for flat ones."""
+        """(m,) w: one, less than one for thin tets, zero for flat ones."""
         return np.minimum(self.thickness / THIN, 1)
 
     @cached_property
     def ties(self) -> NDArray[np.float64]:
-        """(m,) stiffness of a tie between any two faces of a flat tet: it has next to none of its own."""
+        """(m,) extra stiffness between any two faces of a flat tet, whose own stiffness is nearly zero."""
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
         return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
 
     def face_mass(self, faces: FaceTable) -> NDArray[np.float64]:
-        """(f,) M of Eq. 12, lumped: a quarter of the volume at each face."""
+        """(f,) M of Eq. 12, lumped: a quarter of the volume at each face.
+
+        The consistent mass of Eq. 23 has 2/5 of the volume on its diagonal and −1/20 between two faces of a tet. These
+        quarters are its row sums; they are as accurate, and simpler.
+        """
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
         return np.bincount(faces.tet_faces.ravel(), weights=quarter, minlength=len(faces.vertices))
 
     def face_laplacian(self, faces: FaceTable) -> sparse.csr_matrix:
-        """(f, f) Crouzeix–Raviart Laplacian: L_ab = Σ_T N_a·N_b / |T|, which is −(3/2) |e| cot θ between two faces.
+        """(f, f) Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T|, −(3/2) |e| cot θ between two faces.
 
-        The faces of flat tets are tied to each other besides: directions then pass through them unharmed.
+        e is the edge that the two faces share, θ the dihedral angle of the tet there.
+        The faces of flat tets are coupled by the `ties` besides, so that directions pass through these unchanged.
         """
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
 
     def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
-        """(n, n) cotan Laplacian: C_ij = Σ_T N_i·N_j / (9|T|), which is −(1/6) |e| cot θ between two vertices.
+        """(n, n) cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|), −(1/6) |e| cot θ between two vertices.
 
-        The vertices of flat tets are tied to each other, loosely, besides, since some have no other tets.
+        e is the edge of the tet opposite edge ij, θ the dihedral angle there.
+        The vertices of flat tets are coupled by weak `ties` besides, since some belong to no other tet.
         """
         return _assemble(self.area_vectors, self.stiffness_factors / 9, 1e-4 * self.ties, corners, n)
 
     def divergence(self, directions: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
-        """(n,) b of Eq. 13: ∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T for one vector Y per tet."""
+        """(n,) b of Eq. 13 for one vector Y per tet: the divergence of Eq. 22, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``.
+
+        Eq. 22 is printed without the ⅓, and with the opposite sign, as the paper's Laplacian is negative semidefinite.
+        """
         parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.weights / -3)[:, None]
         return np.bincount(corners.ravel(), weights=parts.ravel(), minlength=n)
 
@@ -120,7 +129,7 @@ class Tetrahedra:
         return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
 
     def mean_gradients(self, values: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
-        """(n, 3) gradients at vertices: means over the tets around each, by volume."""
+        """(n, 3) gradients at vertices: volume-weighted means over the tets around each."""
         weights = self.weights / -3
         sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * weights[:, None]
         volumes = np.bincount(corners.ravel(), np.repeat(self.weights * self.volumes, 4), n)
@@ -129,7 +138,7 @@ class Tetrahedra:
 
 
 def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(m,) volumes, negative for tets given inside out.
+    """(m,) volumes, negative for inverted tets.
 
     Examples
     --------
@@ -147,7 +156,7 @@ def _assemble(
     ids: NDArray[np.int64],
     n: int,
 ) -> sparse.csr_matrix:
-    """Σ_T factor · N_a·N_b at the entry (ids of a, ids of b), and the ties."""
+    """Sparse (n, n) matrix with ``Σ_T factor · N_a·N_b`` at the entry (id of a, id of b), plus the ties."""
     indptr, columns = _pattern(ids, n)
     data = np.zeros(len(columns))
     _accumulate(vectors, factors, ties, ids, indptr, columns, data)
@@ -156,7 +165,7 @@ def _assemble(
 
 @compiled
 def _pattern(ids, n):
-    """Rows and sorted columns of the matrix that couples the four ids of each tet."""
+    """Sparsity pattern (CSR, sorted columns) of the matrix that couples the four ids of each tet."""
     starts = np.zeros(n + 1, dtype=np.int64)
     for t in range(len(ids)):
         for a in range(4):

@@ -1,1 +1,18 @@
 """Pictures of fields and shapes, without a screen."""
+
+from .figures import PICTURE_FORMATS, new_figure
+from .scenes import draw_shape, save_scene
+from .slices import draw_plane, draw_slices, save_slices
+from .surfaces import draw_surface, save_surface
+
+__all__ = [
+    "PICTURE_FORMATS",
+    "draw_plane",
+    "draw_shape",
+    "draw_slices",
+    "draw_surface",
+    "new_figure",
+    "save_scene",
+    "save_slices",
+    "save_surface",
+]

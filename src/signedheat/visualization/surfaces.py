@@ -1,4 +1,4 @@
-"""Pictures of distance on surfaces: shaded, with isolines, by a small rasteriser that needs no screen."""
+"""Pictures of distance on surfaces: shaded, with isolines and sources."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
 from ..domains.curves import Curve
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable
-from .slices import INSIDE_TO_OUTSIDE, PICTURE_FORMATS, _direction, _write, new_figure
+from .colors import add_color_bar, distance_colors, isolines_between
+from .figures import PICTURE_FORMATS, new_figure, write_figure
+from .rasterizer import Camera, oblique, rasterize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SIZE = 900
-"""Pixels along the longer side."""
 
-
-def save_surface(field: VertexField, path: PathLike, sources: Sequence[Any] = (), n_contours: int = 20) -> None:
+def save_surface(
+    field: VertexField, path: PathLike, sources: Sequence[Any] = (), n_contours: int = 20, up: int = 2
+) -> None:
     """A surface coloured by φ, with isolines and sources, seen from where most of the sources show.
 
     Blue is φ < 0, orange φ > 0; the heavy line is φ = 0; yellow are the sources.
@@ -36,6 +36,8 @@ def save_surface(field: VertexField, path: PathLike, sources: Sequence[Any] = ()
         What to draw in yellow.
     n_contours : int
         About how many isolines.
+    up : int
+        Axis that points upwards: 0, 1 or 2.
 
     Raises
     ------
@@ -45,9 +47,8 @@ def save_surface(field: VertexField, path: PathLike, sources: Sequence[Any] = ()
     ensure_writable(path, PICTURE_FORMATS, "a picture")
     figure = new_figure(8.0, 7.0)
     axes = figure.add_subplot(1, 1, 1)
-    image = draw_surface(field, axes, sources, n_contours)
-    figure.colorbar(image, ax=axes, shrink=0.7, label="signed distance")
-    _write(figure, path)
+    draw_surface(field, axes, sources, n_contours, up=up)
+    write_figure(figure, path)
 
 
 def draw_surface(
@@ -56,41 +57,31 @@ def draw_surface(
     sources: Sequence[Any] = (),
     n_contours: int = 20,
     view: NDArray[np.float64] | None = None,
-) -> Any:
-    """Draw into axes; what a colour bar needs comes back. `view` is a direction from the surface to the eye."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LinearSegmentedColormap, Normalize
-
+    up: int = 2,
+) -> None:
+    """Draw into axes, with a colour bar. `view` is a direction from the surface to the eye."""
     field = field.restrict()
     mesh, values = field.domain.triangulation, field.domain.on_triangulation(field.values)
     flat = [item for source in sources for item in (source if isinstance(source, Sequence) else [source])]
-    frame = camera(mesh, flat) if view is None else looking(view)
-    seen = mesh.vertices @ frame.T
-    used = seen[mesh.faces.ravel()]
-    lower, upper = used[:, :2].min(axis=0), used[:, :2].max(axis=0)
-    scale = (SIZE - 20) / max(float((upper - lower).max()), 1e-300)
-    seen = np.column_stack([(seen[:, :2] - lower) * scale + 10, seen[:, 2] * scale])
-    width, height = (np.ceil((upper - lower) * scale).astype(int) + 20).tolist()
-    depth, face, phi = rasterised(seen[mesh.faces], values[mesh.faces], width, height)
+    direction = toward_sources(mesh, flat, up) if view is None else view
+    camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
+    corners = camera.pixels(mesh.vertices)[mesh.faces]
+    depth, face, phi = rasterize(corners, values[mesh.faces], camera.width, camera.height)
 
-    bound = float(np.nanmax(np.abs(values))) or 1.0
-    colours = ScalarMappable(Normalize(-bound, bound), LinearSegmentedColormap.from_list("phi", INSIDE_TO_OUTSIDE))
-    known = face >= 0
-    normals = mesh.face_area_vectors @ frame.T
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    light = 0.45 + 0.55 * np.abs(normals[face] @ np.array([0.25, 0.35, 0.9]) / 0.998)
-    image = np.ones((height, width, 3))
-    shade = colours.to_rgba(np.where(np.isfinite(phi), phi, 0.0))[..., :3] * light[..., None]
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    colors = distance_colors(low, high)
+    shade = colors.to_rgba(np.where(np.isfinite(phi), phi, 0.0))[..., :3]
     shade[~np.isfinite(phi)] = 0.7
-    image[known] = shade[known]
-    span = float(np.nanmax(values) - np.nanmin(values))
-    if n_contours > 0 and span > 0:
-        darken(image, phi, known, span / n_contours)
+    known = face >= 0
+    image = np.where(known[..., None], shade * camera.shades(mesh.face_area_vectors)[face][..., None], 1.0)
+    isolines, step = isolines_between(low, high, n_contours)
+    if n_contours > 0 and high > low:
+        darken(image, phi, known, step)
     axes.imshow(image, origin="lower", interpolation="antialiased")
     for item in flat:
-        draw_source(axes, item, mesh, frame, lower, scale, depth)
+        draw_source(axes, item, mesh, camera, depth)
     axes.set_axis_off()
-    return colours
+    add_color_bar(axes.figure, [axes], colors, isolines, step)
 
 
 def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[np.bool_], step: float) -> None:
@@ -105,16 +96,14 @@ def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[
         image[smooth] *= (1 - strength * cover[smooth])[:, None]
 
 
-def draw_source(
-    axes: Axes, item: Any, mesh: Any, frame: NDArray, lower: NDArray, scale: float, depth: NDArray[np.float64]
-) -> None:
+def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: NDArray[np.float64]) -> None:
     """Those parts of a source that nothing hides."""
-    points = np.einsum("ik,ikj->ij", item.barycentric, mesh.vertices[mesh.faces[item.faces]]) @ frame.T
+    points = np.einsum("ik,ikj->ij", item.barycentric, mesh.vertices[mesh.faces[item.faces]])
     if isinstance(item, Curve) and item.closed:
         points = np.concatenate([points, points[:1]])
-    pixels = (points[:, :2] - lower) * scale + 10
+    pixels, near = np.split(camera.pixels(points), [2], axis=1)
     column, row = np.clip(np.round(pixels).astype(int).T, 0, np.array(depth.shape[::-1])[:, None] - 1)
-    visible = points[:, 2] * scale >= depth[row, column] - 6
+    visible = near[:, 0] >= depth[row, column] - 6
     if isinstance(item, Curve):
         shown = np.where(visible[:, None], pixels, np.nan)
         axes.plot(*shown.T, color="black", linewidth=3.2, solid_capstyle="round")
@@ -123,59 +112,20 @@ def draw_source(
         axes.plot(*pixels[visible].T, "o", color="#ffd83b", markeredgecolor="black", markersize=6)
 
 
-def camera(mesh: Any, sources: Sequence[Any]) -> NDArray[np.float64]:
-    """Axes of the picture: right, up, towards the eye."""
+def toward_sources(mesh: Any, sources: Sequence[Any], up: int = 2) -> NDArray[np.float64]:
+    """A direction from which most of the sources show; of flat surfaces, the side that they face."""
     normals = [mesh.face_area_vectors[s.faces] for s in sources]
     mean = np.zeros(3)
     if normals:
         stacked = np.concatenate(normals)
         lengths = np.linalg.norm(stacked, axis=1)
         mean = (stacked[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0) / len(stacked)
-    direction = _direction(22, -58)
+    direction = oblique(22, -58, up)
     if np.linalg.norm(mean) > 0.3:
-        direction = mean / np.linalg.norm(mean) + 0.2 * direction
-    elif not normals or np.ptp(mesh.bounds, axis=0).min() < 1e-3 * np.ptp(mesh.bounds, axis=0).max():
+        return mean / np.linalg.norm(mean) + 0.2 * direction
+    extents = np.ptp(mesh.bounds, axis=0)
+    if not normals or extents.min() < 1e-3 * extents.max():
         total = mesh.face_area_vectors.sum(axis=0)
         if np.linalg.norm(total) > 0.5 * mesh.face_areas.sum():
-            direction = total
-    return looking(direction)
-
-
-def looking(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(3, 3) right, up and towards the eye, for a direction to the eye."""
-    towards = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
-    up = np.array([0.0, 0.0, 1.0]) if abs(towards[2]) < 0.95 else np.array([0.0, 1.0, 0.0])
-    right = np.cross(up, towards)
-    right /= np.linalg.norm(right)
-    return np.stack([right, np.cross(towards, right), towards])
-
-
-def rasterised(
-    corners: NDArray[np.float64], values: NDArray[np.float64], width: int, height: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-    """Depth, face and value at each pixel: (height, width), face −1 where there is none."""
-    depth = np.full((height, width), -np.inf)
-    face = np.full((height, width), -1, dtype=np.int64)
-    shown = np.full((height, width), np.nan)
-    _fill(corners, values, depth, face, shown)
-    return depth, face, shown
-
-
-@compiled
-def _fill(corners, values, depth, face, shown):
-    height, width = depth.shape
-    for f in range(len(corners)):
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[f]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if area == 0.0:
-            continue
-        for row in range(max(int(np.ceil(min(ay, by, cy))), 0), min(int(max(ay, by, cy)), height - 1) + 1):
-            for column in range(max(int(np.ceil(min(ax, bx, cx))), 0), min(int(max(ax, bx, cx)), width - 1) + 1):
-                u = ((column - ax) * (cy - ay) - (row - ay) * (cx - ax)) / area
-                v = ((bx - ax) * (row - ay) - (by - ay) * (column - ax)) / area
-                if u < 0.0 or v < 0.0 or u + v > 1.0:
-                    continue
-                z = az + u * (bz - az) + v * (cz - az)
-                if z > depth[row, column]:
-                    depth[row, column], face[row, column] = z, f
-                    shown[row, column] = (1 - u - v) * values[f, 0] + u * values[f, 1] + v * values[f, 2]
+            return total
+    return direction

@@ -13,6 +13,7 @@ from shapes.grid_cases import (
     torus,
     torus_distance,
 )
+from signedheat.diagnostics import SampledSource
 from signedheat.discretization import discretize
 from signedheat.lowering.grid.discretization import memory_estimate
 
@@ -117,12 +118,12 @@ def test_faces_of_any_size_beside_the_cells():
     field = sh.signed_distance(sh.TriangleMesh(corners, [[0, 1, 2], [0, 2, 3]]), grid)
     # the box ends before the plane does, and the stencil's walls let nothing out: straight up to there
     np.testing.assert_allclose(field.values, grid.points[..., 2] - 0.2, atol=1e-4)
-    assert field.diagnostics.notes["area outside the grid"] > 0.99
+    assert field.diagnostics.note(SampledSource).area_outside > 0.99
     x, y = (v.ravel() for v in np.meshgrid(np.linspace(-1.6, 1.6, 300), np.linspace(-1.6, 1.6, 300), indexing="ij"))
     i = np.arange(299 * 300).reshape(299, 300)[:, :-1].ravel()
     faces = np.concatenate([np.stack([i, i + 300, i + 301], 1), np.stack([i, i + 301, i + 1], 1)])
     tiny = sh.signed_distance(sh.TriangleMesh(np.c_[x, y, np.full(len(x), 0.2)], faces), grid)
-    assert tiny.diagnostics.notes["samples"] < 2 * 32 * 32
+    assert tiny.diagnostics.note(SampledSource).samples < 2 * 32 * 32
     np.testing.assert_allclose(tiny.values, field.values, atol=1e-3)
 
 
@@ -181,7 +182,7 @@ def test_sides_that_coincide_are_told_and_refused_when_nothing_is_left():
         [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1e-4]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
     )
     field = sh.signed_distance(thin, resolution=32)
-    assert 0.99 < field.diagnostics.notes["area that cancels"] < 1
+    assert 0.99 < field.diagnostics.note(SampledSource).area_cancelled < 1
     outside = np.abs(field.grid.points[..., 2]) > 0.1
     assert (field.values[outside] > 0).all()
     twice = sh.TriangleMesh(thin.vertices, np.concatenate([thin.faces, thin.faces[:, ::-1]]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat.visualization import slices as viewing
+from signedheat import visualization
 
 
 def circle(n=400, radius=1.0, center=(0.0, 0.0), part=1.0):
@@ -151,7 +151,7 @@ def test_field_in_the_plane(tmp_path):
         again = sh.load_field(tmp_path / f"phi.{ending}")
         np.testing.assert_array_equal(again.values, phi.values)
         np.testing.assert_array_equal(again.grid.origin, phi.grid.origin)
-    viewing.save_slices(phi, tmp_path / "phi.png", [circle()], [0.2])
+    visualization.save_slices(phi, tmp_path / "phi.png", [circle()], [0.2])
     assert matplotlib.image.imread(tmp_path / "phi.png")[..., :3].std() > 0.05
 
 

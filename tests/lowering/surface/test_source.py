@@ -8,6 +8,7 @@ import pytest
 
 import signedheat as sh
 from shapes.surface_cases import band, book, flipped, laid_out, positions, sphere, square
+from signedheat.diagnostics import VerticesAdded
 from signedheat.domains.segments import segments_of, segments_of_each
 from signedheat.geometry.intrinsic.conforming_refinement import refine_to_conform
 from signedheat.geometry.surface_points import locate_points
@@ -227,7 +228,7 @@ def test_an_edge_curve_shifted_into_faces_gives_nearly_the_same_distance():
     exact = np.hypot(np.maximum(np.abs(mesh.vertices[:, 0]) - 0.5, 0), mesh.vertices[:, 1])
     on_edges = solver.distance(mesh.polyline([[-0.5, 0, 0], [0.5, 0, 0]], oriented=False))
     inside = solver.distance(mesh.polyline([[-0.5, 1e-4, 0], [0.5, 1e-4, 0]], oriented=False))
-    assert inside.diagnostics.notes["vertices added for sources"] > 20
+    assert inside.diagnostics.note(VerticesAdded).vertices_added > 20
     assert np.abs(inside.values - exact).max() < 2 * np.abs(on_edges.values - exact).max() < 0.2
 
 
@@ -272,7 +273,7 @@ def test_an_oriented_curve_that_meets_an_embedded_one_is_the_same_curve():
     stub = mesh.polyline([[0.9, 0.0713, 0], [0.95, 0.0713, 0]], oriented=False)
     alone = sh.SignedHeatSolver(mesh).distance(straight, sh.Free()).values
     together = sh.SignedHeatSolver(mesh).distance([straight, stub], sh.Free())
-    assert together.diagnostics.notes["vertices added for sources"] > 10  # the whole curve was embedded
+    assert together.diagnostics.note(VerticesAdded).vertices_added > 10  # the whole curve was embedded
     left = mesh.vertices[:, 0] < 0
     assert np.abs(together.values - alone)[left].max() < 0.06
 

@@ -1,1 +1,1 @@
-"""Shortest paths and exact distance on polyhedral surfaces, and along straight lines in tets."""
+"""Shortest paths and exact distance on polyhedral surfaces, and any-angle distance in tet meshes."""

@@ -1,9 +1,10 @@
-"""Kernels: distance in tets along straight lines from a surface, bent where they meet walls.
+"""Kernels: distance in a tet mesh from a surface, along straight lines that bend at the boundary of the mesh.
 
 Where the segment to the nearest point of the surface lies in the mesh, its length is the distance. Elsewhere shortest
-lines bend at the boundary. They are found vertex by vertex, in order of distance: each takes over from a neighbour the
-piece of the surface or the bend that the neighbour sees, if it sees it too, and else bends at the neighbour (any-angle
-search, Nash et al. 2007). Bending at vertices instead of anywhere on an edge costs a length of second order.
+paths bend at the boundary. They are found vertex by vertex, in order of distance: each vertex takes over from a
+neighbour the triangle, or the bend, that the neighbour's path starts from, if it is visible from the vertex too;
+otherwise the path bends at the neighbour (any-angle search, Nash et al. 2007). Bending at vertices only, instead of
+anywhere on an edge, costs a length of second order.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from ..nearest import place_on_triangle
 
 
 class FacePlanes(NamedTuple):
-    """What lines need to know of tets to walk through them; see `sources.clipping.Planes` for the last three."""
+    """Tets, their neighbours and the planes of their faces, to walk along lines; see `tet_clipping.Planes`."""
 
     tets: NDArray[np.int64]
     neighbors: NDArray[np.int64]
@@ -31,7 +32,7 @@ class FacePlanes(NamedTuple):
 
 @compiled(nogil=True)
 def _beyond(planes, tet, k, x, y, z):
-    """How far a point lies outside the face opposite corner k of a tet."""
+    """Signed distance by which a point lies outside the face opposite corner k of a tet."""
     f = planes.tet_faces[tet, k]
     height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
     return planes.signs[tet, k] * height
@@ -39,7 +40,7 @@ def _beyond(planes, tet, k, x, y, z):
 
 @compiled(nogil=True)
 def _seen(planes, points, first_tet, tets_at, v, target, slack):
-    """Whether the segment from vertex v to a target lies in the mesh; the target does."""
+    """Whether the segment from vertex v to a target in the mesh lies in the mesh."""
     x, y, z = points[v]
     u, w, t = target
     tet, least = -1, np.inf
@@ -70,7 +71,7 @@ def _seen(planes, points, first_tet, tets_at, v, target, slack):
 
 @compiled(nogil=True)
 def _foot(triangles, triangles_at, first_triangle, corners, near, x, y, z):
-    """The nearest point on the triangles that share a corner with one: its triangle, and where it is."""
+    """Nearest point to (x, y, z) on the triangles that share a corner with triangle `near`: triangle and position."""
     best, found, place = np.inf, near, np.zeros(3)
     for c in range(3):
         for i in range(first_triangle[corners[near, c]], first_triangle[corners[near, c] + 1]):
@@ -98,23 +99,23 @@ def any_angle_distance(
     planes : FacePlanes
         The mesh.
     points : (n, 3) float
-        Its vertices, measured from the middle of the mesh, as the planes are.
+        Its vertices, relative to the centre of the mesh, as the planes are.
     first_tet : (n + 1,) int
         Where in `tets_at` the tets at each vertex begin.
     tets_at : (4 m,) int
         Tets by vertex.
     triangles : (k, 3, 3) float
-        The surface, measured from the same middle.
+        The surface, relative to the same centre.
     corners : (k, 3) int
-        Which of its corners coincide.
+        Vertex ids of the surface: corners that coincide have the same id.
     first_triangle, triangles_at : int arrays
-        Triangles by corner.
+        The triangles at each of these ids: where they begin, and the triangles.
     owners : (k,) int
-        The tet that each lies in.
+        The tet that each triangle lies in.
     nearest : (n,) int
-        The triangle nearest to each vertex; −1 for vertices that have no distance.
+        The triangle nearest to each vertex, regardless of visibility; −1 for vertices that have no distance.
     slack : float
-        A line may lie so far outside.
+        Length by which a line may lie outside the mesh.
 
     Returns
     -------
@@ -123,9 +124,9 @@ def any_angle_distance(
     nearest : (n,) int
         The triangle that it is measured from.
     feet : (n, 3) float
-        The place on it.
+        The point of that triangle at which the shortest path starts.
     hidden : int
-        Number of vertices that do not see what is nearest to them.
+        Number of vertices from which the nearest point of the surface is not visible.
     """
     n = len(points)
     distance = np.full(n, np.inf)
@@ -142,7 +143,7 @@ def any_angle_distance(
                 distance[v], known[v] = np.sqrt(square), True
     heap = [(0.0, 0)]
     heap.pop()
-    for i in range(len(triangles)):  # what lies in a tet is seen from its corners, though it may not be the nearest
+    for i in range(len(triangles)):  # a triangle in a tet is visible from the tet's corners, if not the nearest to them
         for k in range(4):
             v = planes.tets[owners[i], k]
             if not known[v] and nearest[v] >= 0:

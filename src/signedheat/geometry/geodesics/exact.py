@@ -1,10 +1,10 @@
-"""Distance on a polyhedral surface from line segments and points in its faces, exact or very nearly so.
+"""Distance on a polyhedral surface from line segments and points in its faces: exact, or within a tolerance.
 
-Windows travel from face to face in order of distance (Mitchell, Mount & Papadimitriou 1987; Chen & Han 1990), and those
-that a path through a vertex outruns are dropped (Xin & Wang 2009). A window is an interval of an edge, reached straight
-from one source: a point, or, since the sources here are segments too, a parallel beam at right angles to one.
-Each vertex splits a window, so that their number per edge would grow with distance; neighbouring windows on an edge
-that one circular or straight wave can stand for are therefore made one (as Surazhsky et al. 2005 do), and the work
+Windows propagate from face to face in order of distance (Mitchell, Mount & Papadimitriou 1987; Chen & Han 1990), and
+windows that a path through a vertex undercuts are dropped (Xin & Wang 2009). A window is an interval of an edge whose
+points see one source along straight lines: a point, or, since sources here are segments too, a parallel beam at right
+angles to a segment. Each vertex splits windows, so that their number per edge would grow with distance; neighbouring
+windows that one circular or straight wave front approximates are therefore merged (Surazhsky et al. 2005), and the work
 stays in proportion to the number of faces.
 """
 
@@ -29,21 +29,21 @@ _NO_ID, _NO_POINT = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.complex128
 def distance_to_zero_line(
     triangles: IntrinsicMesh, values: NDArray[np.float64], tolerance: float = 1e-4
 ) -> tuple[NDArray[np.float64], int]:
-    """Distance of every vertex to the line on which values, linear in every face, are zero; and the windows it took.
+    """Distance of every vertex to the zero set of a function that is linear in every face; and the number of windows.
 
     Parameters
     ----------
     triangles : IntrinsicMesh
         Any surface, nonmanifold and nonorientable ones too.
     values : (n,) float
-        At the vertices; faces with NaN have no line.
+        The function at the vertices; faces with a NaN corner contain no part of the zero set.
     tolerance : float
-        Windows are made one where that changes distances by less than this fraction of the edge; 0 is exact.
+        Windows are merged where that changes distances by less than this fraction of the edge; 0 is exact.
 
     Returns
     -------
     (n,) float
-        inf where no line is connected.
+        inf where the zero set is not connected to the vertex.
     int
         Number of windows, a measure of the work.
     """
@@ -62,9 +62,10 @@ def distance_to_edges_and_points(
     positions: NDArray[np.complex128],
     tolerance: float = 1e-4,
 ) -> tuple[NDArray[np.float64], int]:
-    """Distance of every vertex to the nearest of some edges, vertices, and points inside faces; and the windows.
+    """Distance of every vertex to some edges, vertices, and points inside faces; and the number of windows.
 
-    A point on an edge is to be given in every face there; otherwise see `distance_to_zero_line`.
+    Points are given by their faces and their `positions` in the layouts of these; a point on an edge has to be given in
+    every face at the edge. For the rest see `distance_to_zero_line`.
 
     Examples
     --------
@@ -81,10 +82,10 @@ def distance_to_edges_and_points(
 
 
 def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
-    """Values kept away from zero, so that the line crosses edges and no vertices.
+    """Values moved away from zero by `least`, so that the zero set crosses edges and passes no vertex.
 
-    A vertex with zero gets the sign that its neighbours have less of: where both sides of a source have the same sign,
-    the line runs round it.
+    A vertex with value zero gets the sign that fewer of its neighbours have: where both sides of a source have the same
+    sign, the zero set then runs around the source.
     """
     near = np.abs(values) < least
     known = np.where(near | np.isnan(values), 0.0, np.sign(values))
@@ -94,7 +95,7 @@ def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float)
 
 
 def is_pseudosource(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
-    """(n,) vertices that shortest lines can pass through: on a boundary, or with an angle of more than 2π."""
+    """(n,) vertices that shortest paths can pass through: on a boundary, or with a total angle of more than 2π."""
     angles = np.arctan2(1.0, triangles.corner_cotangents)
     total = np.bincount(triangles.corner_vertices.ravel(), angles.ravel(), triangles.n_vertices)
     special = total > 2 * np.pi + 1e-9
@@ -104,7 +105,7 @@ def is_pseudosource(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
 
 @compiled(nogil=True)
 def _reach(v, length, heap, distance, pseudosources):
-    """Note a path to a vertex; a pseudosource, round which paths bend, is queued."""
+    """Record a path of this length to a vertex; if paths can bend around it (a pseudosource), queue it."""
     if length < distance[v] * (1.0 - 1e-14):
         distance[v] = length
         if pseudosources[v]:
@@ -113,7 +114,7 @@ def _reach(v, length, heap, distance, pseudosources):
 
 @compiled(nogil=True)
 def _collect(state, latest, halfedge, at_tail, at_head, length, slack, tolerance):
-    """The windows queued for a halfedge, in order along it, trimmed, and made fewer where one will do for several."""
+    """The windows queued for a halfedge, in order along it, trimmed against each other and merged where possible."""
     windows, following, _ = state
     count, number = 0, latest[halfedge]
     while number >= 0:
@@ -154,7 +155,7 @@ def _propagate(faces, pseudosources, sources, tolerance):
     distance = np.full(n, np.inf)
     heap = [(0.0, 0)]
     heap.pop()
-    state = (np.empty((1024, 6)), np.empty(1024, dtype=np.int64), len(heap))  # none; a literal 0 compiles twice
+    state = (np.empty((1024, 6)), np.empty(1024, dtype=np.int64), len(heap))  # len(heap) is 0; a literal compiles twice
     latest = np.full(3 * len(faces.vertices), -1, dtype=np.int64)  # window queued for each halfedge; others follow it
     slack = _ROUND + 2.0 * tolerance
     state = initial_windows(faces, sources, state, heap, latest, distance, slack)
@@ -204,7 +205,7 @@ def _propagate(faces, pseudosources, sources, tolerance):
             right = d1x * cy - d1y * (cx - s1)
             if (
                 left > 0.0
-            ):  # the apex lies beside what the window sees, in a gap between windows perhaps: by way of their end
+            ):  # the apex lies outside the visible sector, perhaps in a gap between windows: by way of a window's end
                 to_apex = arrival(w, s0, 0.0) + np.hypot(cx - s0, cy)
             elif right < 0.0:
                 to_apex = arrival(w, s1, 0.0) + np.hypot(cx - s1, cy)
@@ -213,7 +214,7 @@ def _propagate(faces, pseudosources, sources, tolerance):
             _reach(faces.vertices[face, (side + 2) % 3], to_apex, heap, distance, pseudosources)
             turned = unit * (w[P] + up * w[Q])
             source, normal = (origin, turned) if w[KIND] == BEAM else (origin + turned, 0j)
-            if left < 0.0:  # seen on the side from tail to apex
+            if left < 0.0:  # visible on the side from tail to apex
                 t0 = hit(s0, d0x, d0y, 0.0, 0.0, cx, cy)
                 t1 = hit(s1, d1x, d1y, 0.0, 0.0, cx, cy) if right < 0.0 else 1.0
                 t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
@@ -221,7 +222,7 @@ def _propagate(faces, pseudosources, sources, tolerance):
                     faces, state, heap, latest, distance, face, tail_side, w[KIND], t0, t1, source, normal, w[SIGMA],
                     slack,
                 )  # fmt: skip
-            if right > 0.0:  # seen on the side from apex to head
+            if right > 0.0:  # visible on the side from apex to head
                 t0 = hit(s0, d0x, d0y, cx, cy, length, 0.0) if left > 0.0 else 0.0
                 t1 = hit(s1, d1x, d1y, cx, cy, length, 0.0)
                 t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)

@@ -1,4 +1,4 @@
-"""Kernels: sources of distance on a polyhedral surface, and the first windows that they open."""
+"""Kernels: sources of exact distance on a polyhedral surface, and their initial windows."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outr
 
 
 class Faces(NamedTuple):
-    """Intrinsic mesh, with the halfedges at each edge and the corners at each vertex in order of these."""
+    """An intrinsic mesh as plain arrays, with the halfedges of each edge and the corners at each vertex in lists."""
 
     vertices: NDArray[np.int64]
     positions: NDArray[np.complex128]
@@ -29,7 +29,7 @@ class Faces(NamedTuple):
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh) -> Faces:
-        """The same triangles, as the kernels want them."""
+        """The arrays of an intrinsic mesh."""
         table = triangles.edges
         at_edge, at_vertex = table.face_edges.ravel(), triangles.corner_vertices.ravel()
         edge_counts = np.bincount(at_edge, minlength=triangles.n_edges)
@@ -49,7 +49,7 @@ class Faces(NamedTuple):
 
 
 class GeodesicSources(NamedTuple):
-    """Where distance begins: the zero line of vertex values, edges, vertices, and points inside faces."""
+    """Where distance is zero: on the zero set of vertex values, on edges, at vertices, and at points inside faces."""
 
     values: NDArray[np.float64]
     edges: NDArray[np.int64]
@@ -62,8 +62,8 @@ class GeodesicSources(NamedTuple):
 def propagate_across(faces, state, heap, latest, distance, face, side, kind, t0, t1, point, normal, sigma, slack):
     """Propagate distance across a side of a face, from within, to the faces beyond; returns the windows.
 
-    Layout coordinates: the side is lit from fraction t0 to t1; the source is a point, or a beam along a normal through
-    a point, at distance σ.
+    In the layout of the face: the interval of the side from fraction t0 to t1 sees the source, which is a point whose
+    own distance is σ, or a beam along a normal whose distance at a point is σ.
     """
     windows, following, count = state
     edge = faces.edges[face, side]
@@ -110,7 +110,7 @@ def propagate_across(faces, state, heap, latest, distance, face, side, kind, t0,
 
 @compiled(nogil=True)
 def _segment(faces, values, face):
-    """Whether the line crosses a face, the two sides it crosses, and where."""
+    """Whether the zero set crosses a face, the two sides that it crosses, and where."""
     first, second, start, end = -1, -1, 0j, 0j
     for side in range(3):
         a, b = values[faces.vertices[face, side]], values[faces.vertices[face, (side + 1) % 3]]
@@ -137,7 +137,7 @@ def _reach_corners(faces, distance, face, start, end):
 
 @compiled(nogil=True)
 def _first_beam(faces, state, heap, latest, distance, face, start, end, normal, slack):
-    """Straight waves from a segment in a face, along a normal to it, to the sides that they meet."""
+    """Parallel beam from a segment in a face, along one of its normals, to the sides of the face that it meets."""
     along = (end - start) / abs(end - start)
     for side in range(3):
         a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
@@ -157,7 +157,7 @@ def _first_beam(faces, state, heap, latest, distance, face, start, end, normal, 
 
 @compiled(nogil=True)
 def _first_fan(faces, values, state, heap, latest, distance, face, side, point, other, slack):
-    """Round waves from the end of a segment, between its beams and those of its neighbours across the side there."""
+    """Circular waves from the end of a segment, between its beam and the beam of the next segment, across the side."""
     here = (other - point) / abs(other - point)
     edge = faces.edges[face, side]
     alone = faces.first_halfedge[edge + 1] - faces.first_halfedge[edge] == 1
@@ -165,7 +165,7 @@ def _first_fan(faces, values, state, heap, latest, distance, face, side, point, 
         beyond, there = faces.halfedges[k] // 3, faces.halfedges[k] % 3
         if beyond == face and not alone:
             continue
-        # the fan in this face: behind its own segment, and behind that of the face beyond, laid out beside it
+        # the fan in this face: between the beam of its own segment and that of the face beyond, unfolded next to it
         back = here
         if not alone:
             _, one, _, p, q = _segment(faces, values, beyond)
@@ -191,7 +191,7 @@ def _first_fan(faces, values, state, heap, latest, distance, face, side, point, 
 
 @compiled(nogil=True)
 def initial_windows(faces, sources, state, heap, latest, distance, slack):
-    """Distance at the corners of faces with sources, then the first windows."""
+    """Set distances at the corners of faces with sources, then make the initial windows."""
     for face in range(len(faces.vertices)):
         crossed, _, _, start, end = _segment(faces, sources.values, face)
         if crossed:

@@ -1,7 +1,7 @@
-"""Compiled kernels that find shortest lines across intrinsic mesh.
+"""Kernels: shortest paths across the faces of an intrinsic mesh.
 
-Side ``3 f + k`` of face f runs from corner k to corner k + 1. A *sleeve* is a sequence of faces, each left through a
-side and the next one entered through another side of the same edge.
+Halfedge ``3 f + k`` of face f runs from corner k to corner k + 1. A *sleeve* is a sequence of faces: each is left
+through a halfedge, and the next one entered through another halfedge of the same edge.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ...compiled import compiled
 
 @compiled
 def group(members, n):
-    """Positions of 0 … n−1 in `members`: where each one's begin, and the positions themselves."""
+    """Inverse index of `members` (values 0 … n−1): where the entries of each value begin, and the positions."""
     begin = np.zeros(n + 1, np.int64)
     for m in members:
         begin[m + 1] += 1
@@ -31,7 +31,7 @@ def group(members, n):
 
 @compiled
 def middle(corners, h):
-    """Midpoint of a side, in the layout of its face."""
+    """Midpoint of a halfedge, in the layout of its face."""
     return 0.5 * (corners[h // 3, h % 3] + corners[h // 3, (h % 3 + 1) % 3])
 
 
@@ -39,8 +39,8 @@ def middle(corners, h):
 def find_sleeve(corners, edge_of, around, starts, start_points, ends, end_points, cost, leave, enter):
     """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
 
-    Returns the sides through which all faces but the last are left, and those through which all but the first are
-    entered; none if there is no way. `cost`, `leave` and `enter` are room to work in, given back as they were.
+    Returns the halfedges through which all faces but the last are left, and those through which all but the first are
+    entered; empty if there is no path. `cost`, `leave` and `enter` are work arrays, restored before returning.
     """
     heap = [(0.0, np.int64(0))]
     heap.pop()
@@ -92,9 +92,9 @@ def find_sleeve(corners, edge_of, around, starts, start_points, ends, end_points
 
 @compiled
 def unfold(corners, forward, left, entered):
-    """Lay out a sleeve in the plane of its first face: tails and heads of the sides left, and the last face.
+    """Unfold a sleeve into the plane of its first face: tails and heads of the halfedges left, and the last face.
 
-    Also whether each face, the last one included, lies there turned over.
+    Also whether each face, the last one included, is turned over in that plane.
     """
     n = len(left)
     tails, heads = np.empty(n, np.complex128), np.empty(n, np.complex128)
@@ -118,15 +118,15 @@ def unfold(corners, forward, left, entered):
 
 @compiled
 def turns(a, b):
-    """Positive where b is counter-clockwise of a."""
+    """Cross product of plane vectors: positive where b is counter-clockwise of a."""
     return a.real * b.imag - a.imag * b.real
 
 
 @compiled
 def funnel(tails, heads, over, start, end):
-    """Pull a string tight inside an unfolded sleeve: the portals at which it bends, and whether to their left.
+    """Shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
 
-    The simple funnel algorithm. Also the length.
+    Returns the portals at which the path bends, whether it bends at their left end, and its length.
     """
     n = len(tails)
     bends, to_left = [np.int64(0)], [False]
@@ -173,7 +173,7 @@ def funnel(tails, heads, over, start, end):
 
 @compiled
 def other_way(edge_of, forward, around, left, entered, tails, heads, bend, point):
-    """The sleeve that passes the vertex of a bend on its other side; empty where no faces lead there."""
+    """The sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
     begin, sides = around
     first = last = bend
     while first > 0 and (tails[first - 1] == point or heads[first - 1] == point):
@@ -181,7 +181,7 @@ def other_way(edge_of, forward, around, left, entered, tails, heads, bend, point
     while last + 1 < len(left) and (tails[last + 1] == point or heads[last + 1] == point):
         last += 1
     goal, h, at_tail = entered[last] // 3, left[first], tails[first] == point
-    # turn round the vertex in all ways there are, breadth first: sides through which faces are left, and entered
+    # walk around the vertex in all directions, breadth first: halfedges through which faces are left, and entered
     out, into, before = [turned(h, at_tail)], [h], [-1]
     tail_there = [not at_tail]
     k = 0
@@ -212,13 +212,13 @@ def other_way(edge_of, forward, around, left, entered, tails, heads, bend, point
 
 @compiled
 def turned(h, at_tail):
-    """The other side of a face at the tail of a side, or at its head."""
+    """The other halfedge of the face at the tail of a halfedge, or at its head."""
     return h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
 
 
 @compiled
 def point_in(faces, points, face):
-    """The point of a face in its layout, from a list."""
+    """The point listed for a face, in its layout."""
     for s in range(len(faces)):
         if faces[s] == face:
             return points[s]
@@ -227,9 +227,9 @@ def point_in(faces, points, face):
 
 @compiled
 def straighten(corners, edge_of, forward, around, left, entered, starts, start_points, ends, end_points):
-    """The shortest line in a sleeve, and in those that can be had from it by passing vertices on their other side.
+    """The shortest path in a sleeve, improved as long as passing a vertex on its other side makes it shorter.
 
-    Returns the sides crossed and how far along each.
+    Returns the halfedges crossed and the fraction along each.
     """
     tails, heads, over, placed = unfold(corners, forward, left, entered)
     begin = point_in(starts, start_points, left[0] // 3)
@@ -276,7 +276,7 @@ def straighten(corners, edge_of, forward, around, left, entered, starts, start_p
 
 @compiled
 def locate_end(corners, entered, placed, over, ends, end_points):
-    """The end of a line in the plane of its sleeve's first face."""
+    """The end of a path, unfolded into the plane of its sleeve's first face."""
     face = entered[-1] // 3
     point = point_in(ends, end_points, face)
     q = corners[face]
@@ -289,10 +289,10 @@ def locate_end(corners, entered, placed, over, ends, end_points):
 
 @compiled
 def shortest_lines(corners, edge_of, forward, n_edges, starts, start_points, start_at, ends, end_points, end_at):
-    """Shortest lines for many pairs of places: sides crossed, fractions along them, and their number for each pair.
+    """Shortest paths for many pairs of points: halfedges crossed, fractions along them, their number for each pair.
 
-    Faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` says where it lies in
-    the layout of each; likewise for ends. The number is −1 where there is no way.
+    The faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` has its position in
+    the layout of each; likewise for ends. The number is −1 where there is no path.
     """
     around = group(edge_of, n_edges)
     cost = np.full(n_edges, np.inf)

@@ -1,4 +1,4 @@
-"""Shortest lines across faces, between points that share none."""
+"""Geodesic paths: shortest paths across faces, between points that share no face."""
 
 from __future__ import annotations
 
@@ -24,9 +24,27 @@ from .path_kernels import shortest_lines
 def join(
     triangles: IntrinsicMesh, located: LocatedPoints, start: NDArray[np.int64], end: NDArray[np.int64], name: str
 ) -> tuple[LocatedPoints, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Join starts to ends: all points, with the shortest lines between those that share no face cut into segments.
+    """Join starts to ends, by geodesic paths where the two share no face, as segments that lie in one face each.
 
-    Returns the located, old ones first; starts and ends of segments, in order; and which pair each belongs to.
+    Parameters
+    ----------
+    triangles : IntrinsicMesh
+        The surface.
+    located : LocatedPoints
+        (n,) points.
+    start, end : (k,) int
+        Pairs of them to join.
+    name : str
+        What the points belong to, for messages.
+
+    Returns
+    -------
+    located : LocatedPoints
+        All points, the given ones first.
+    start, end : (s,) int
+        The points that each segment joins, in order.
+    pairs : (s,) int
+        The pair that each segment belongs to.
     """
     apart = np.flatnonzero(shared_faces(triangles, located[start], located[end]) < 0)
     added = np.zeros(len(start), dtype=np.int64)
@@ -42,7 +60,7 @@ def join(
 
 
 def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDArray[np.int64]:
-    """Which segments of a curve through points have ends that share no face."""
+    """Indices of the segments of a curve through points whose two ends share no face."""
     start = np.arange(len(located) if closed else len(located) - 1)
     return np.flatnonzero(shared_faces(triangles, located[start], located[(start + 1) % len(located)]) < 0)
 
@@ -50,11 +68,11 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDAr
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, NDArray]:
-    """Points on the shortest lines between starts and ends, where they cross edges or pass vertices.
+    """Points at which the shortest paths between starts and ends cross edges or pass vertices.
 
-    A line is shortest among its neighbours: no vertex that it passes could be passed on the other side for less. The
-    first guess is the shortest way through midpoints of edges; the faces on it are unfolded, a string is pulled tight
-    inside them, and wherever it bends round a vertex the other side is tried.
+    Paths are locally shortest: none becomes shorter by passing a vertex on its other side. The first guess is the
+    shortest path through midpoints of edges; its faces are unfolded, the shortest path inside them is found (funnel
+    algorithm), and wherever it bends around a vertex the other side is tried.
 
     Parameters
     ----------
@@ -68,14 +86,14 @@ def geodesic_paths(
     Returns
     -------
     located : LocatedPoints
-        All points between, line after line.
+        All points between, path after path.
     counts : (k,) int
-        How many there are on each line.
+        Number of points on each path.
 
     Raises
     ------
     SourceError
-        If no way along the surface leads from a start to its end.
+        If a start and its end are not connected.
     """
     starts, ends = faces_at(triangles, start), faces_at(triangles, end)
     edges = triangles.edges
@@ -103,7 +121,7 @@ def geodesic_paths(
 def faces_at(
     triangles: IntrinsicMesh, located: LocatedPoints
 ) -> tuple[NDArray[np.int64], NDArray[np.complex128], NDArray[np.int64]]:
-    """All faces that have each place, where it lies in their layouts, and where the faces of each place begin."""
+    """All faces that contain each point, its position in their layouts, and where the faces of each point begin."""
     which, faces = incident_faces(triangles, located)
     order = np.lexsort([faces, which])
     which, faces = which[order], faces[order]
@@ -113,7 +131,7 @@ def faces_at(
 
 
 def through_vertices(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str) -> LocatedPoints:
-    """The way between two places that no faces join across edges, through vertices at which fans of faces touch."""
+    """The path between two points that are connected only through vertices at which fans of faces touch."""
     edges, n = triangles.edges, triangles.n_vertices
     arcs, lengths = [edges.vertices], [triangles.lengths_of_edges]
     for node, place in ((n, start), (n + 1, end)):
@@ -129,8 +147,9 @@ def through_vertices(triangles: IntrinsicMesh, start: LocatedPoints, end: Locate
         path.append(before[path[-1]])
     if path[-1] != n:
         raise SourceError(
-            f"{name}: no way along the surface joins the point in face {start.faces[0]} to the point in face "
-            f"{end.faces[0]}: they lie on different connected components; make them two curves"
+            f"{name}: no way along the surface joins the point in face {start.faces[0]} to the point "
+            f"in face {end.faces[0]}: they lie on different connected components; make them two curves",
+            element=f"face {start.faces[0]}",
         )
     chain = concatenated([start, points_at_vertices(triangles, np.array(path[-2:0:-1])), end])
     step = np.arange(len(chain) - 1)

@@ -1,9 +1,9 @@
 """Kernels: windows on the edges of a polyhedral surface.
 
-In the frame of an edge, its tail is at the origin, its head on the positive x axis, light comes from below. A window is
-a row ``(s0, s1, p, q, sigma, kind)``: the interval; kind `POINT`: waves from the point (p, q ≤ 0), whose own distance
-is σ; kind `FOCUS`: waves that contract to the point (p, q ≥ 0), whose distance would be σ; kind `BEAM`: straight waves
-along the direction (p, q > 0), σ their distance at the tail.
+In the frame of an edge, its tail is at the origin, its head on the positive x axis; waves arrive from below. A window
+is a row ``(s0, s1, p, q, sigma, kind)``: the interval [s0, s1] of the edge, and the wave. Kind `POINT`: circular waves
+from the point (p, q ≤ 0), whose own distance is σ; kind `FOCUS`: circular waves that contract to the point (p, q ≥ 0),
+whose distance would be σ; kind `BEAM`: straight waves along the direction (p, q > 0), σ their distance at the tail.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ S0, S1, P, Q, SIGMA, KIND = range(6)
 
 @compiled(nogil=True)
 def put(window, rows, k):
-    """Write a window to row k. By hand, as below: slices of arrays take long to compile."""
+    """Write a window to row k, entry by entry: assignments to slices of arrays take long to compile."""
     for i in range(6):
         rows[k, i] = window[i]
 
 
 @compiled(nogil=True)
 def arrival(w, x, y):
-    """From the source of a window to a point in the frame of its edge."""
+    """Distance from the source of a window to a point in the frame of its edge."""
     if w[KIND] == BEAM:
         return w[SIGMA] + w[P] * x + w[Q] * y
     return w[SIGMA] + w[KIND] * np.sqrt((x - w[P]) ** 2 + (y - w[Q]) ** 2)
@@ -33,7 +33,7 @@ def arrival(w, x, y):
 
 @compiled(nogil=True)
 def ray(w, x):
-    """Direction of the light at a point of the edge; of any length."""
+    """Direction of propagation at a point of the edge; of any length."""
     if w[KIND] == BEAM:
         return w[P], w[Q]
     return w[KIND] * (x - w[P]), -w[KIND] * w[Q]
@@ -41,7 +41,7 @@ def ray(w, x):
 
 @compiled(nogil=True)
 def outrun(w, at_tail, at_head, length, slack):
-    """Whether paths through an end of the edge reach all of the window sooner."""
+    """Whether paths through an end of the edge are shorter everywhere in the window."""
     if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
         return True
     return at_head + length - w[S0] < arrival(w, w[S0], 0.0) - slack
@@ -49,7 +49,7 @@ def outrun(w, at_tail, at_head, length, slack):
 
 @compiled(nogil=True)
 def trim(a, b):
-    """Cut back two windows, a beginning first, where they overlap and the other is nearer."""
+    """Trim two overlapping windows, of which a begins first, to where each has the smaller distance."""
     if b[S0] >= a[S1]:
         return
     low, high = b[S0], min(a[S1], b[S1])
@@ -79,7 +79,7 @@ def trim(a, b):
 
 @compiled(nogil=True)
 def merge(a, b, length, tolerance):
-    """Make a stand for b too, if the two are neighbours and one wave fits both: true where it does."""
+    """Merge window b into a, if they are neighbours and one wave approximates both; whether it was done."""
     if abs(a[S1] - b[S0]) > 1e-6 * length:
         return False
     s0, between, s1 = a[S0], a[S1], b[S1]
@@ -129,7 +129,7 @@ def clip(s0, s1, at_start, slope):
 
 @compiled(nogil=True)
 def hit(x0, dx, dy, ax, ay, bx, by):
-    """Where on the segment from a to b, as a fraction, the ray from (x0, 0) along (dx, dy) meets its line."""
+    """Fraction of the way from a to b at which the ray from (x0, 0) along (dx, dy) meets the line through both."""
     ex, ey = bx - ax, by - ay
     det = dx * ey - dy * ex
     if det == 0.0:

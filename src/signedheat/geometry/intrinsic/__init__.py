@@ -1,1 +1,1 @@
-"""Intrinsic triangulations: flips, refinement, and the transfer of points and curves to them."""
+"""Intrinsic triangulations: edge flips, refinement, and the transfer of points and curves to them."""

@@ -1,6 +1,6 @@
-"""Compiled kernels that say where a new vertex would come to lie: a face's circumcentre, and what it comes too near to.
+"""Kernels: the circumcentre of a face, where a new vertex would be inserted, and the segments that it encroaches upon.
 
-Faces are laid out one after the other, across the edges between them, in the plane of the first.
+Faces are unfolded one after the other, across the edges between them, into the plane of the first.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ INSIDE, BLOCKED, LOST = 0, 1, 2
 
 @kernel
 def unfold(g, h, side, tx, ty, hx, hy):
-    """Lay out the face on the other side of h, whose ends lie at t and h: its apex, and on which side its inside lies.
+    """Unfold the face on the other side of halfedge h, which runs from (tx, ty) to (hx, hy): its apex and its sense.
 
-    `side` is 1 where the face of h is laid out counter-clockwise, −1 where clockwise.
+    `side` is 1 where the face of h is laid out counter-clockwise, −1 where clockwise; so is the sense returned.
     """
     t = g.sibling[h]
     if g.forward[t] == g.forward[h]:
@@ -37,10 +37,10 @@ def cross(ax, ay, bx, by, cx, cy):
 
 @kernel
 def find_circumcenter(g, f):
-    """Walk straight from a face's barycentre to its circumcentre.
+    """Walk straight from the barycentre of a face to its circumcentre.
 
-    Returns INSIDE with a face and the centre in its frame (first halfedge along x), BLOCKED with a segment's halfedge,
-    or LOST where the face is flat.
+    Returns INSIDE with the face that contains it and its position there (first halfedge along x), BLOCKED with a
+    halfedge of the segment in between, or LOST where the face is flat.
     """
     x, y = np.zeros(3), np.zeros(3)
     x[1] = g.length[g.edge[3 * f]]
@@ -86,9 +86,9 @@ def find_circumcenter(g, f):
 
 @kernel
 def encroached(g, f, px, py, ends, halfedges):
-    """A segment in whose diametral circle p lies and which p would see, or −1; p in the frame of face f.
+    """A segment that p encroaches upon: visible from p, which lies in its diametral circle. −1 if there is none.
 
-    `ends` and `halfedges` are room for what is still to be looked at.
+    p is given in the frame of face f. `ends` and `halfedges` are work arrays for the search.
     """
     x, y = np.zeros(3), np.zeros(3)
     x[1] = g.length[g.edge[3 * f]]

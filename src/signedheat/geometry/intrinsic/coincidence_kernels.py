@@ -1,4 +1,4 @@
-"""Compiled kernel that finds vertices that all but coincide."""
+"""Kernel: groups of vertices that nearly coincide."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from .gluing_kernels import kernel
 
 NEARNESS = 0.01
-"""Vertices all but coincide where they are together smaller than this part of the way to any other."""
+"""Vertices nearly coincide where the size of their group is less than this fraction of the distance to any other."""
 
 
 @kernel
 def root(parent, a):
-    """The group that a vertex belongs to so far."""
+    """Representative of the group that a vertex belongs to (union–find with path halving)."""
     while parent[a] != a:
         parent[a] = parent[parent[a]]
         a = parent[a]
@@ -21,10 +21,11 @@ def root(parent, a):
 
 @kernel
 def coinciding(tail, head, length, order, n_vertices):
-    """Group vertices that all but coincide.
+    """Group vertices that nearly coincide.
 
-    The shortest edges join vertices into ever larger groups (Kruskal). One is kept if the edges that made it sum to
-    less than `NEARNESS` times the next one that leaves it; the largest such group counts.
+    Edges join vertices into ever larger groups, shortest first (Kruskal). A group is kept if the lengths of the edges
+    that made it sum to less than `NEARNESS` times the length of the next edge that leaves it; of nested groups the
+    largest is kept.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def coinciding(tail, head, length, order, n_vertices):
     (n,) int
         The first vertex of the group, or −1.
     (n,) float
-        At that vertex the sum of the edges that made the group: no two of its vertices are farther apart.
+        At that vertex, the total length of the edges that made the group, a bound on its diameter.
     """
     parent, node = np.arange(n_vertices), np.arange(n_vertices)
     first, second = np.full(2 * n_vertices, -1), np.full(2 * n_vertices, -1)

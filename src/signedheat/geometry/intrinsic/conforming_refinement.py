@@ -1,4 +1,4 @@
-"""Triangles cut so that curves run along edges and points lie at vertices."""
+"""Conforming refinement: cut triangles so that curves run along edges and points lie at vertices."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from .delaunay import flip_all, glue, lay_out
 def refine_to_conform(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
-    """Cut faces wherever an unoriented curve or an isolated point leaves edges and vertices (MATH.md §2).
+    """Cut faces wherever an unoriented curve crosses them, and put vertices at isolated points.
 
-    Whatever else lies in a face that is cut, or on an edge that is split, is embedded too; all other faces and pieces
-    stay as they are. Edges of the cut faces that carry nothing are then flipped to Delaunay, to be rid of slivers.
+    All other segments in a face that is cut, or on an edge that is split, become edges too; other faces and segments
+    stay as they are. Edges of the cut faces that no segment uses are then flipped to Delaunay, which removes slivers.
 
     Parameters
     ----------
     triangles : IntrinsicMesh
         The surface.
     groups : sequence of sequences of CurveSegments
-        The sources, in pieces.
+        The sources, as segments.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def refine_to_conform(
 
 @dataclass(frozen=True, eq=False)
 class MergedSources:
-    """The pieces of several sources, with points that coincide counted once."""
+    """The segments of several sources in one list, with points that coincide counted once."""
 
     nodes: LocatedPoints
     ends: NDArray[np.int64]
@@ -65,7 +65,7 @@ class MergedSources:
 
     @classmethod
     def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
-        """Join sources; `samples` says which nodes each of them has."""
+        """Merge sources; `samples` has the nodes of each."""
         located = concatenated([p.nodes for p in parts])
         first, who = unique_points(located)
         offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
@@ -97,7 +97,7 @@ class MergedSources:
 def affected_elements(
     triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]
 ) -> tuple[set[int], set[int]]:
-    """Faces to cut and edges to split: those that unfit sources need, and what else must follow."""
+    """Faces to cut and edges to split: those of nonconforming sources, and those that these entail in turn."""
     nodes, inside = merged.nodes, merged.edges < 0
     nodes_of, pieces_of = defaultdict(list), defaultdict(list)
     for i in np.flatnonzero(nodes.kinds == FACE).tolist():
@@ -134,7 +134,7 @@ def affected_elements(
 
 
 class FaceCutter:
-    """A set of triangles while some of its faces are cut."""
+    """An intrinsic mesh while some of its faces are being cut."""
 
     def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: set[int], edges: set[int]) -> None:
         self.triangles, self.merged = triangles, merged
@@ -207,7 +207,7 @@ class FaceCutter:
         return self.chains[edge]
 
     def cut_face(self, face: int, inside: list[int]) -> None:
-        """Cut one face along the pieces inside it."""
+        """Cut one face along the segments inside it."""
         triangles, merged = self.triangles, self.merged
         corners = triangles.corner_vertices[face].tolist()
         points, vertices = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], list(corners)
@@ -266,13 +266,13 @@ class FaceCutter:
                 )
 
     def assemble(self) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_]]:
-        """The triangles after all cuts, what lies on them, and which faces are new."""
+        """The triangles after all cuts, the sources on them, and which faces are new."""
         triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
         parents = np.concatenate([kept, [f.parent for f in self.faces]])
         order = np.argsort(
             parents, kind="stable"
-        )  # the first face of an edge remains, or leaves its place to its parts
+        )  # the first face of an edge remains, or one of its parts takes its place
 
         def with_new(old: NDArray, name: str) -> NDArray:
             return np.concatenate([old[kept], [getattr(f, name) for f in self.faces]])[order]
@@ -324,7 +324,7 @@ class NewFace(NamedTuple):
 
 
 class NewSegment(NamedTuple):
-    """A piece, or part of one; its face does not count where it runs along an edge."""
+    """A segment, or part of one; `face` has no meaning where it runs along an edge."""
 
     start: int
     end: int
@@ -335,7 +335,7 @@ class NewSegment(NamedTuple):
 
 
 def first_halfedges(triangles: IntrinsicMesh) -> NDArray[np.int64]:
-    """(e,) the first side ``3 face + k`` of each edge."""
+    """(e,) the first halfedge ``3 face + k`` of each edge."""
     return np.unique(triangles.edges.face_edges, return_index=True)[1]
 
 
@@ -346,7 +346,7 @@ def points_on_elements(
     along: NDArray[np.float64],
     barycentric: NDArray[np.float64],
 ) -> LocatedPoints:
-    """Points told by their elements; `along` says where on edges and `barycentric` where in faces."""
+    """Points given by their elements: by the fraction `along` an edge, or by `barycentric` coordinates in a face."""
     faces, weights = elements.copy(), barycentric.copy()
     at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
     vertices = points_at_vertices(triangles, elements[at_vertex])
@@ -361,9 +361,9 @@ def points_on_elements(
 def flip_new_faces(
     triangles: IntrinsicMesh, merged: MergedSources, is_new: NDArray[np.bool_]
 ) -> tuple[IntrinsicMesh, MergedSources]:
-    """Flip edges of new faces to Delaunay, but for those that carry a piece or bound a face with one inside.
+    """Flip edges of new faces to Delaunay, except those that a segment uses and those of faces with one inside.
 
-    Where faces do not agree on the lengths of their edges, none can be flip_new_faces.
+    Where neighbouring faces do not agree on the length of their edge, no edge is flipped.
     """
     if not triangles.agree_on_lengths:
         return triangles, merged
@@ -378,7 +378,7 @@ def flip_new_faces(
     better = lay_out(gluing)
 
     side = first_halfedges(better)
-    ahead, same = gluing.forward[side], gluing.front[side]  # the frame of an edge, seen from its first face of now
+    ahead, same = gluing.forward[side], gluing.front[side]  # the frame of an edge, in what is its first face by now
     carrier = merged.edges[on_edge]
     vectors, faces = merged.vectors.copy(), merged.faces.copy()
     seen = vectors[on_edge]

@@ -1,4 +1,4 @@
-"""Intrinsic Delaunay triangulations by edge flips: lengths and gluing in, lengths and gluing out."""
+"""Intrinsic Delaunay triangulations by edge flips, on edge lengths and gluing alone."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from .gluing_kernels import Gluing, flip_until_delaunay
 def flip_to_delaunay(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> IntrinsicMesh:
     """Flip edges until the two angles opposite to every edge sum to at most π.
 
-    The surface stays what it is: its vertices, angle sums and area; only the edges change. Edges at a boundary,
-    nonmanifold edges and those in `fixed_edges` stay, under their numbers. Where neighbouring faces disagree about
-    their orientation, faces are turned over as needed.
+    The surface stays the same, with its vertices, angle sums and area; only the edges change. Boundary edges,
+    nonmanifold edges and `fixed_edges` are not flipped and keep their ids. Where neighbouring faces have opposite
+    orientations, faces are turned over as needed.
 
     Parameters
     ----------
     triangles : IntrinsicMesh
-        Neighbouring faces must agree about the length of their edge; flat and nearly flat triangles are welcome.
+        Neighbouring faces must agree on the length of their edge; flat and nearly flat triangles are allowed.
     fixed_edges : (e,) bool, optional
         Edges that must not be flipped, for instance those of a source.
 
     Returns
     -------
     IntrinsicMesh
-        As many vertices, edges and faces. Two edges may now join the same two vertices, or one vertex with itself.
+        With the same numbers of vertices, edges and faces. Two edges may join the same two vertices, or an edge may
+        join a vertex with itself.
 
     Examples
     --------
-    A rhombus cut along its long diagonal; the other diagonal is better.
+    A rhombus cut along its long diagonal; the Delaunay edge is the short one.
 
     >>> sides = np.array([[1.9, 1.0, 1.0], [1.9, 1.0, 1.0]])
     >>> rhombus = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3]]), sides, 4)
@@ -78,7 +79,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None)
 
 
 def flip_all(gluing: Gluing) -> Gluing:
-    """Flip to Delaunay; the same triangulation, with room for its longer history."""
+    """Flip to Delaunay, in place; returns the gluing with arrays long enough for its history."""
     n_edges = int(gluing.counts[1])
     gluing.counts[4] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
@@ -88,7 +89,7 @@ def flip_all(gluing: Gluing) -> Gluing:
 
 
 def lay_out(gluing: Gluing) -> IntrinsicMesh:
-    """The triangulation as it is now. Edges keep their numbers."""
+    """The current triangulation as an intrinsic mesh. Edges keep their ids."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     corners, edge = gluing.tail[: 3 * n_faces].reshape(-1, 3), gluing.edge[: 3 * n_faces]
     forward, heads = gluing.forward[: 3 * n_faces], np.roll(corners, -1, axis=1).ravel()

@@ -1,7 +1,7 @@
-"""Compiled kernels on intrinsic triangulations: triangles known by their gluing and their edge lengths alone.
+"""Kernels on intrinsic triangulations: triangles given by their gluing and their edge lengths alone.
 
 Halfedge ``3 f + k`` runs from corner k to corner k + 1 of face f. Two halfedges of one edge may lie in one face, and
-two edges may join the same two vertices, so nothing here is ever looked up by vertex ids.
+two edges may join the same two vertices, so nothing here is looked up by vertex ids.
 """
 
 from __future__ import annotations
@@ -13,26 +13,45 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 
-kernel = compiled(error_model="numpy")  # without exceptions to unwind it compiles in half the time
+kernel = compiled(error_model="numpy")  # without exceptions, compilation takes half the time
 
 FLIP, TURN, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
 """Kinds of steps in a history."""
 
 MOST_FLIPS = 1000
-"""An edge flipped as often goes round in a circle, for rounding; it stays as it is then."""
+"""An edge that has been flipped as often flips back and forth because of rounding, and is left as it is."""
 
 
 class Gluing(NamedTuple):
-    """An intrinsic triangulation under construction; arrays are longer than what is used of them.
+    """An intrinsic triangulation under construction; arrays are longer than the part that is in use.
 
-    `tail`, `edge`, `forward`, `front` and `sibling` have one entry per halfedge: its tail vertex; its edge; whether it
-    runs along the edge's own direction; which of the edge's two sides it is on (moved along, so that the two sides of
-    a source keep their names); and the next halfedge of the same edge, cyclically: itself at a boundary.
-    `start`, `length`, `fixed` and `flips` have one entry per edge: one of its halfedges; its length, in multiples of
-    `unit`; whether it must not be flipped; how often it has been. `counts` holds the number of faces, edges, vertices,
-    steps and edges to be looked at. `steps` and `weights` are the history: kind, two halfedges or faces, the new
-    vertex; and four numbers that say how points move.
-    `scratch` is room to work in.
+    Attributes
+    ----------
+    tail, edge : (3 m,) int
+        Tail vertex and edge of every halfedge.
+    forward : (3 m,) bool
+        Whether the halfedge runs in the direction of its edge.
+    front : (3 m,) bool
+        Which of the two sides of its edge the halfedge is on; transferred through all steps, so that the two sides of a
+        source can be told apart.
+    sibling : (3 m,) int
+        Next halfedge of the same edge, cyclically; the halfedge itself at a boundary.
+    start : (e,) int
+        One halfedge of every edge.
+    length : (e,) float
+        Length of every edge, in multiples of `unit`.
+    fixed : (e,) bool
+        Edges that must not be flipped.
+    flips : (e,) int
+        How often each edge has been flipped.
+    counts : (5,) int
+        Numbers of faces, edges, vertices, steps of the history, and edges on the stack.
+    steps, weights : (s, 4) int, (s, 4) float
+        The history: kind of the step, two halfedges or faces, the new vertex; and the affine dependency of its points.
+    scratch : int array
+        Work array.
+    unit : float
+        Unit of length.
     """
 
     tail: NDArray[np.int64]
@@ -59,15 +78,15 @@ def following(h):
 
 @kernel
 def preceding(h):
-    """The halfedge before, around the face."""
+    """The previous halfedge around the face."""
     return h - 1 if h % 3 else h + 2
 
 
 @kernel
 def half_tangent(a, b, c):
-    """Numerator and denominator of tan²(α/2), α opposite to a, without cancellation (Kahan).
+    """Numerator and denominator of tan²(α/2), α the angle opposite to side a, without cancellation (Kahan).
 
-    Their product is 16 times the squared area; impossible triangles count as flat ones.
+    Their product is 16 times the squared area; lengths that violate the triangle inequality count as a flat triangle.
     """
     if b < c:
         b, c = c, b
@@ -101,7 +120,7 @@ def violates_delaunay(g, h):
 
 @kernel
 def move(g, old, new):
-    """Move halfedges old[k] to the places new[k], a permutation of them, all at once; corners are left alone."""
+    """Renumber halfedges old[k] to new[k], a permutation of them, all at once; tails stay where they are."""
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
     for k in range(len(old)):
         after = g.sibling[old[k]]
@@ -147,10 +166,10 @@ def turn_over(g, face):
 
 @kernel
 def diamond(g, h):
-    """Two faces laid out side by side: ``h: i → j`` with apex a, its twin with apex b.
+    """The two faces at an edge unfolded into one plane: ``h: i → j`` with apex a, its twin with apex b.
 
-    Returns the signed areas of jab and iab, the areas of the twin's face and of h's face, and the length of ab. They
-    say how the four corners depend on each other: area_jab·i + area_iab·j = area_twin·a + area_h·b.
+    Returns the signed areas of jab and iab, the areas of the twin's face and of h's face, and the length of ab. The
+    areas are the affine dependency of the four corners: area_jab·i + area_iab·j = area_twin·a + area_h·b.
     """
     t = g.sibling[h]
     mirrored = g.forward[h] == g.forward[t]
@@ -175,10 +194,10 @@ def diamond(g, h):
 
 @kernel
 def flip(g, h):
-    """Flip an interior edge, if the two faces form a strictly convex quadrilateral; whether it was done.
+    """Flip an interior edge, if the two faces form a strictly convex quadrilateral; returns whether it did.
 
     ``h: i → j`` with apex a and its twin ``t: j → i`` with apex b become ``h: b → a`` with apex i, ``t: a → b`` with
-    apex j. Faces and places are kept, so that a history can be run backwards.
+    apex j. Faces and halfedges keep their ids, so that a history can be run backwards.
     """
     t = g.sibling[h]
     if g.forward[h] == g.forward[t]:
@@ -200,9 +219,9 @@ def flip(g, h):
 
 @kernel
 def flip_until_delaunay(g, stack, stacked):
-    """Flip until every edge that is not fixed has the Delaunay property; False if the history is full before.
+    """Flip until every edge that is not fixed is Delaunay; returns False if the history is full before that.
 
-    `stack` holds the edges still to be looked at, `counts[4]` of them, and `stacked` says which they are.
+    `stack` holds the edges still to be checked, `counts[4]` of them; `stacked` marks them.
     """
     while g.counts[4] > 0:
         if g.counts[3] + 2 > len(g.steps):
@@ -224,7 +243,7 @@ def flip_until_delaunay(g, stack, stacked):
 
 @kernel
 def look_at(g, stack, stacked, e):
-    """Put an edge on the stack of those to be looked at."""
+    """Push an edge on the stack of edges to be checked."""
     if not stacked[e]:
         stack[g.counts[4]] = e
         stacked[e] = True
@@ -242,7 +261,7 @@ def new_edge(g, length, fixed):
 
 @kernel
 def apex_position(g, h):
-    """(x, y) of the face's third corner, the halfedge along the x axis from the origin; y ≥ 0."""
+    """(x, y) of the face's third corner, with the halfedge along the positive x axis from the origin; y ≥ 0."""
     base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
     n, d = half_tangent(right, base, left)
     return 0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base
@@ -250,7 +269,7 @@ def apex_position(g, h):
 
 @kernel
 def split_face(g, f, u, v, w):
-    """Put a vertex into a face at barycentric coordinates (u, v, w); return the vertex.
+    """Insert a vertex into a face at barycentric coordinates (u, v, w); returns the vertex.
 
     Face (a, b, c) becomes (a, b, x) and two new faces (b, c, x) and (c, a, x).
     """
@@ -274,10 +293,10 @@ def split_face(g, f, u, v, w):
 
 @kernel
 def split_edge(g, h, fraction):
-    """Put a vertex on an edge, `fraction` of the way along halfedge h, and split every face there; return the vertex.
+    """Insert a vertex on an edge, `fraction` of the way along halfedge h, splitting all its faces; returns the vertex.
 
     Face (tail, head, apex) becomes (tail, x, apex) and a new face (x, head, apex). No face may have the edge twice.
-    The part at the edge's own tail keeps its number.
+    The half at the edge's own tail keeps its id.
     """
     count = sibling_count(g, h)
     around, beside = np.empty(count, np.int64), np.empty(count, np.int64)

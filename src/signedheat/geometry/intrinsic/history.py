@@ -1,4 +1,4 @@
-"""How an intrinsic triangulation came about, and how points and lines go with it."""
+"""The steps by which an intrinsic triangulation was made, and the transfer of points and lines through them."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ class Lines(NamedTuple):
     owners : (r,) int
         Which line.
     faces : (r,) int
+        The face crossed.
     starts, ends : (r, 3) float
         Barycentric coordinates of where the line enters and leaves the face.
     vectors : (r, k, 3) float
-        The vectors that went along, as differences of barycentric coordinates.
+        Vectors transported along the line, as differences of barycentric coordinates.
     """
 
     owners: NDArray[np.int64]
@@ -42,9 +43,9 @@ class History:
     Attributes
     ----------
     before, after : IntrinsicMesh
-        Vertices of `before` keep their numbers; the new ones follow.
+        Vertices of `before` keep their ids; new ones follow.
     steps, weights : (n, 4) int and float
-        As `intrinsic_kernels.record` writes them.
+        As `gluing_kernels.record` writes them.
     """
 
     before: IntrinsicMesh
@@ -66,7 +67,7 @@ class History:
 
     @cached_property
     def new_vertices(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Where on `before` the vertices are that only `after` has: faces and barycentric coordinates."""
+        """Positions on `before` of the vertices that only `after` has: faces and barycentric coordinates."""
         count = self.after.n_vertices - self.before.n_vertices
         faces, barycentric, _ = self.backward(np.full(count, -1), np.zeros((count, 3)))
         return faces, barycentric
@@ -110,7 +111,7 @@ def straight_lines(
     barycentric: NDArray[np.float64],
     vectors: NDArray[np.float64],
 ) -> Lines:
-    """Straight lines given by their middle points and, as the first vector at each, their whole extent."""
+    """Straight lines given by their midpoints and vectors there, of which the first is the whole extent of the line."""
     gluing = glue(triangles)
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
     halves[:, 0] *= 0.5

@@ -1,4 +1,4 @@
-"""Intrinsic Delaunay refinement: vertices put where they heal thin triangles."""
+"""Intrinsic Delaunay refinement: insert vertices until no triangle is thin."""
 
 from __future__ import annotations
 
@@ -18,44 +18,44 @@ PER_EDGE = ("start", "length", "fixed", "flips")
 TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
 
 PATIENCE = 5000
-"""New vertices between two reports of progress: some hundredths of a second."""
+"""New vertices between two progress reports: some hundredths of a second."""
 
 
 def refine_all(
     gluing: Gluing, angle: float, max_vertices: int, progress: Callable[[float], None] | None = None
 ) -> tuple[Gluing, NDArray[np.int64], NDArray[np.bool_], bool]:
-    """Refine a Delaunay triangulation until every face that can be helped has no angle below `angle`.
+    """Refine a Delaunay triangulation until no face has an angle below `angle`, where that is possible.
 
-    Fixed, boundary and nonmanifold edges may be split but stay. Small angles remain where fixed edges meet, or the
-    surface closes up, at less than 60°; where vertices all but coincide; and where the limit on the number of vertices
-    is reached first.
+    Fixed, boundary and nonmanifold edges may be split but are not flipped. Small angles remain where fixed edges meet
+    at less than 60°, at vertices with a total angle of less than 60°, at vertices that nearly coincide, and where the
+    limit on the number of vertices is reached first.
 
     Parameters
     ----------
     gluing : Gluing
-        Delaunay, as `flip_all` returns it; changed.
+        Delaunay, as `flip_all` returns it; changed in place.
     angle : float
         Radians.
     max_vertices : int
         Stop when there are as many.
     progress : callable, optional
-        Called now and then with an estimate of the part that is done; what it raises ends the work.
+        Called now and then with an estimate of the fraction done; an exception that it raises cancels.
 
     Returns
     -------
     Gluing
         The refined triangulation.
     (e,) int
-        The fixed edge before that each edge now is part of, or −1.
+        The fixed edge of the input that each edge is part of, or −1.
     (m,) bool
-        Faces at vertices that all but coincide: thin ones among them have been left alone.
+        Faces at vertices that nearly coincide, which may be thin.
     bool
-        Whether it was finished before the limit.
+        Whether refinement ended before the limit on the number of vertices.
     """
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, max_vertices)
     list_all(gluing, agenda, goal)
-    listed = np.flatnonzero(agenda.bins >= 0)  # by size: large faces go first, so the list in turn tells the progress
+    listed = np.flatnonzero(agenda.bins >= 0)  # lists by size, large faces first: the current list tells the progress
     done = 0.0
     while True:
         status = refine(gluing, agenda, goal, PATIENCE)
@@ -76,7 +76,7 @@ def refine_all(
 
 
 def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
-    """(m,) faces whose shortest side joins vertices that all but coincide."""
+    """(m,) faces whose shortest side joins vertices that nearly coincide."""
     n_faces = int(gluing.counts[0])
     faces = np.arange(n_faces)
     lengths = gluing.length[gluing.edge[: 3 * n_faces]].reshape(-1, 3)
@@ -87,7 +87,7 @@ def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
 
 
 def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:
-    """The fixed edges, and what there is to do; boundary and nonmanifold edges become fixed."""
+    """The fixed edges, and the work lists of refinement; boundary and nonmanifold edges become fixed."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
     gluing.fixed[:n_edges] |= counts != 2
@@ -119,7 +119,7 @@ def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:
 
 
 def narrow_vertices(gluing: Gluing) -> NDArray[np.bool_]:
-    """(n,) vertices at which two fixed edges meet, or the surface closes up, at less than 60°."""
+    """(n,) vertices at which two fixed edges meet at less than 60°, or with a total angle of less than 60°."""
     corners, total = sectors(gluing)
     narrow = np.zeros(int(gluing.counts[2]), dtype=bool)
     narrow[gluing.tail[: len(corners)][total[corners] < NARROW]] = True
@@ -127,7 +127,7 @@ def narrow_vertices(gluing: Gluing) -> NDArray[np.bool_]:
 
 
 def sectors(gluing: Gluing) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Which sector every corner belongs to, and the angle of each: from fixed edge to fixed edge around a vertex."""
+    """Sector that every corner belongs to, from fixed edge to fixed edge around a vertex, and angle of each sector."""
     n = 3 * int(gluing.counts[0])
     h = np.flatnonzero(~gluing.fixed[gluing.edge[:n]])
     t = gluing.sibling[h]

@@ -1,7 +1,7 @@
-"""Compiled kernels of intrinsic Delaunay refinement: find thin triangles, put vertices where they heal them.
+"""Kernels of intrinsic Delaunay refinement: find thin triangles and insert vertices that remove them.
 
-Circumcentres go in (Chew 1993; on surfaces Sharp, Soliman & Crane 2019); where one would lie beyond a segment (an edge
-that must stay) or in a segment's diametral circle, the segment is split instead (Ruppert 1995).
+Circumcentres are inserted (Chew 1993; on surfaces Sharp, Soliman & Crane 2019); where one would lie beyond a segment
+(an edge that must not be flipped) or in a segment's diametral circle, the segment is split instead (Ruppert 1995).
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from .gluing_kernels import (
 )
 
 DONE, GROW, FULL, PAUSED = 0, 1, 2, 3
-"""Why `refine` stopped: nothing left to do; out of room; as many vertices as allowed; to report how far it is."""
+"""Why `refine` returned: no thin face is left; arrays are full; vertex limit reached; pause to report progress."""
 
 NARROW = np.pi / 3
-"""Where segments meet, or the surface closes up, at less than this, small angles have to stay."""
+"""Where segments meet at less than this, or a vertex has a smaller total angle, small angles cannot be avoided."""
 
 N_BINS = 256
 
 
 class Agenda(NamedTuple):
-    """What refinement still has to do, and what it remembers of segments.
+    """Work lists of refinement, and what it needs to know of segments.
 
-    `stack` and `stacked` are edges to be looked at for the Delaunay property. `bins` and `next_face` are linked lists
-    of faces to be looked at, by the binary logarithm of their circumradius; `listed` says which faces are in one.
-    `segment` numbers the input segment of each fixed edge, `segment_ends` and `segment_length` describe those, and
-    `on_segment` is the segment on which a new vertex was put. `narrow` marks input vertices at which two segments meet,
-    or the surface closes up, at less than 60°. `group` and `extent` tell which vertices all but
-    coincide, as `coinciding` does. `seen` counts the steps of the history whose faces have been listed, and remembers
-    the list that the last face came from; `room` and `halfedges` are for the search around a new vertex.
+    `stack` and `stacked` are the edges to be checked for the Delaunay property. `bins` and `next_face` are linked lists
+    of thin faces, by the binary logarithm of their circumradius; `listed` marks the faces that are in one. `segment` is
+    the input segment of each fixed edge, `segment_ends` and `segment_length` describe the segments, and `on_segment` is
+    the segment on which a new vertex was inserted. `narrow` marks input vertices at which two segments meet at less
+    than 60°, or with a smaller total angle. `group` and `extent` describe the vertices that nearly coincide, as
+    returned by `coinciding`. `seen` counts the steps of the history whose faces have been listed, and holds the list
+    that the last face came from; `room` and `halfedges` are work arrays for the search around a new vertex.
     """
 
     stack: NDArray[np.int64]
@@ -68,7 +68,7 @@ class Agenda(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """When refinement is done: squared tangent of half the angle, and the largest number of vertices."""
+    """When refinement is done: `angle` is tan²(α/2) of the smallest angle α allowed; and the vertex limit."""
 
     angle: float
     max_vertices: int
@@ -76,7 +76,7 @@ class Goal(NamedTuple):
 
 @kernel
 def refine(g, agenda, goal, patience):
-    """Insert vertices until no face that can be helped has a smaller angle than the goal; pause after `patience`."""
+    """Insert vertices until no face has an angle below the goal, where possible; pause after `patience` of them."""
     pause = g.counts[2] + patience
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):
         for n in range(agenda.seen[0], g.counts[3]):
@@ -99,7 +99,7 @@ def refine(g, agenda, goal, patience):
 
 @kernel
 def changed_faces(g, n):
-    """The faces that step n of the history changed or made, some perhaps twice."""
+    """The faces that step n of the history changed or made, some perhaps listed twice."""
     kind, first, second = g.steps[n, 0], g.steps[n, 1], g.steps[n, 2]
     if kind == FLIP:
         return first // 3, second // 3, second // 3
@@ -112,7 +112,7 @@ def changed_faces(g, n):
 
 @kernel
 def is_thin(g, f, goal):
-    """Whether the smallest angle of a face, opposite to its shortest side, is below the goal; and the side."""
+    """Whether the smallest angle of a face, opposite to its shortest side, is below the goal; and that halfedge."""
     h = 3 * f
     for k in range(1, 3):
         if g.length[g.edge[3 * f + k]] < g.length[g.edge[h]]:
@@ -158,11 +158,11 @@ def next_thin(g, agenda, goal):
 
 @kernel
 def improve(g, agenda, f, goal):
-    """Insert one vertex for the sake of a thin face, if that can help; False if there is no room for it.
+    """Insert one vertex to remove a thin face, where possible; returns False if the arrays have no room for it.
 
-    A face at vertices that all but coincide is left alone, unless an angle above 150° makes its circumcircle large and
-    nothing stands in the way of a vertex there: grading the faces towards such vertices would take hundreds of new
-    ones, for no gain in accuracy.
+    A face at vertices that nearly coincide is left as it is, unless an angle above 150° makes its circumcircle large
+    and no segment blocks its circumcentre: grading the faces towards such vertices would take hundreds of new vertices,
+    for no gain in accuracy.
     """
     h = is_thin(g, f, goal)[1]
     close = coincide(g, agenda, h)
@@ -184,9 +184,10 @@ def improve(g, agenda, f, goal):
 
 @kernel
 def too_near(g, h, f, px, py):
-    """Whether the circumcentre of the face with shortest side h, p in the frame of face f, is near a corner of f.
+    """Whether p, the circumcentre of the face with shortest side h in the frame of face f, is too near a corner of f.
 
-    No vertex is nearer than the radius in a Delaunay triangulation; what rounding has kept from it is left alone.
+    In a Delaunay triangulation no vertex is nearer than the circumradius. Where rounding has made one so, the face is
+    left as it is.
     """
     n, d = tangent_at(g, preceding(h))
     radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
@@ -197,14 +198,14 @@ def too_near(g, h, f, px, py):
 
 @kernel
 def coincide(g, agenda, h):
-    """Whether the two ends of a halfedge all but coincide."""
+    """Whether the two ends of a halfedge nearly coincide."""
     group = agenda.group[g.tail[h]]
     return group >= 0 and group == agenda.group[g.tail[following(h)]] and g.length[g.edge[h]] <= agenda.extent[group]
 
 
 @kernel
 def is_cap(g, agenda, f):
-    """Whether an angle of the face exceeds 150°, opposite to a side whose ends do not coincide."""
+    """Whether an angle of the face exceeds 150°, opposite to a side whose ends do not nearly coincide."""
     for h in range(3 * f, 3 * f + 3):
         n, d = tangent_at(g, preceding(h))
         if n > 13.9 * d:
@@ -214,7 +215,7 @@ def is_cap(g, agenda, f):
 
 @kernel
 def is_hopeless(g, agenda, h):
-    """Whether the small angle opposite to h is there for good: given with the surface, or with the segments."""
+    """Whether the small angle opposite to h cannot be avoided: it is given by the surface or by its segments."""
     corner = preceding(h)
     if agenda.narrow[g.tail[corner]] and sector(g, corner) < NARROW:
         return True
@@ -231,7 +232,7 @@ def is_hopeless(g, agenda, h):
 
 @kernel
 def sector(g, corner):
-    """Angle around the tail of a halfedge from segment to segment, or all around, as far as it matters (up to π)."""
+    """Angle around the tail of a halfedge between two segments, or the total angle; counted up to π."""
     n, d = tangent_at(g, corner)
     total = 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
     for side in range(2):
@@ -249,7 +250,7 @@ def sector(g, corner):
 
 @kernel
 def has_room(g, agenda, ring):
-    """Whether a split of an edge with so many faces fits into the arrays (one of a face takes less)."""
+    """Whether splitting an edge with so many faces fits into the arrays (splitting a face needs less)."""
     faces, edges, vertices, steps = g.counts[0], g.counts[1], g.counts[2], g.counts[3]
     return (
         3 * (faces + ring + 2) <= len(g.tail)
@@ -261,7 +262,7 @@ def has_room(g, agenda, ring):
 
 @kernel
 def look_around(g, agenda, step):
-    """Put the edges of all faces that the steps from `step` on have changed on the stack."""
+    """Push the edges of all faces that the steps from `step` on have changed on the stack."""
     for n in range(step, g.counts[3]):
         for f in changed_faces(g, n):
             for k in range(3):
@@ -270,7 +271,7 @@ def look_around(g, agenda, step):
 
 @kernel
 def insert(g, agenda, f, px, py):
-    """Put a vertex at p (in the frame of face f), or on the face's edge that it all but lies on."""
+    """Insert a vertex at p (in the frame of face f), or on the edge of the face that p nearly lies on."""
     step = g.counts[3]
     x, y = np.zeros(3), np.zeros(3)
     x[1] = g.length[g.edge[3 * f]]
@@ -315,7 +316,7 @@ def folded_face(g, h):
 
 @kernel
 def vertex_beside(g, h):
-    """The vertex opposite to an edge that all but lies on it, its height above and its place along h; or −1, 0, ½."""
+    """A vertex opposite to an edge that nearly lies on it, its height and its fraction along h; −1, 0, ½ if none."""
     nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
     while True:
         along, above = apex_position(g, y)
@@ -329,7 +330,7 @@ def vertex_beside(g, h):
 
 @kernel
 def room_beside(g, h, fraction):
-    """How far the vertices opposite to an edge are from a place along h."""
+    """Distance of the nearest vertex opposite to an edge from the point at `fraction` along h."""
     nearest, length, y = np.inf, g.length[g.edge[h]], h
     while True:
         along, above = apex_position(g, y)
@@ -342,11 +343,12 @@ def room_beside(g, h, fraction):
 
 @kernel
 def split_segment(g, agenda, h, f, goal):
-    """Split a segment that stands in the way of healing face f; False if there is no room for it.
+    """Split a segment that keeps face f from being removed; returns False if the arrays have no room for it.
 
-    In the middle; but beside a vertex that all but lies on it, and near an end where segments meet in a small angle at
-    a power of two from it, so that the parts of both segments come out equal and stop splitting each other. Parts a
-    billionth of their segment are left alone.
+    The segment is split in the middle, with two exceptions: next to a vertex that nearly lies on it; and, near an end
+    where segments meet at a small angle, at a distance from that end that is a power of two, so that the parts of both
+    segments have equal lengths and stop splitting each other (Ruppert 1995). Parts a billionth of their segment are not
+    split.
     """
     e = g.edge[h]
     segment, length, step = agenda.segment[e], g.length[e], g.counts[3]

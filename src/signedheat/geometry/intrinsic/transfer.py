@@ -1,4 +1,4 @@
-"""Sources on a mesh, as an intrinsic triangulation of the mesh sees them."""
+"""Transfer of sources from a mesh to an intrinsic triangulation of it."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class ConformingRefinement:
     marked : (e,) bool
         Edges along which the curves run.
     parents : (m,) int
-        The face that each face is part of.
+        The face, before the cuts, that each face is part of.
     corners : (m, 3, 3) float
-        Barycentric coordinates of its corners there.
+        Barycentric coordinates of the corners of each face in its parent.
     """
 
     triangles: IntrinsicMesh
@@ -38,7 +38,7 @@ class ConformingRefinement:
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> ConformingRefinement:
-        """Cut faces wherever a piece leaves the edges, or a point the vertices."""
+        """Cut faces along all segments inside them, and put vertices at all points of the sources."""
         finer, parents = triangles, np.arange(triangles.n_faces)
         corners = np.broadcast_to(np.eye(3), (triangles.n_faces, 3, 3))
         marked = np.zeros(triangles.n_edges, dtype=bool)
@@ -102,7 +102,7 @@ def differences_of(
 def transfer_segments(
     source: CurveSegments, refinement: ConformingRefinement, history: History, before: IntrinsicMesh
 ) -> CurveSegments:
-    """A source on the triangles `before` the refinement, as the triangles at the end of the history see it."""
+    """Transfer a source from the triangles `before` the refinement to the triangles at the end of the history."""
     after = history.after
     none = np.zeros((len(source.nodes), 0, 3))
     spots = history.forward(*_snapped(*refinement.push_forward(source.nodes.faces, source.nodes.barycentric, none)))
@@ -130,7 +130,7 @@ def transfer_segments(
     who_start = np.where(first, source.ends[owners, 0], np.roll(who_end, 1))
     chosen, who = unique_points(located)
 
-    # the angle between piece and growth is known; what was carried only tells on which side, however thin the faces
+    # the angle between segment and normal is known; the transferred normal only tells the side, however thin the faces
     corners = after.corner_positions[faces]
     steps = ((ends.barycentric - starts.barycentric) * corners).sum(axis=1)
     carried = np.conj(steps) * (lines.vectors[keep, 1] * corners).sum(axis=1)
@@ -150,9 +150,9 @@ def transfer_segments(
 
 
 def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Face, start, end (barycentric) and direction in the face's layout of every piece, along edges or not.
+    """Face, start, end (barycentric) and normal in the layout of the face of every segment, along edges or not.
 
-    A piece along an edge is seen from the edge's face with the largest area.
+    For a segment along an edge it is the face of the edge with the largest area.
     """
     faces = source.faces.copy()
     on_edge = np.flatnonzero(source.edges >= 0)
@@ -173,7 +173,7 @@ def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[NDArray, 
 def _snapped(
     faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Points within rounding of an edge moved on to it, and vectors within rounding of it turned along it."""
+    """Points within rounding error of an edge moved onto it, and vectors within rounding error of its direction too."""
     near = barycentric < SNAP
     weights = np.where(near, 0.0, barycentric)
     weights /= weights.sum(axis=1, keepdims=True)

@@ -1,9 +1,9 @@
-"""Compiled kernels that transfer points and vectors between intrinsic triangulations of one surface.
+"""Kernels that transfer points and vectors between intrinsic triangulations of one surface.
 
-Every step of a history (a flip, a split of a face or of an edge) exchanges simplices of four points with one affine
-dependency ``Σ c_k p_k = 0``. A point with nonnegative weights on the old simplex moves along c until another weight
-vanishes: then it has nonnegative weights on a new one. No angle is measured and nothing is traced, so carrying cannot
-miss, and what lay on an edge that stays lies on it exactly.
+Every step of a history (an edge flip, or a split of a face or an edge) exchanges simplices on four points with one
+affine dependency ``Σ c_k p_k = 0``. The weights of a point on the old simplex are moved along c until another one
+vanishes; then they are nonnegative on a new simplex. No angle is measured and no line is traced, so the transfer cannot
+fail, and a point on an edge that stays remains on it exactly.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from .gluing_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, diamond, following, kernel
 
 BEFORE = np.full((4, 3, 3), -1)
-"""By kind, face of the step and corner: which of the four points is there before it."""
+"""By kind of step, face and corner: which of the four points is that corner before the step; `AFTER`, after it."""
 AFTER = np.full((4, 3, 3), -1)
 BEFORE[FLIP, :2], AFTER[FLIP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
 BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
@@ -22,7 +22,7 @@ BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2,
 
 @kernel
 def transfer(steps, weights, forward, n_faces, faces, barycentric, vectors):
-    """Carry points and vectors at them through a history, forward or backward; in place.
+    """Transfer points and vectors at them through a history, forward or backward; in place.
 
     Parameters
     ----------
@@ -31,12 +31,12 @@ def transfer(steps, weights, forward, n_faces, faces, barycentric, vectors):
     forward : bool
         From the first triangulation to the last, or back.
     n_faces : int
-        Of the larger triangulation.
+        Number of faces of the finer triangulation.
     faces : (p,) int
-        Face of each point. Going back, the points that have none (−1) are the new vertices, in the order in which they
-        were made, at the end; they appear where they were put.
+        Face of each point. Backward, points without a face (−1) stand for the new vertices, in the order in which they
+        were inserted, at the end of the array; they get the position at which they were inserted.
     barycentric : (p, 3) float
-        Where in the face.
+        Barycentric coordinates in the face.
     vectors : (p, k, 3) float
         Differences of barycentric coordinates.
     """
@@ -94,13 +94,13 @@ def transfer(steps, weights, forward, n_faces, faces, barycentric, vectors):
 
 @kernel
 def swap_last(w):
-    """Follow a face that is turned over."""
+    """Exchange the last two entries, as a face that is turned over does with its corners."""
     w[1], w[2] = w[2], w[1]
 
 
 @kernel
 def exchange(kind, c, forward, corners, start, new_corners, new_start, w, vectors):
-    """Carry one point, and vectors at it, over one step; returns which of the step's new faces has it."""
+    """Transfer one point, and vectors at it, over one step; returns which of the step's new faces contains it."""
     lead = 3 if kind == SPLIT_FACE else 2  # the points before it are on one side of the dependency
     x = np.zeros(4)
     for k in range(3):
@@ -127,13 +127,13 @@ def exchange(kind, c, forward, corners, start, new_corners, new_start, w, vector
 
 @kernel
 def has(corners, l):
-    """Whether a face has point l of a step."""
+    """Whether point l of a step is a corner of a face."""
     return corners[0] == l or corners[1] == l or corners[2] == l
 
 
 @kernel
 def shift(x, c, lead, gone, amount):
-    """Move weights along the dependency until one is gone."""
+    """Move weights along the affine dependency c, so that the one of point `gone` vanishes."""
     for l in range(4):
         x[l] += -amount * c[l] if l < lead else amount * c[l]
     x[gone] = 0.0
@@ -141,7 +141,7 @@ def shift(x, c, lead, gone, amount):
 
 @kernel
 def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
-    """Go straight from a point along its first vector, or against it, up to its end; other vectors go along.
+    """Trace a geodesic from a point along its first vector, or against it, over its length; other vectors are carried.
 
     Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
     it, and the vectors there. Returns the next row.
@@ -171,7 +171,7 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
         h = 3 * f + (leaving + 1) % 3
         t = g.sibling[h]
         if t == h or g.sibling[t] != h:
-            break  # a boundary: only by rounding
+            break  # a boundary, reached by rounding errors only
         i, j, a = h % 3, following(h) % 3, leaving
         ti, tj = (t % 3, following(t) % 3) if g.forward[h] == g.forward[t] else (following(t) % 3, t % 3)
         tb = 3 - ti - tj
@@ -189,7 +189,7 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
 
 @kernel
 def trace_both_ways(g, faces, barycentric, vectors, out_faces, out_starts, out_ends, out_vectors, owners):
-    """Trace half of the first vector both ways from every point; rows whose owner is −1 − p go against it."""
+    """Trace half of the first vector both ways from every point p; rows of the backward half have owner −1 − p."""
     n = 0
     for p in range(len(faces)):
         for way in range(2):

@@ -1,1 +1,1 @@
-"""Regular grids, and the shapes in them, lowered to stencils and node vectors."""
+"""Lowering of regular grids, and of shapes in them, to stencils and node vectors."""

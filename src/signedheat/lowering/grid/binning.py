@@ -1,4 +1,4 @@
-"""Kernel: simplices bisected and merged per cell of a grid."""
+"""Kernel: bisect simplices and merge them per cell of a grid."""
 
 from __future__ import annotations
 
@@ -22,22 +22,21 @@ def merge_in_cells(
 ) -> tuple[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]], NodeSources]:
     """Samples of the simplices `corners` (m, c, d), in cells, that lie on a grid of `shape` nodes.
 
-    Every simplex is bisected across its longest edge until that is at most `size` cells, which halves its measure each
-    time; parts whose box misses the grid are dropped at once, however large. Simplices come in an `order` that brings
-    those of one component together.
+    Every simplex is bisected at the midpoint of its longest edge until that is at most `size` cells long; parts whose
+    bounding box misses the grid are dropped at once, however large. `order` lists the simplices component by component.
 
-    The vectors of all parts, divided by `scale`, are added to the `sources` of the nodes around them with the weights
-    of linear interpolation.
+    The vectors of all parts, divided by `scale`, are added to the `sources` at the nodes around them, with the weights
+    of multilinear interpolation.
 
     Returns
     -------
     samples : tuple
-        positions (s, d), vectors (s, d), weights (s,), components (s,), sorted by component, then in order of first
-        touch. Samples of no weight are left out.
+        positions (s, d), vectors (s, d), weights (s,), components (s,); sorted by component, then in order of first
+        appearance. Samples without weight are left out.
     sources : NodeSources
-        What acts on the nodes by now; takes the place of what was given.
+        The sum of the given sources and those of the simplices; replaces the given ones, whose arrays it may reuse.
     """
-    slots = np.zeros(int(np.prod(shape - 1)), dtype=np.int32)  # untouched pages cost no memory
+    slots = np.zeros(int(np.prod(shape - 1)), dtype=np.int32)  # memory that is never touched costs nothing
     dimension = corners.shape[2]
     sums, labels, nodes = _merge(
         np.ascontiguousarray(corners),
@@ -63,7 +62,7 @@ def merge_in_cells(
 def _merge(corners, vectors, weights, components, order, shape, size, slots, nodes, places, scale):
     """Sums of weight · position, vector and weight per (component, cell).
 
-    Element by element: array assignment compiles slowly.
+    Arrays are copied entry by entry, since assignments to slices compile slowly.
     """
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
@@ -73,7 +72,7 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
     sums = np.zeros((capacity, 2 * dimension + 1))
     labels = np.empty(capacity, dtype=np.int64)
     count, used = 0, nodes.shape[0]
-    first = 0  # slots of the component at hand start here
+    first = 0  # slots of the current component start here
     current = np.int64(-1)
     centre = np.empty(dimension)
     lines = np.zeros(1 << (dimension - 1), dtype=np.int64)  # of nodes, around a piece, and its share of each

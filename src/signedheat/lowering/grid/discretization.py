@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...discretization import DiffusesEach, discretize
 from ...domains.grid import Grid
 from ...errors import MemoryLimitError, SourceError
+from ...memory import available_memory
 from ...operators.grid.multilevel import Level, collapse, diffuse_multilevel
 from ...operators.grid.readout import unit_vectors
 from ...operators.grid.stencil import divergence
@@ -23,15 +24,17 @@ from .masked import MaskedGridDiscretization
 from .source import GridSource
 
 SAMPLE_SIZE = 1.0
-"""Longest edge, in cells, of the pieces into which faces are cut."""
+"""Longest edge, in cells, of the simplices into which faces are bisected."""
 BYTES_PER_NODE = 46
-"""Peak of a distance computation, measured."""
+"""Measured peak memory of a distance computation."""
+BASE = 50_000_000
+"""The part that does not depend on the number of nodes: loaded libraries and compiled kernels."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
 
 
 def memory_estimate(grid: Grid) -> int:
-    """Bytes that a distance computation on the grid takes at its peak.
+    """Estimated peak memory of a distance computation on the grid, in bytes.
 
     Examples
     --------
@@ -39,20 +42,30 @@ def memory_estimate(grid: Grid) -> int:
     True
     """
     per_node = BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS[grid.dimension]
-    return per_node * grid.n_nodes + 50_000_000
+    return per_node * grid.n_nodes + BASE
 
 
 def refuse_beyond_memory(grid: Grid) -> None:
-    """Raise `MemoryLimitError` if the grid cannot fit, before anything is allocated."""
-    import os
+    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing."""
+    available, needed = available_memory(), memory_estimate(grid)
+    if available is None or needed <= available:
+        return
+    spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting_spacing(grid, available)))
+    raise MemoryLimitError(
+        f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
+        f"and {available / 1e9:.1f} GB are free",
+        remedy=f"choose a spacing of {spacing} or more, or a lower resolution",
+    )
 
-    available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else None
-    needed = memory_estimate(grid)
-    if available is not None and needed > available:
-        raise MemoryLimitError(
-            f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, and this machine "
-            f"has {available / 1e9:.1f} GB: choose a lower resolution"
-        )
+
+def fitting_spacing(grid: Grid, available: int) -> NDArray[np.float64]:
+    """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
+    share = max((available - BASE) / (memory_estimate(grid) - BASE), 1e-12)
+    spacing = grid.spacing * share ** (-1.0 / grid.dimension)
+    per_node = (memory_estimate(grid) - BASE) / grid.n_nodes
+    while per_node * np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1) + BASE > max(available, 2 * BASE):
+        spacing *= 1.01
+    return spacing
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +82,12 @@ class GridDiscretization(DiffusesEach):
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
+        """X₀ and the rows that interpolate φ on the source: Eq. 11 in space, area vectors spread to the nodes."""
         samples = sample_on_grid(sources, self.grid, SAMPLE_SIZE)
         return GridSource(samples, self.grid, diffusion)
 
     def diffuse(self, source: GridSource) -> list[Level]:
+        """Solve ``(1 − tΔ) X = X₀`` (Eq. 12): in flat space each component of X diffuses by itself."""
         return diffuse_multilevel(source.vectors, source.time_on, source.finest)
 
     def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
@@ -81,6 +96,7 @@ class GridDiscretization(DiffusesEach):
         return np.moveaxis(directions.reshape(dimension, *self.grid.shape), 0, -1)
 
     def divergence(self, directions: NDArray[np.floating]) -> NDArray[np.float64]:
+        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return divergence(directions, self.grid.spacing)
 
 

@@ -1,4 +1,4 @@
-"""Nodes of a grid around solid ones: the same stencil, with no flux into what is solid; straight lines between them."""
+"""The free nodes of a grid with solid ones: stencil without flux into solid nodes, gradients, visibility."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...compiled import compiled
 from ...domains.grid import Grid
 
 REFLECTION = 3
-"""Nodes beside a wall whose gradients its echo turns by more than a degree."""
+"""Width, in nodes, of the layer beside a wall in which reflected heat turns gradients by more than a degree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,24 +34,24 @@ class FreeNodes:
 
     @cached_property
     def ids(self) -> NDArray[np.int64]:
-        """(n,) node of the grid that each free node is."""
+        """(n,) index of each free node among all nodes of the grid."""
         return np.flatnonzero(~self.grid.mask.ravel())
 
     @cached_property
     def numbers(self) -> NDArray[np.int64]:
-        """(n_nodes,) the opposite of `ids`; −1 for solid nodes."""
+        """(n_nodes,) the inverse of `ids`; −1 for solid nodes."""
         numbers = np.full(self.grid.n_nodes, -1, dtype=np.int64)
         numbers[self.ids] = np.arange(len(self.ids))
         return numbers
 
     @cached_property
     def indices(self) -> NDArray[np.int64]:
-        """(n, d) place of each free node, in cells."""
+        """(n, d) position of each free node, in cells."""
         return np.stack(np.unravel_index(self.ids, self.grid.shape), axis=1)
 
     @cached_property
     def neighbors(self) -> NDArray[np.int64]:
-        """(n, 2d) free node before and after each along every axis; −1 where there is none."""
+        """(n, 2d) free node before and after each free node along every axis; −1 where there is none."""
         padded = np.pad(self.numbers.reshape(self.grid.shape), 1, constant_values=-1)
         place = self.indices + 1
         around = []
@@ -64,7 +64,7 @@ class FreeNodes:
 
     @cached_property
     def laplacian(self) -> sparse.csr_matrix:
-        """C: positive semidefinite, with no flux through walls and into solid nodes."""
+        """C, Eq. 10 on a grid: positive semidefinite, with no flux through the box or into solid nodes."""
         n, weights = len(self.ids), np.repeat(self.grid.spacing**-2.0, 2)
         there = self.neighbors >= 0
         rows, sides = np.nonzero(there)
@@ -72,7 +72,7 @@ class FreeNodes:
         return sparse.csr_matrix(sparse.diags_array(there @ weights) - parts)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) −∇·Y, each face between two free nodes taking the mean of theirs, and all others nothing."""
+        """(n,) −∇·Y, which is b of Eq. 13. The flux between two free nodes is the mean of theirs, any other zero."""
         result = np.zeros(len(directions))
         for axis, step in enumerate(self.grid.spacing):
             for side, sign in ((2 * axis, 1.0), (2 * axis + 1, -1.0)):
@@ -81,10 +81,10 @@ class FreeNodes:
         return result
 
     def gradients(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n, d) central differences; beyond a wall a value is what it is before it.
+        """(n, d) central differences; a value beyond a wall is replaced by the one before it.
 
-        Where values fall like the kernel of ``1 − tΔ`` this is the direction in which they come, exactly: the central
-        difference is the velocity that belongs to the symbol of the stencil, however few nodes √t spans.
+        For values that decay like the Green's function of ``1 − tΔ``, central differences have the exact direction of
+        decay: they are the group velocity of the stencil, however few nodes √t spans.
         """
         slopes = np.empty((len(values), self.grid.dimension))
         for axis, step in enumerate(self.grid.spacing):
@@ -95,9 +95,10 @@ class FreeNodes:
         return slopes
 
     def remove_wall_reflection(self, directions: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Directions of the chosen nodes, those that lead into a wall taken from farther inside.
+        """Directions at the chosen nodes; where one points into a wall nearby, it is taken from farther inside.
 
-        Heat that a wall throws back takes from the gradient what points into it, within a few √t, that is nodes.
+        Within a few √t (a few nodes) of a wall, heat that the wall reflects cancels the component of the gradient that
+        points into the wall.
         """
         result = directions.copy()
         for axis in range(self.grid.dimension):
@@ -114,7 +115,7 @@ class FreeNodes:
         return result
 
     def see(self, targets: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(n,) whether the straight line from each free node to its target, in cells, passes no solid node's box."""
+        """(n,) whether the line from each free node to its target (n, d), in cells, avoids the boxes of solid nodes."""
         counts = np.array(self.grid.shape)
         strides = np.append(np.cumprod(counts[:0:-1])[::-1], 1)
         return _see(self.indices, targets, self.grid.mask.ravel(), counts, strides)
@@ -144,7 +145,7 @@ def _see(starts, targets, solid, counts, strides):
             node = 0
             for d in range(dimension):
                 node += place[d] * strides[d]
-            # lines that touch a corner spend no time in the box beyond it
+            # a line that only touches a corner of a box does not enter it
             if solid[node] and leave > entered + 1e-9:
                 seen[i] = False
                 break

@@ -1,4 +1,4 @@
-"""Step 3 on a grid: the cosine transform inverts C, and constraints are corrections of what it gives."""
+"""Step 3 on a grid: C is inverted by the cosine transform, and constraints are corrections of that solution."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .source import GridSource
 TOLERANCE = 1e-6
 """Relative residual at which conjugate gradients stop."""
 STIFFNESS = 10.0
-"""Penalty within the augmented Lagrangian, in 1/h."""
+"""Penalty of the augmented Lagrangian, in 1/h."""
 MULTIPLIER_STEPS = 5
 """Steps of the augmented Lagrangian."""
 
@@ -31,14 +31,16 @@ class GridIntegration(SolvesEach):
     grid: Grid
 
     def solve(self, divergence: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
+        """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
         phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
         phi -= np.average(source.at_samples(phi), weights=source.weights)
         return phi
 
     def fit(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
-        """Subtract from φ the mean of its error at the samples, weighted by how well each is seen from a node.
+        """Subtract from φ a smooth function that takes its error at the samples (in place of Eq. 14).
 
-        The weights are the samples' areas, diffused as the normals are.
+        At a node it is the mean of the errors of all samples, weighted by area and nearness: errors and areas are
+        diffused as the normals were, and divided.
         """
         phi = self.solve(divergence, source)
         excess = deviation(source.at_samples(phi), source, levels)
@@ -46,15 +48,16 @@ class GridIntegration(SolvesEach):
         return phi
 
     def penalize(self, divergence: NDArray[np.float64], source: GridSource, strength: float) -> NDArray[np.float64]:
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples."""
         levels = Levels(np.zeros(len(source.weights)))
         zero = np.zeros(len(source.weights))
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
     def fit_exactly(self, divergence: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
-        """Augmented Lagrangian, then the least correction at the nodes around the samples that leaves no deviation.
+        """Solve Eq. 14 by an augmented Lagrangian, then the least correction at the nodes around the samples.
 
         The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
-        small, and met directly. Rows that contradict each other are met in the mean.
+        small, and corrected directly. Rows that contradict each other are met in the least-squares sense.
         """
         strength = STIFFNESS / float(self.grid.spacing.mean())
         phi = self.fit(divergence.copy(), source, levels)
@@ -73,7 +76,7 @@ class GridIntegration(SolvesEach):
         multipliers: NDArray[np.float64],
         start: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the deviations from the levels."""
+        """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the `deviation` of φ from the levels."""
         volume = float(np.prod(self.grid.spacing))
         rows, weights = source.interpolation, source.weights / volume
         free = Levels(np.zeros_like(levels.values), levels.groups)
@@ -85,7 +88,7 @@ class GridIntegration(SolvesEach):
             pull = strength * deviation(rows @ phi, source, free)
             return (laplacian(phi.reshape(self.grid.shape), self.grid.spacing) + spread(pull)).ravel()
 
-        # the constant, of which C knows nothing, costs what the penalty makes of it
+        # constants are in the kernel of C; their cost is that of the penalty alone
         constant = strength * float(weights.sum()) / self.grid.n_nodes
 
         def precondition(residual: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -99,7 +102,7 @@ class GridIntegration(SolvesEach):
 
 
 def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
-    """Values at the samples, less their level and, where there are groups, less their group's mean."""
+    """(s,) values at the samples minus their levels; with groups, also minus the mean of the group."""
     excess = values - levels.values
     if levels.groups is not None:
         sums = np.bincount(levels.groups, source.weights * excess)
@@ -109,9 +112,9 @@ def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -
 
 
 def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(*grid.shape) mean of values given at the samples, weighted by area and nearness: as the normals are diffused.
+    """(*grid.shape) mean of values at the samples, weighted by area and by heat: diffused as the normals are.
 
-    It varies slowly, so the finest level of the hierarchy is left out.
+    It varies slowly, so the finest level of the hierarchy is skipped.
     """
     largest = np.abs(values).max()
     if largest == 0.0:
@@ -130,7 +133,7 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
 
 
 def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
-    """(nodes,) smallest change that takes these values at the samples, in the sense of least squares."""
+    """(n_nodes,) grid function of least norm that interpolates these values at the samples, in least squares."""
     from scipy.sparse.linalg import lsqr
 
     touched = np.unique(source.interpolation.indices)

@@ -1,4 +1,4 @@
-"""Grids with solid nodes as a discretisation: the stencil as a sparse matrix, directions that bend around corners."""
+"""Grids with solid nodes as a discretisation: the stencil as a sparse matrix, and directions around corners."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from .masked_source import MaskedSource
 from .source import GridSource
 
 SAMPLE_SIZE = 1.0
-"""Longest edge, in cells, of the pieces into which sources are cut."""
+"""Longest edge, in cells, of the simplices into which sources are bisected."""
 
 DIRECT_NODES = {1: 10_000_000, 2: 1_000_000, 3: 40_000, 4: 5_000}
-"""Up to this number of free nodes both systems are factorised; that grows the faster the higher the dimension."""
+"""Up to this number of free nodes both systems are factorised, by dimension: factors fill more in higher ones."""
 
 DIRECTION_ERROR = 1e-4
-"""Componentwise residual at which conjugate gradients stop."""
+"""Componentwise residual at which the conjugate gradients of step 1 stop."""
 
 FACING = 1.5
-"""Cells by which a node may lie beside the end of a source at a wall and still be seen as in front of it."""
+"""Cells by which a node may lie past the end of a source at a wall and still count as in front of the source."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class MaskedGridDiscretization(DiffusesEach):
 
     @property
     def direct(self) -> bool:
-        """Whether systems are factorised; they are solved by conjugate gradients otherwise."""
+        """Whether systems are factorised; otherwise they are solved by conjugate gradients."""
         return len(self.nodes.ids) <= DIRECT_NODES[self.grid.dimension]
 
     @cached_property
@@ -72,7 +72,7 @@ class MaskedGridDiscretization(DiffusesEach):
         return MaskedSource.of(whole, self.nodes)
 
     def diffuse(self, source: MaskedSource) -> NDArray[np.float64]:
-        """Solve ``(1 − tΔ) X = X₀`` and turn X where the way from the source is bent.
+        """Solve ``(1 − tΔ) X = X₀`` (Eq. 12) and turn X where the shortest way from the source is bent.
 
         That is where the straight line to the source passes solid nodes, or leads past the end of a source that a wall
         ends.
@@ -92,7 +92,7 @@ class MaskedGridDiscretization(DiffusesEach):
         return bend_around_corners(vectors[:, :-1], falling, heights, nodes.neighbors, straight)
 
     def solve_heat(self, time: float, loads: NDArray[np.float64]) -> list[Stage]:
-        """``(1 − tΔ)⁻¹`` of columns, in stages."""
+        """``(1 − tΔ)⁻¹`` (Eq. 12) of columns, in stages that each begin where the one before underflows."""
         return self._heats(time, lambda: self._heat_system(time)).solve(loads)
 
     def _heat_system(self, time: float) -> HeatSystem:
@@ -113,22 +113,22 @@ class MaskedGridDiscretization(DiffusesEach):
         return nodes.see(source.positions[nearest]) & ~past_end
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """X at the free nodes, where it is already."""
+        """X at the free nodes, which are the cells here: as it is."""
         return vectors
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """b, the right-hand side of ``C φ = b``."""
+        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return self.nodes.divergence(directions)
 
 
 @dataclass(frozen=True, eq=False)
 class MaskedIntegration(DirectIntegration):
-    """Step 3 on free nodes; levels are met as on other grids, by a smooth correction, unless exactly is asked for."""
+    """Step 3 on free nodes; `fit` imposes levels by a smooth correction, as on grids without solid nodes."""
 
     diffusing: MaskedGridDiscretization | None = None
 
     def fit(self, divergence: NDArray[np.float64], source: MaskedSource, levels: Levels) -> NDArray[np.float64]:
-        """Subtract from φ the mean of its error at the samples, weighted by area and by the heat that each sends."""
+        """Subtract from φ the mean of its errors at the samples, weighted by area and heat (in place of Eq. 14)."""
         phi = self.solve(divergence, source)
         excess = deviation(source.interpolation @ phi, source, levels)
         if not excess.any():

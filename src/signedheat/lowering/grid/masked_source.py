@@ -23,11 +23,11 @@ class MaskedSource:
     whole : GridSource
         The same on the grid without solid nodes.
     interpolation : (s, n) sparse
-        Interpolates at the samples, from those nodes around them that are open.
+        Interpolates at the samples, from the free ones among the nodes around each.
     kept : (s,) int
-        Samples of `whole` that have one.
+        Samples of `whole` with a free node around them.
     beside_solid : (s,) bool
-        Samples with a solid node no more than a cell or two away, so that a source that ends there ends at a wall.
+        Samples with a solid node within a cell or two: a source that ends there ends at a wall.
     """
 
     whole: GridSource
@@ -37,7 +37,7 @@ class MaskedSource:
 
     @classmethod
     def of(cls, whole: GridSource, nodes: FreeNodes) -> MaskedSource:
-        """Bring sources to free nodes.
+        """Lower sources to free nodes.
 
         Raises
         ------
@@ -54,7 +54,9 @@ class MaskedSource:
         lost = np.setdiff1d(whole.source_ids, whole.source_ids[kept])
         if len(lost):
             raise SourceError(
-                f"source {lost[0]} lies within solid nodes of the grid, where nothing reaches it: move it out of them"
+                f"source {lost[0]} lies within solid nodes of the grid, where nothing reaches it",
+                remedy="move it out of them",
+                element=f"source {lost[0]}",
             )
         weights, numbers = weights[kept] / total[kept, None], numbers[kept]
         row, corner = np.nonzero(weights)
@@ -86,10 +88,10 @@ class MaskedSource:
 
     @cached_property
     def vectors(self) -> NDArray[np.float64]:
-        """(n, d + 1) X₀, and the area without direction."""
+        """(n, d + 1) X₀, and in the last column the scalar source: areas without their normals."""
         return self.interpolation.T @ np.concatenate([self.normals, self.weights[:, None]], axis=1)
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(s, d) of the samples, in cells."""
+        """(s, d) positions of the samples, in cells."""
         return self.whole.samples.positions[self.kept]

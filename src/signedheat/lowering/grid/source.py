@@ -1,4 +1,4 @@
-"""Sources on a grid: samples, and how they act on its nodes."""
+"""Sources on a grid: samples of their area elements, and X₀ at the nodes."""
 
 from __future__ import annotations
 
@@ -20,14 +20,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class GridSource:
-    """Sources lowered to a grid."""
+    """Sources lowered to a grid.
+
+    Attributes
+    ----------
+    samples : AreaSamples
+        Area elements, merged per cell and component, and X₀.
+    grid : Grid
+        The domain.
+    diffusion : float
+        τ in ``t = τ max(h, h_source)²``.
+    """
 
     samples: AreaSamples
     grid: Grid
     diffusion: float
 
     def time_on(self, spacing: float) -> float:
-        """t on a coarser grid of this mean spacing: on none does √t span less than a cell."""
+        """t on a coarser grid of this mean spacing: as on this grid, but at least such that √t spans a cell."""
         return self.time if spacing <= self._step else max(self.time, spacing**2)
 
     @property
@@ -36,7 +46,7 @@ class GridSource:
 
     @property
     def finest(self) -> int:
-        """How many halvings of the grid still leave √t a cell to span: finer grids have nothing to add."""
+        """How often the grid can be coarsened until √t spans a single cell: finer grids add no accuracy."""
         return max(0, int(np.log2(np.sqrt(self.time) / self._step) + 1e-6))
 
     @property
@@ -61,7 +71,7 @@ class GridSource:
 
     @cached_property
     def stencil(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Nodes and weights that interpolate at each sample."""
+        """(s, 2^d) nodes and weights of multilinear interpolation at each sample."""
         return interpolation_stencil(self.samples.positions, self.grid.shape)
 
     @cached_property
@@ -74,6 +84,6 @@ class GridSource:
         return csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=size)
 
     def at_samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of the nodes, interpolated."""
+        """(s,) node values interpolated at the samples."""
         nodes, weights = self.stencil
         return np.einsum("ij,ij->i", values.ravel()[nodes], weights)

@@ -1,1 +1,1 @@
-"""Surfaces of every kind, and the curves and points on them, lowered to intrinsic meshes."""
+"""Lowering of surfaces of every kind, and of curves and points on them, to intrinsic meshes."""

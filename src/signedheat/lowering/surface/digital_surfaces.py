@@ -1,4 +1,4 @@
-"""Digital surfaces, lowered by flattening each square into the plane orthogonal to its corrected normal (Sec. 8)."""
+"""Digital surfaces, lowered by projecting each square on the plane orthogonal to its corrected normal (Sec. 8)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .discretization import SurfaceDiscretization
 
 @discretize.register
 def _(domain: DigitalSurface) -> SurfaceDiscretization:
-    """Each square becomes a parallelogram of four triangles; neighbours agree on edges, not on their lengths.
+    """Each square becomes a parallelogram of four triangles. Neighbours share edges, but with different lengths.
 
-    h is the deviation of the Gaussian that normals are estimated with, or else the voxel size. Below it nothing is
-    known of the surface, and heat feels the directions of the lattice instead.
+    h is the standard deviation of the Gaussian with which normals are estimated, and at least the voxel size. At a
+    smaller scale the shape of the surface is unknown, and diffusion would follow the directions of the lattice.
     """
     first, last = flattened_sides(domain.surfels, domain.spacing, domain.normals)
     around = np.stack([np.zeros_like(first), first, first + last, last], axis=1)

@@ -1,8 +1,9 @@
-"""Surfaces of every kind, as intrinsic mesh."""
+"""Surfaces of every kind as a discretisation: one vector per edge, one value per vertex of an intrinsic mesh."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...cache import LastUsed, fingerprint
+from ...diagnostics import EdgesLengthened, LargeAngles, Note, VerticesAdded
 from ...discretization import discretize
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
@@ -29,25 +31,25 @@ from .vector_heat import VectorHeat
 
 @dataclass(frozen=True, eq=False)
 class SurfaceDiscretization:
-    """A surface as the three steps see it.
+    """The discretisation of a surface.
 
     Parameters
     ----------
-    domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
-        What fields are reported on.
+    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
+        The domain of the fields returned.
     triangles : IntrinsicMesh
-        What the method runs on.
+        The triangles that the method runs on.
     restriction : (n,) int, optional
-        Vertex of the triangles that stands for each vertex of the domain, where they are not the same.
+        Vertex of the triangles for each vertex of the domain, if they are not the same.
     transfer : callable, optional
-        Takes a source on the domain to the same source on the triangles, where their faces are not the domain's.
+        Maps a source on the domain to the same source on the triangles, if their faces are not those of the domain.
     positions : (n_vertices, 3) or (m, 3, 3) float, optional
-        Where in space vertices lie, or the corners of each face, up to translation, where faces lie in planes of their
-        own: for curves whose normals are given. By default what the domain's triangulation says.
+        Positions in space of the vertices, or of the corners of each face (up to translation) if every face lies in a
+        plane of its own; needed for curves with given normals. By default those of the domain's triangulation.
     spacing : float, optional
         h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
-    notes : mapping
-        What was repaired in making the triangles; passed on to the diagnostics of every field.
+    notes : tuple of Note
+        Repairs made in building the triangles; they are added to the diagnostics of every field.
     """
 
     domain: Any
@@ -55,13 +57,13 @@ class SurfaceDiscretization:
     restriction: NDArray[np.int64] | None = None
     transfer: Callable[[Any], Any] | None = None
     positions: NDArray[np.float64] | None = None
-    spacing: float | None = None
-    notes: Mapping[str, Any] = field(default_factory=dict)
+    spacing: float = math.nan
+    notes: tuple[Note, ...] = ()
     _heats: LastUsed[float, VectorHeat] = field(default_factory=LastUsed, init=False, repr=False)
     _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.spacing is None:
+        if math.isnan(self.spacing):
             object.__setattr__(self, "spacing", 0.5 * float(self.triangles.lengths_of_edges.mean()))
 
     @cached_property
@@ -71,7 +73,7 @@ class SurfaceDiscretization:
 
     @cached_property
     def stiffness(self) -> sparse.csr_matrix:
-        """Upper triangle of C, on the vertices of the triangles."""
+        """Upper triangle of C (Eq. 10), on the vertices of the triangles."""
         return cotan_matrix(self.triangles)
 
     @cached_property
@@ -80,7 +82,7 @@ class SurfaceDiscretization:
         return elimination_order(self.stiffness)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Unoriented curves and points inside faces get edges and vertices; nonmanifold edges are told from where."""
+        """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
         if self.transfer is not None:
             sources = [self.transfer(source) for source in sources]
         positions = self.positions
@@ -93,7 +95,7 @@ class SurfaceDiscretization:
         return surface._turned_to(triangles), groups
 
     def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """The same triangles with other first faces at nonmanifold edges; step 3 does not see them."""
+        """The same surface with other first faces at nonmanifold edges; shares all of step 3, which ignores them."""
         if triangles is self.triangles:
             return self
         return self._turned(fingerprint(triangles.first_halfedges), lambda: self._turn_to(triangles))
@@ -104,26 +106,26 @@ class SurfaceDiscretization:
         return turned
 
     def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """The same surface in more triangles, whose first vertices are those of this."""
+        """The same surface with refined triangles, whose first vertices are the present ones."""
         added = triangles.n_vertices - self.triangles.n_vertices
         return replace(
             self,
             triangles=triangles,
             restriction=np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction,
             transfer=None,
-            notes={**self.notes, "vertices added for sources": added},
+            notes=(*self.notes, VerticesAdded(added)),
         )
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
-        """X₀ and the rows that interpolate φ along the sources."""
+        """X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
         return surface_source(self.triangles, sources, diffusion, self.spacing)
 
     def diffuse(self, source: Any) -> list[NDArray[np.complex128]]:
-        """Solve ``(M + tL) X = X₀``; one vector per edge, in stages (see `VectorHeat`)."""
+        """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per edge, in stages (see `VectorHeat`)."""
         return self.diffuse_many([source])[0]
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
-        """Solve for several sources of the same t at once."""
+        """Solve Eq. 12 for several sources with the same t at once."""
         heat = self._heats(sources[0].time, lambda: self._vector_heat(sources[0].time))
         return heat.solve([source.vectors for source in sources])
 
@@ -131,7 +133,10 @@ class SurfaceDiscretization:
         return VectorHeat(self.triangles, time, self.triangles.edges.elimination_order(self.vertex_order))
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
-        """X at the faces, as complex numbers in their layouts: each face from the last stage that covers it."""
+        """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout.
+
+        Each face takes it from the last stage in which all of its edges are known.
+        """
         vectors = self.triangles.sum_in_faces(stages[0])
         for stage in stages[1:]:
             later = self.triangles.sum_in_faces(stage)
@@ -139,11 +144,11 @@ class SurfaceDiscretization:
         return vectors
 
     def divergence(self, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """b, the right-hand side of ``C φ = b``."""
+        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
         return divergence(self.triangles, directions)
 
     def reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
-        """(n_vertices,) whether a vertex has a face on a part that holds vectors. Vectors only pass along edges."""
+        """(n_vertices,) whether a vertex has a face in a component with sources. Vectors diffuse across edges only."""
         parts = self.triangles.face_components
         if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
@@ -161,11 +166,12 @@ def _(domain: TriangleMesh) -> SurfaceDiscretization:
     if not lengths.max() > 0:
         raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
     triangles = IntrinsicMesh.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)
-    notes = {"added to edge lengths": added, "large angles": large_angles(triangles)}
-    return SurfaceDiscretization(domain, triangles, notes={name: note for name, note in notes.items() if note})
+    share = large_angles(triangles)
+    notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))
+    return SurfaceDiscretization(domain, triangles, notes=notes)
 
 
 def large_angles(triangles: IntrinsicMesh) -> float:
-    """Share of angles above 120°; 0 below 1 %. Where they are many, step 1 may turn directions far from the source."""
+    """Fraction of angles above 120°, or 0 if below 1 %. Many of them make directions far from the source inaccurate."""
     share = float((triangles.corner_cotangents < -(3**-0.5)).mean())
     return share if share >= 0.01 else 0.0

@@ -1,4 +1,4 @@
-"""The round end of an unoriented curve (App. A.2)."""
+"""The round end of an unoriented curve (App. A.2, arcs of type C; Eq. 19 over a part of the circle)."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from ...geometry.intrinsic_mesh import IntrinsicMesh
 def free_end_arcs(
     triangles: IntrinsicMesh, edges: NDArray[np.int64], vertices: NDArray[np.int64], least: float
 ) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
-    """Vectors that point away from free ends, over the half plane of directions behind each.
+    """Vectors that point away from the free ends of curves, integrated over the half disk of directions behind each.
 
-    Directions are told by their angle from the curve, measured the shortest way round the vertex. Behind the end are
-    those at a quarter of the total angle or more; at boundaries and where the surface is no manifold, at a right angle.
+    Directions are given by their angle from the curve, measured the shortest way around the vertex. Behind the end are
+    those at a quarter of the total angle or more; at boundary and nonmanifold vertices, at a right angle or more.
 
     Parameters
     ----------
     triangles : IntrinsicMesh
         The surface.
     edges, vertices : (k,) int
-        Last edge of each end, and the vertex at which it ends.
+        Last edge of each curve, and the vertex at which it ends.
     least : float
-        An end weighs as much as its last edge is long, and at least this much: a curve that was cut into short edges
-        needs its ends as much as any other. (The published code knows no least weight.)
+        The weight of an end is the length of its last edge, but at least this: subdividing a curve into short edges
+        must not make its ends vanish. (The published code has no least weight.)
 
     Returns
     -------
     faces : (j,) int
         Faces behind the ends.
     vectors : (j,) complex
-        ``∫ e^{iθ} dθ`` over the part of the corner that lies behind, in the face's layout, times the weight of the
-        end over the angle of the whole arc.
+        ``∫ e^{iθ} dθ`` over the part of the corner that lies behind the end, in the layout of the face, times the
+        weight of the end and divided by the angle of the whole arc.
     """
     faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
     marked = np.zeros(triangles.n_vertices, dtype=bool)
@@ -71,9 +71,9 @@ def free_end_arcs(
 def angles_from(
     spoke: int, right: NDArray[np.int64], left: NDArray[np.int64], angle: NDArray[np.float64], n_spokes: int
 ) -> NDArray[np.float64]:
-    """(n_spokes,) angle between a spoke and all spokes of its vertex, the shortest way round; inf if there is none.
+    """(n_spokes,) angle from one spoke (edge at a vertex) to all others, the shortest way around; inf if not connected.
 
-    Corner k lies between spokes ``right[k]`` and ``left[k]``.
+    Corner k lies between spokes ``right[k]`` and ``left[k]``, and has the angle ``angle[k]``.
     """
     away = np.full(n_spokes, np.inf)
     away[spoke] = 0.0

@@ -1,4 +1,4 @@
-"""Intrinsic triangulations, and meshes that get one of their own for every source, lowered to intrinsic meshes."""
+"""Intrinsic triangulations, and meshes that get one per set of sources, lowered to intrinsic meshes (Sec. 9.4)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...diagnostics import IntrinsicTriangles
 from ...discretization import discretize
 from ...domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ...domains.triangle_mesh import TriangleMesh
@@ -16,7 +17,7 @@ from ...geometry.mollification import mollify
 from .discretization import SurfaceDiscretization
 
 THICKNESS = 1e-9
-"""The same, for what is computed on a triangulation that has been made."""
+"""Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
 
 
 @discretize.register
@@ -26,16 +27,16 @@ def _(domain: IntrinsicTriangulation) -> SurfaceDiscretization:
 
 @dataclass(frozen=True, eq=False)
 class Retriangulated:
-    """A mesh that gets an intrinsic triangulation of its own for every set of sources; fields stay on the mesh.
+    """A mesh for which an intrinsic triangulation is made for every set of sources; fields are reported on the mesh.
 
-    Stands in for the mesh's discretisation until the sources are known.
+    Takes the place of the discretisation until `adapt` is called with the sources.
     """
 
     mesh: TriangleMesh
     progress: Callable[[float], None] | None = field(default=None, repr=False)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Refine the mesh with the sources along edges."""
+        """Make the intrinsic Delaunay refinement of the mesh that has the sources along its edges."""
         inner = None if self.progress is None else lambda share, _: self.progress(share)
         domain = intrinsic_delaunay(self.mesh, keep=sources, refine=True, progress=inner)
         own = np.arange(self.mesh.n_vertices)
@@ -43,7 +44,7 @@ class Retriangulated:
 
 
 def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
-    """An intrinsic triangulation as the three steps see it; what is flat against an edge that stays, is thickened."""
+    """The discretisation of an intrinsic triangulation; triangles that are nearly flat are mollified."""
     triangles = triangulation.triangles
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
     if added:
@@ -53,16 +54,16 @@ def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDis
         "domain": triangulation,
         "transfer": triangulation.transfer,
         "spacing": spacing(triangles),
-        "notes": {"intrinsic triangulation": triangulation.summary},
+        "notes": (IntrinsicTriangles(triangulation.summary),),
         **options,
     }
     return SurfaceDiscretization(triangles=triangles, **options)
 
 
 def spacing(triangles: IntrinsicMesh) -> float:
-    """h: half the mean edge length, where the mean is over the area of the surface.
+    """h: half the area-weighted mean edge length.
 
-    The plain mean would follow the many small triangles that refinement puts where the mesh needs them, and then
-    ``√t`` would not bridge the others.
+    The plain mean would be dominated by the many small triangles that refinement may insert in a small region, and
+    ``√t`` would be too short for the others.
     """
     return 0.5 * float(triangles.face_areas @ triangles.edge_lengths.mean(axis=1) / triangles.face_areas.sum())

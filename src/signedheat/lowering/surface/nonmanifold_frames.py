@@ -1,4 +1,4 @@
-"""Nonmanifold edges, seen from the sources: which of their faces the heat comes from."""
+"""Frames at nonmanifold edges, chosen so that heat enters the edge from its first face."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from ...geometry.intrinsic_mesh import IntrinsicMesh
 def nonmanifold_frames(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, Sequence[Sequence[CurveSegments]]]:
-    """Make the face that is nearest to the sources the first of every edge with more than two faces.
+    """Make the face that is nearest to the sources the first face of every edge with more than two faces.
 
-    A vector that leaves one face over such an edge enters all the others. The frame of the edge tells its first face
-    from the rest, so the first must be the one that heat leaves: otherwise what passes between two others is reflected.
-    Edges along which or past which heat runs keep their first face.
+    Heat that leaves one face through such an edge enters all the others. The frame of the edge distinguishes its first
+    face from the others, so the first must be the face that heat comes from: vectors that pass between two of the
+    others would be reflected. Edges whose ends are nearer than every opposite corner, which heat passes or runs along,
+    keep their first face.
 
     Parameters
     ----------
@@ -33,7 +34,7 @@ def nonmanifold_frames(
     Returns
     -------
     IntrinsicMesh
-        The very same ones where nothing changes.
+        The triangles with the new first faces; the same object if none changes.
     sequence of sequences of CurveSegments
         The sources in the new frames.
 
@@ -60,7 +61,7 @@ def nonmanifold_frames(
     first = np.full(triangles.n_edges, -1)
     first[table.face_edges.ravel()[triangles.first_halfedges]] = triangles.first_halfedges
     away = np.where(holds[side // 3], -1.0, distance[opposite])
-    order = np.lexsort([side != first[edge], away, edge])  # of equal ones, the first stays first
+    order = np.lexsort([side != first[edge], away, edge])  # among equally near faces the first stays first
     nearest = order[np.append(True, np.diff(edge[order]) > 0)]
     nearest = nearest[(away[nearest] < ends[nearest]) & (side[nearest] != first[edge[nearest]])]
     if not len(nearest):
@@ -73,13 +74,13 @@ def nonmanifold_frames(
 
 
 def mirrored(part: CurveSegments, changed: NDArray[np.bool_]) -> CurveSegments:
-    """Vectors along edges whose frames have been reflected."""
+    """The segments, with the vectors on edges whose frames have changed reflected."""
     here = (part.edges >= 0) & changed[part.edges]
     return replace(part, vectors=np.where(here, np.conj(part.vectors), part.vectors)) if here.any() else part
 
 
 def from_sources(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
-    """(n_vertices,) about how far every vertex is from the sources: along edges."""
+    """(n_vertices,) distance of every vertex from the sources along edges."""
     lengths, n = triangles.lengths_of_edges, triangles.n_vertices
     tail, head = triangles.edges.vertices.T
     onto = [corner_distances(triangles, part) for part in parts]
@@ -87,13 +88,13 @@ def from_sources(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> ND
     rows, columns = np.concatenate([tail, np.full(len(vertices), n)]), np.concatenate([head, vertices])
     shortest = np.lexsort([np.concatenate([lengths, offsets]), columns, rows])
     first = np.append(True, (np.diff(rows[shortest]) != 0) | (np.diff(columns[shortest]) != 0))
-    kept = shortest[first]  # csr_matrix would add up entries that occur twice
+    kept = shortest[first]  # csr_matrix would sum duplicate entries
     graph = csr_matrix((np.concatenate([lengths, offsets])[kept], (rows[kept], columns[kept])), shape=(n + 1, n + 1))
     return dijkstra(graph, directed=False, indices=n)[:n]
 
 
 def corner_distances(triangles: IntrinsicMesh, part: CurveSegments) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """How far the corners of a source's faces are from its nodes."""
+    """Vertices of the faces that a source passes, and their distances from its nodes in these faces."""
     corners = triangles.corner_positions[part.nodes.faces]
     at = np.einsum("nk,nk->n", part.nodes.barycentric, corners)
     return triangles.corner_vertices[part.nodes.faces].ravel(), np.abs(corners - at[:, None]).ravel()

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...diagnostics import PointsLeftOut
 from ...discretization import discretize
 from ...domains.point_cloud import PointCloud
 from .discretization import SurfaceDiscretization
@@ -13,16 +14,14 @@ from .discretization import SurfaceDiscretization
 
 @discretize.register
 def _(domain: PointCloud) -> SurfaceDiscretization:
-    """φ lives at the points; points that coincide share one unknown.
+    """The values of φ are at the points; points that coincide share one unknown.
 
-    h is the mean distance between neighbouring points: triangles between samples say nothing of the surface below it.
+    h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
     """
     mesh = domain.triangulation
     used = np.zeros(domain.n_points, dtype=bool)
     used[mesh.faces] = True
-    notes = {
-        "duplicate points": int((domain.representatives != np.arange(domain.n_points)).sum()),
-        "points without triangles": np.flatnonzero(~used[domain.representatives]),
-    }
+    duplicates = int((domain.representatives != np.arange(domain.n_points)).sum())
+    notes = (PointsLeftOut(duplicates, np.flatnonzero(~used[domain.representatives])),)
     spacing = float(mesh.edge_lengths.mean())
     return replace(discretize(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)

@@ -13,11 +13,11 @@ from .discretization import SurfaceDiscretization
 
 @discretize.register
 def _(domain: PolygonMesh) -> SurfaceDiscretization:
-    """φ is solved for on the triangles, virtual vertices and all, and reported at the corners of the polygons.
+    """φ is solved for on all vertices of the triangles, virtual ones included, and reported at those of the polygons.
 
-    Were virtual vertices averages of their corners in step 3 too (PᵀCP), a curve across polygons could not be a level
-    set: there are more places where it crosses triangles than corners, and φ would be flat across whole polygons.
-    h is half the mean length of the polygons' own edges, so that virtual vertices do not change the time.
+    With virtual vertices eliminated in step 3 (``PᵀCP``), a curve across polygons could not be a level set of φ: it
+    crosses more edges of triangles than its polygons have corners, and φ would be constant on whole polygons. h is half
+    the mean length of the polygons' own edges, so that virtual vertices do not change t.
     """
     lowered = discretize(domain.triangulation)
     own = (domain.triangulation.edges.vertices < domain.n_vertices).all(axis=1)

@@ -1,4 +1,4 @@
-"""Sources on surfaces, lowered to X₀ of Eq. 12 and to the rows that interpolate φ on them."""
+"""Sources on surfaces, lowered to X₀ of Eq. 12 (Eq. 11, Eq. 19) and to the rows A of Eq. 14 that interpolate φ."""
 
 from __future__ import annotations
 
@@ -29,29 +29,29 @@ from .free_ends import free_end_arcs
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSource:
-    """Curves and points, lowered to a set of intrinsic mesh.
+    """Curves and points, lowered to an intrinsic mesh.
 
     Attributes
     ----------
     vectors : (1, e) complex sparse
-        X₀, in the frames of the edges; few are not zero.
+        X₀, in the frames of the edges.
     time : float
         t of Eq. 12.
     interpolation : (s, n_vertices) sparse
         Row i interpolates φ at sample i; samples are the distinct points of every source.
     weights : (s,) float
-        Length of curve that belongs to each sample; `spacing` for isolated points.
+        Length of curve that belongs to each sample; h for isolated points.
     components : (s,) int
-        Connected component of the sources taken together, numbered in the order in which the sources name them.
+        Connected component of the union of all sources, numbered by first appearance.
     source_ids : (s,) int
-        Which source each sample belongs to.
+        Source that each sample belongs to.
     oriented : bool
-        Whether any source has two sides; where none has, φ is an unsigned distance.
+        Whether any source is oriented; if none is, φ is an unsigned distance.
     pinned : (s,) bool
-        Samples at which exact constraints hold: not those inside faces, where their component has others. Three of them
-        inside one face, however close to a line, would flatten φ on it.
+        Samples at which `fit` imposes levels: all but those inside faces, unless their component has only such. Three
+        samples inside one face, not quite on a line, would force φ to be constant on it.
     triangles : IntrinsicMesh
-        What they were lowered to; the first vertices are those of the domain's own triangles.
+        The triangles that the sources are lowered to; the first vertices are those of the domain's own triangles.
     parts : list of CurveSegments
         The sources on these triangles.
     """
@@ -75,26 +75,26 @@ def surface_source(
     spacing: float,
     positions: NDArray[np.float64] | None = None,
 ) -> SurfaceSource:
-    """Lower sources to a set of triangles.
+    """Lower sources to an intrinsic mesh.
 
     Parameters
     ----------
     triangles : IntrinsicMesh
         The surface; face ids of the sources refer to it.
     sources : sequence of Curve, SurfacePoints, CurveSegments or sequences of them
-        What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges
-        (`embedding.embed` brings them there).
+        What distance is measured to; a sequence in it counts as one source. Unoriented curves must run along edges: see
+        `refine_to_conform`.
     diffusion : float
         τ in ``t = τ h²``.
     spacing : float
-        h: mean distance between unknowns. An isolated point weighs as much as a curve of this length.
+        h: mean distance between unknowns. An isolated point has the weight of a curve of this length.
     positions : (n_vertices, 3) float, optional
         Vertices in space, for curves whose normals are given.
 
     Raises
     ------
     SourceError
-        If there is no source, one does not fit the surface, or they cancel.
+        If there is no source, one does not fit the surface, or oriented curves cancel each other.
 
     Examples
     --------
@@ -107,7 +107,10 @@ def surface_source(
     groups = segments_of_each(sources, triangles, positions)
     parts = [part for group in groups for part in group]
     if not parts or not all(groups):
-        raise SourceError("there is no source: pass at least one curve or point, and no empty lists")
+        raise SourceError(
+            "there is no source",
+            remedy="pass at least one curve or point, and no empty lists",
+        )
     if not all(part.is_conforming for part in parts):
         raise SourceError("unoriented curves inside faces must be embedded in the triangles first")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
@@ -142,10 +145,10 @@ def surface_source(
 
 
 def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> csr_array:
-    """Eq. 11 without the value of ψ_e: i(b − a), on the edge that it runs along or in thirds on those of its face.
+    """Eq. 11 without its factor ψ_e(m): i(b − a) for a segment ab, to its edge or in thirds to the edges of its face.
 
-    One third is the mean of ψ_e over a face; it gives both kinds of pieces of one curve the same weight. (The
-    published code adds the whole vector to each of the three edges.)
+    One third is the mean of ψ_e over a face; it gives segments along edges and segments inside faces of one curve the
+    same weight. (The published code adds the whole vector to each of the three edges.)
     """
     sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
     for part in parts:
@@ -156,9 +159,10 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
 
 
 def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
-    """App. A.2: each side of a curve along edges points away from it, and round its free ends.
+    """App. A.2, from Eq. 11 and Eq. 19: vectors away from curves along edges, on both sides and at free ends.
 
-    A face beside edge ij gets i(p_j − p_i), ij in its own order, on its other two edges; on ij itself the sides cancel.
+    A face at edge ij, i before j in its own order, contributes i(p_j − p_i) to its other two edges. On ij itself the
+    contributions of the two sides cancel.
     """
     curves = [p for p in parts if len(p.ends) and not p.oriented]
     if not curves:
@@ -173,7 +177,7 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
     sums = scatter(triangles.n_edges, triangles.edges.face_edges[faces], on_edges)
 
     touched = np.bincount(triangles.edges.vertices[edges].ravel(), minlength=triangles.n_vertices)
-    for part in parts:  # an end that lies on another source is not free
+    for part in parts:  # an end at a vertex of another source is not free
         if len(part.ends) and part.oriented:
             at_vertex = part.nodes.kinds == VERTEX
             touched[part.nodes.elements[at_vertex]] += 2
@@ -184,9 +188,9 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
 
 
 def vertex_point_vectors(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) -> csr_array:
-    """App. A.1, Eq. 19: round vertex i, the corner of angle α gets i d (1 − e^{iα}) / Θ.
+    """App. A.1, Eq. 19: the corner of angle α at a vertex contributes i d (1 − e^{iα}) / Θ to the edges of its face.
 
-    d is the direction of the first edge that leaves the corner, counter-clockwise, and Θ the total angle at the vertex.
+    d is the direction of the first edge of the corner, counter-clockwise, and Θ the total angle at the vertex.
     """
     marked = np.zeros(triangles.n_vertices, dtype=bool)
     marked[vertices] = True
@@ -201,12 +205,12 @@ def vertex_point_vectors(triangles: IntrinsicMesh, vertices: NDArray[np.int64]) 
 
 
 def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_array:
-    """Points on edges and inside faces: −∇δ tested with the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
+    """Points on edges and inside faces: −∇δ_p against the Crouzeix–Raviart functions, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
-    Diffused, this is minus the gradient of the heat kernel, which points away from p in all directions alike, whatever
-    the shape of the faces: on each, ``Σ_e ∇ψ_e = 0`` and ``Σ_e ∇ψ_e x_eᵀ`` is the identity. ∇ψ_e, constant on faces, is
-    averaged over those around each vertex and interpolated at p. A point at a vertex of equilateral triangles weighs
-    √3 h times what Eq. 19 gives it.
+    Its diffusion is minus the gradient of the heat kernel, which points away from p with equal strength in all
+    directions, whatever the shape of the faces: on each, ``Σ_e ∇ψ_e = 0`` and ``Σ_e ∇ψ_e x_eᵀ`` is the identity. ∇ψ_e,
+    constant on faces, is averaged over the faces around each vertex and interpolated at p. At a vertex of equilateral
+    triangles it is Eq. 19 divided by √3 h, which the caller makes up for.
     """
     corner = np.argwhere(located.barycentric > 0)
     vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
@@ -226,13 +230,13 @@ def from_faces(triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDAr
 
 
 def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> csr_array:
-    """(1, n) sums of values with the same index, few beside n."""
+    """(1, n) sparse sums of values with the same index."""
     flat = index.ravel()
     return csr_array((values.ravel(), (np.zeros(len(flat), dtype=np.int64), flat)), shape=(1, n), dtype=np.complex128)
 
 
 def line_elements(part: CurveSegments, spacing: float) -> NDArray[np.float64]:
-    """(s,) half of the lengths that meet at each node; `spacing` at isolated points."""
+    """(s,) half the length of the segments that meet at each node; `spacing` at isolated points."""
     if len(part.ends) == 0:
         return np.full(len(part.nodes), spacing)
     return 0.5 * np.bincount(part.ends.ravel(), np.repeat(part.lengths, 2), len(part.nodes))

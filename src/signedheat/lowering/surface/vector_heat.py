@@ -1,4 +1,4 @@
-"""Step 1 on intrinsic mesh: one factorisation, and right-hand sides carried as far as they have to go."""
+"""Step 1 on an intrinsic mesh: one factorisation, with restarts where the solution would underflow."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ...operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
 
 @dataclass(frozen=True, eq=False)
 class VectorHeat:
-    """``(M + tL) X = X₀`` on the edges of triangles.
+    """Solver of ``(M + tL) X = X₀`` (Eq. 12) on the edges of triangles.
 
     X falls like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. What lies
     beyond is solved for again with the same factor (`linear.restarts`).
@@ -39,19 +39,19 @@ class VectorHeat:
 
     @cached_property
     def factor(self) -> Factor:
-        """Its factor."""
+        """The factor of M + tL."""
         matrix = vector_heat_matrix(self.triangles, self.time)
-        parts = np.arange(matrix.shape[0] // self.triangles.n_edges)  # real and imaginary, or both in one
+        parts = np.arange(matrix.shape[0] // self.triangles.n_edges)  # real and imaginary part, or one complex number
         return factorize(matrix, order=(len(parts) * self.order[:, None] + parts).ravel(), reused=True)
 
     @cached_property
     def _smallest_mass(self) -> float:
-        """|X| is at most |X₀| divided by it."""
+        """Least entry of M: |X| is at most |X₀| divided by it."""
         mass = np.bincount(self.triangles.edges.face_edges.ravel(), np.repeat(self.triangles.face_areas / 3.0, 3))
         return float(mass.min())
 
     def solve(self, sources: Sequence[csr_array]) -> list[list[NDArray[np.complex128]]]:
-        """X for each X₀, in stages: each is known up to a factor of its own, and NaN nearer than where it begins."""
+        """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border."""
         starts = np.zeros((len(sources), self.triangles.n_edges), dtype=np.complex128)
         for source, start in zip(sources, starts, strict=True):
             start[source.indices] = scaled(source.data, self._smallest_mass)[0]

@@ -1,1 +1,1 @@
-"""Tet meshes, and the shapes in them, lowered to Crouzeix–Raviart elements."""
+"""Lowering of tet meshes, and of shapes in them, to Crouzeix–Raviart elements."""

@@ -24,7 +24,7 @@ from .integration import TetIntegration
 from .source import TetSource, tet_source
 
 DIRECT_FACES = 20_000
-"""Up to this number of faces step 1 is factorised: that grows like n², conjugate gradients like n⁴ᐟ³."""
+"""Up to this number of faces step 1 is factorised, in O(n²) time; conjugate gradients take O(n⁴ᐟ³)."""
 
 DIRECT_VERTICES = 40_000
 """Up to this number of vertices step 3 is factorised."""
@@ -33,19 +33,19 @@ DIRECTION_ERROR = 1e-3
 """Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
 
 SPRINGS = 30.0
-"""Strength with which levels are imposed, over one edge length."""
+"""Strength of the springs that impose levels, times the mean edge length."""
 
 
 @dataclass(frozen=True, eq=False)
 class TetDiscretization(DiffusesEach):
-    """A tet mesh as the three steps see it.
+    """The discretisation of a tet mesh.
 
     Parameters
     ----------
     mesh : TetMesh
         The domain.
     direct : bool
-        Whether to factorise the system of step 1; it is solved by conjugate gradients otherwise.
+        Whether to factorise the system of step 1, instead of solving it by conjugate gradients.
     """
 
     mesh: TetMesh
@@ -59,17 +59,17 @@ class TetDiscretization(DiffusesEach):
 
     @cached_property
     def spacing(self) -> float:
-        """h: mean distance between the barycentres of two faces of a tet, a third of the edge between their corners."""
+        """h: mean distance between the barycentres of two faces of a tet, which is a third of an edge length."""
         corners = self.mesh.vertices[self.mesh.tets]
         pairs = [corners[:, a] - corners[:, b] for a in range(4) for b in range(a)]
         return float(np.mean([np.linalg.norm(edge, axis=1).mean() for edge in pairs])) / 3
 
     @cached_property
     def unknowns(self) -> NDArray[np.int64]:
-        """(m, 4) unknown of φ at each corner.
+        """(m, 4) unknown of φ at each corner of each tet.
 
-        Heat flows through faces. Parts of the mesh that touch in an edge or a vertex alone are separate domains, and a
-        vertex that they share is an unknown in each.
+        Heat flows through faces only. Parts of the mesh that meet in an edge or a vertex only are separate domains, and
+        a vertex of several parts has one unknown for each.
         """
         parts = self.mesh.parts
         keys = self.mesh.tets * (parts.max() + 1) + parts[:, None]
@@ -93,15 +93,15 @@ class TetDiscretization(DiffusesEach):
         return self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
-        """Tets hold sources in any position."""
+        """The discretisation itself: sources need not conform to the tets."""
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> TetSource:
-        """X₀ and the rows that average φ over the sources."""
+        """X₀ (Sec. 8.1; Eq. 11 in space) and the rows that average φ over the sources (Eq. 14)."""
         return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
 
     def diffuse(self, source: TetSource) -> NDArray[np.float64]:
-        """Solve ``(M + tL) X = X₀``: one vector per face, averaged in the tets."""
+        """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per face, averaged in the tets (App. B.2)."""
         heat = self._heats(source.time, lambda: self._heat_system(source.time))
         if self._is_convex:
             return self._in_tets(heat.solve(source.vectors))[0]
@@ -113,14 +113,15 @@ class TetDiscretization(DiffusesEach):
         return bend_around_corners(means[:, :3], -gradients, heights, neighbors, self._straight(source, neighbors))
 
     def _heat_system(self, time: float) -> HeatSystem:
+        """M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
         matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass(self.mesh.faces)
         matrix.setdiag(matrix.diagonal() + mass)
         return HeatSystem(matrix, self.direct, DIRECTION_ERROR)
 
     def _in_tets(self, stages: list[Stage]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Means of X, multiples of the gradient of its last column, and logarithms of the factors of both.
+        """Means of X in the tets, positive multiples of the gradient of its last column, and logarithms of its scale.
 
-        They are those of the last stage that knows all four faces of a tet.
+        Each tet takes them from the last stage in which all its four faces are known.
         """
         tet_faces = self.mesh.faces.tet_faces
         means, gradients, factors = None, None, np.full(self.mesh.n_tets, -np.inf)
@@ -148,7 +149,7 @@ class TetDiscretization(DiffusesEach):
         return self.mesh.geometry.face_laplacian(self.mesh.faces)
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """X at the tets, where it is already."""
+        """X at the tets: `diffuse` has averaged it already."""
         return vectors
 
     @cached_property
@@ -160,18 +161,18 @@ class TetDiscretization(DiffusesEach):
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """b, the right-hand side of ``C φ = b``."""
+        """b, the right-hand side of ``C φ = b`` (Eq. 13, Eq. 22)."""
         return self.mesh.geometry.divergence(directions, self.unknowns, self.n_unknowns)
 
     @cached_property
     def vertices(self) -> NDArray[np.int64]:
-        """(n,) vertex of the mesh at which each unknown is."""
+        """(n,) vertex of the mesh that each unknown belongs to."""
         vertices = np.empty(self.n_unknowns, dtype=np.int64)
         vertices[self.unknowns] = self.mesh.tets
         return vertices
 
     def at_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the vertices of the mesh: means where parts of it touch, NaN where nothing is known."""
+        """(n_vertices,) values at the vertices: means over the unknowns of each, NaN where none has a value."""
         known = np.flatnonzero(~np.isnan(values))
         vertices, n = self.vertices[known], self.mesh.n_vertices
         counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[known], n)

@@ -1,4 +1,4 @@
-"""Step 3 on tets: levels are imposed by springs where the source cuts through tets."""
+"""Step 3 on tets, with levels imposed by springs where the source does not conform to the mesh."""
 
 from __future__ import annotations
 
@@ -13,33 +13,36 @@ from ...discretization import Levels, SourceTerm
 from ..direct_integration import BATCH, DirectIntegration
 
 PIN = 1e6
-"""Stiffness at vertices that the source passes through, times the largest diagonal entry of C."""
+"""Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
 
 
 @dataclass(frozen=True, eq=False)
 class TetIntegration(DirectIntegration):
-    """As for surfaces, but for `fit`, and for the level that φ, linear on tets, is to have on a curved source.
+    """As `DirectIntegration`, but `fit` imposes levels by springs, and levels are corrected for the curvature of φ.
 
-    A function that is linear on tets cannot be level on a curved surface that cuts through them, but by being flat
-    around it. Springs of a strength that suits the tets leave less error on the source, and everywhere, than exact
-    levels do. Vertices on the source are pinned.
+    A function that is linear on tets can be constant on a curved surface that crosses them only by being constant
+    around it. Springs of a strength adapted to the tets leave a smaller error than exact constraints, on the source and
+    everywhere. At vertices on the source the springs are stiff.
 
-    Nor should it have the level there that the distance has: the linear interpolant of a curved function lies off it.
-    By how much, the gradients at the corners tell to second order, once there is a first φ.
+    The level at samples is corrected as well, because the linear interpolant of a curved function differs from it. The
+    difference is known to second order from the gradients at the corners, once there is a first φ.
 
     Parameters
     ----------
     strength : float
-        Of the springs, in 1/length.
+        Strength of the springs, in 1/length.
     gradients : callable
-        From φ at the unknowns, (n, 3) gradients there.
+        From φ at the unknowns to (n, 3) gradients there.
     """
 
     strength: float = 0.0
     gradients: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.zeros_like
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups."""
+        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups; see Eq. 14.
+
+        S is the diagonal matrix of the `springs`, in place of the multipliers of Eq. 14.
+        """
         rows = source.interpolation
         springs, factor = self.springs(source), self.anchored(source)
         pull = sparse.csr_matrix(rows.T @ sparse.diags_array(springs))
@@ -65,12 +68,12 @@ class TetIntegration(DirectIntegration):
         return self._centered(fitted, source)
 
     def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels at the samples, exactly."""
+        """Impose levels at the samples exactly (Eq. 14)."""
         correction = self._quadratic_correction(self.factor.solve(divergence), source)
         return super().fit_exactly(divergence, source, replace(levels, values=levels.values - correction))
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
-        """``(C + λ Aᵀ W A) φ = b``, with φ on the source for A φ."""
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), where A φ is corrected for the curvature of φ."""
         free = super().penalize(divergence, source, strength)
         pull = source.interpolation.T @ (strength * source.weights * self._quadratic_correction(free, source))
         return super().penalize(divergence - pull, source, strength)
@@ -79,10 +82,10 @@ class TetIntegration(DirectIntegration):
         return super()._at_samples(values, source) + self._quadratic_correction(values, source)
 
     def _quadratic_correction(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
-        """(s,) how far φ lies above its interpolant on the source."""
+        """(s,) φ minus its linear interpolant, on the source."""
         return source.quadratic_correction @ self.gradients(np.nan_to_num(values)).ravel()
 
     def springs(self, source: SourceTerm) -> NDArray[np.float64]:
-        """(s,) stiff at vertices, soft inside tets."""
+        """(s,) stiffness of the springs: stiff for samples at vertices, soft for those inside tets."""
         at_vertex = np.diff(source.interpolation.indptr) == 1
         return np.where(at_vertex, PIN * self.stiffness.diagonal().max(), self.strength * source.weights)

@@ -1,8 +1,8 @@
-"""Shapes in space, lowered to a tet mesh: X₀ of Eq. 12, and the rows that average φ over the source."""
+"""Shapes in space, lowered to a tet mesh: X₀ of Eq. 12 (Sec. 8.1), and the rows A of Eq. 14 that average φ on them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...diagnostics import Note, OutsideMesh
 from ...domains.tet_mesh import TetMesh
 from ...errors import SourceError
 from ...geometry.directions import unit
@@ -29,23 +30,23 @@ class TetSource:
     vectors : (f, 3) float
         X₀ at the faces.
     strengths : (f,) float
-        The same for areas without direction: what an unsigned distance starts from.
+        The scalar source: areas without their normals, as for an unsigned distance.
     centers : (p, 3) float
-        Points on the source, one for each piece of it.
+        Centroids of the clipped polygons of the source.
     time : float
         t of Eq. 12.
     interpolation : (s, n) sparse
-        Row i averages φ over patch i of the source: what lies nearest to one vertex of the tets that it crosses.
-        Where the source follows faces of the mesh, the patch is the vertex itself.
+        Row i averages φ over patch i of the source: the clipped polygons that are nearest to one vertex. Where the
+        source conforms to faces of the mesh, the patch is the vertex itself.
     quadratic_correction : (s, 3n) sparse
-        What `rows` lack of being exact for quadratic φ, from the gradients of φ at the unknowns, x, y, z of each in
-        turn.
+        What makes `interpolation` exact for quadratic φ: maps the gradients of φ at the unknowns (x, y, z of each in
+        turn) to its difference from the average of the linear interpolant.
     weights : (s,) float
         Area of each patch.
-    components, owners : (s,) int
-        Connected component, and source, that each patch lies on.
-    notes : mapping
-        What of the sources was lost outside the mesh.
+    components, source_ids : (s,) int
+        Connected component, and source, that each patch belongs to.
+    notes : tuple of Note
+        The parts of the sources that lie outside the mesh.
     """
 
     vectors: NDArray[np.float64]
@@ -57,7 +58,7 @@ class TetSource:
     weights: NDArray[np.float64]
     components: NDArray[np.int64]
     source_ids: NDArray[np.int64]
-    notes: Mapping[str, Any]
+    notes: tuple[Note, ...]
 
 
 def tet_source(
@@ -79,31 +80,36 @@ def tet_source(
     unknowns : (m, 4) int
         Unknown of φ at each corner of each tet.
     sources : sequence of TriangleMesh, PolygonMesh or PointCloud
-        What distance is measured to, in any position. What lies outside the mesh is left out, and noted.
+        What distance is measured to, in any position. Parts outside the mesh are dropped, and noted.
     diffusion, spacing : float
         τ and h in ``t = τ max(h, h_source)²``.
 
     Raises
     ------
     SourceError
-        If a source is of another kind, lies outside the mesh, has no normals, or cancels itself.
+        If a source is of another kind, lies outside the mesh, has no normals, or its normals cancel.
     """
-    cuts, components, notes, n_components, n_unknowns = [], [], {}, 0, int(unknowns.max()) + 1
+    cuts, components, outside, n_components, n_unknowns = [], [], np.zeros(len(sources)), 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):
         elements = area_elements(source)
         if elements.corners.shape[2] != 3:
-            raise SourceError(f"source {number} ({source!r}) does not lie in space of three dimensions, as tets do")
+            raise SourceError(
+                f"source {number} ({source!r}) does not lie in space of three dimensions, as tets do",
+                element=f"source {number}",
+            )
         if not elements.vectors.any():
-            raise SourceError(f"source {number} ({source!r}) has no area at all: its faces are degenerate")
+            raise SourceError(
+                f"source {number} ({source!r}) has no area at all: its faces are degenerate",
+                element=f"source {number}",
+            )
         polygons = _cut(mesh, planes, elements)
         if len(polygons.tets) == 0:
             raise SourceError(
-                f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}: move it into "
-                "the mesh, or check that both have the same units"
+                f"source {number} ({source!r}) lies outside the tet mesh, which spans {_box(mesh)}",
+                remedy="move it into the mesh, or check that both have the same units",
+                element=f"source {number}",
             )
-        outside = 1 - polygons.areas.sum() / elements.weights.sum()
-        if outside > 1e-9:
-            notes[f"source {number} outside the mesh"] = f"{100 * outside:.3g} % of its area, left out"
+        outside[number] = 1 - polygons.areas.sum() / elements.weights.sum()
         spacing = max(spacing, elements.spacing)
         cuts.append(polygons)
         components.append(elements.components[polygons.parents] + n_components)
@@ -111,7 +117,11 @@ def tet_source(
     time = diffusion * spacing**2
     loads = sum(_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts)
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
-        raise SourceError("the normals of the source cancel each other everywhere: turn one of its coinciding sides")
+        raise SourceError(
+            "the normals of the source cancel each other everywhere",
+            remedy="turn one of its coinciding sides",
+        )
+    leaving = np.flatnonzero(outside > 1e-9)
     patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
     rows, corrections, weights, members = zip(*patches, strict=True)
     return TetSource(
@@ -124,7 +134,7 @@ def tet_source(
         weights=np.concatenate(weights),
         components=np.unique(np.concatenate(members), return_inverse=True)[1],
         source_ids=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
-        notes=notes,
+        notes=(OutsideMesh(leaving, outside[leaving]),) if len(leaving) else (),
     )
 
 
@@ -132,7 +142,7 @@ def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygo
     if elements.corners.shape[1] == 3:
         polygons = clip_triangles(mesh, planes, elements.corners)
         sizes = np.linalg.norm(elements.vectors, axis=1)
-        counted = elements.weights / np.where(sizes > 0, sizes, 1)  # −1 where a fan leaves its polygon
+        counted = elements.weights / np.where(sizes > 0, sizes, 1)  # −1 for fan triangles outside their polygon
         return replace(polygons, areas=polygons.areas * counted[polygons.parents])
     tets = containing_tets(mesh, planes, elements.corners[:, 0])
     k = np.flatnonzero(tets >= 0)
@@ -141,12 +151,14 @@ def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygo
 
 
 def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> NDArray[np.float64]:
-    """(f, 4) X₀ at the faces, and the same for areas without direction.
+    """(f, 4) X₀ at the faces (Sec. 8.1), and in the last column the scalar source, from areas without their normals.
 
-    It is ∫ ψ N, without the parts where ψ is negative, which would send out waves of the wrong sign: on a face of the
-    mesh ψ is one, and zero on the others. But plane waves along the normal of a piece fall by e^(−r/√t), and a face
-    that lies δ √t in front of it sends e^δ times what is due ahead, and e^−δ times what is due backwards. Shares
-    weighted by a mean of e^−δ and e^δ send as much as the piece itself both ways, wherever such a mean exists.
+    A polygon is distributed to the four faces of its tet in proportion to ψ = 1 − 3λ of the Crouzeix–Raviart basis,
+    where that is positive: negative shares would emit waves of the wrong sign. For a polygon in a face of the mesh ψ is
+    one there and zero on the other faces, as in the paper. Otherwise the shares are reweighted: a plane wave along the
+    normal decays by e^(−r/√t), so a face δ √t in front of the polygon emits e^δ times the correct amplitude forward and
+    e^−δ times backward. Weights that are a mean of e^−δ and e^δ make both amplitudes correct, wherever such a mean
+    exists.
     """
     shares = np.maximum(1 - 3 * polygons.barycentric, 0)
     corners = mesh.vertices[mesh.tets[polygons.tets]]
@@ -169,10 +181,11 @@ def _patches(
     polygons: ClippedPolygons,
     components: NDArray[np.int64],
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
-    """Rows, quadratic corrections, areas and components of the patches.
+    """Interpolation rows, quadratic corrections, areas and components of the patches.
 
-    One row for each piece would say more than φ, linear on every tet, can obey but by being flat around the source.
-    A quadratic φ is at x, of barycentric coordinates λ between corners v, ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
+    One row per clipped polygon would be more constraints than a function that is linear on tets can meet without being
+    constant around the source. A quadratic φ, at the point x with barycentric coordinates λ between corners v, is
+    ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
     """
     corners = unknowns[polygons.tets]
     conforming = _on_whole_faces(mesh, polygons, components)
@@ -187,7 +200,7 @@ def _patches(
     areas = np.concatenate([np.repeat(polygons.areas[k] / 3, 3), polygons.areas[inside]])
     found, patch = np.unique(keys, return_inverse=True)
     weights = np.bincount(patch, weights=areas)
-    real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # and not fans that cancel outside a polygon
+    real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # drop fan triangles that cancel
     n_on = len(at_vertices)
     columns = np.concatenate([at_vertices, corners[inside].ravel()])
     entries = np.concatenate([areas[:n_on], (areas[n_on:, None] * polygons.barycentric[inside]).ravel()])
@@ -208,7 +221,7 @@ def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> NDArray[np.float64]:
 
 
 def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which polygons lie in faces that their component covers."""
+    """(p,) polygons that lie in a face of the mesh that their component covers entirely."""
     on = polygons.in_face >= 0
     covered = np.zeros(len(on), dtype=bool)
     if on.any():

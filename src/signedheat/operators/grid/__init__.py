@@ -1,1 +1,1 @@
-"""The stencil of regular grids, matrix free: sweeps, multilevel diffusion, cosine transforms."""
+"""Matrix-free operators on regular grids: sweeps, multilevel diffusion, cosine transforms, closest points."""

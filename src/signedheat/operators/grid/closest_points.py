@@ -1,8 +1,8 @@
 """Closest points on the zero set of a grid function.
 
-Where the zero set crosses edges of the grid, how it bends there, and which crossing is nearest to each node. Positions
-are in units of length from the grid's origin. Arrays have four axes and vectors four components; those in front are
-unused in fewer dimensions.
+The zero set is known by its crossings with the edges of the grid, its normals and its curvature there; every node finds
+its nearest crossing. Positions are in units of length from the grid's origin. Arrays have four axes and vectors four
+components, of which the first ones are unused in fewer dimensions.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from .wavefront import padded_shape, sweep_lines
 def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
     """(*shape) distance of each node to the zero set of values, with the sign of its value.
 
-    Crossings are moved onto the zero set of the cubic interpolant. Each node finds the nearest of them by sweeps
-    (Danielsson 1980), then the distance to the circle that touches the zero set there and bends as it does: second
-    order, exact for planes and spheres.
+    Crossings are moved onto the zero set of the cubic interpolant. Sweeps find the nearest of them for each node
+    (Danielsson 1980); the distance is then that to the osculating circle of the zero set there: second order, exact for
+    planes and spheres.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float6
 
 @compiled(nogil=True)
 def _crossed_edges(field):
-    """(e, 5) node and axis of each edge whose ends differ in sign; zero counts as positive."""
+    """(e, 5) node (4 indices) and axis of each edge whose two ends have different signs; zero counts as positive."""
     n0, n1, n2, n3 = field.shape
     capacity, count = 4096, 0
     edges = np.empty((capacity, 5), dtype=np.int32)
@@ -85,14 +85,14 @@ def _crossed_edges(field):
 
 @compiled(nogil=True)
 def _cubic(field, place, weights, gradient):
-    """Value of the cubic convolution interpolant (Keys 1981) at a place in cells; its gradient goes to `gradient`."""
+    """Value of the cubic convolution interpolant (Keys 1981) at a position in cells; writes its `gradient`."""
     base = np.empty(4, dtype=np.int64)
     for axis in range(4):
         n = field.shape[axis]
         base[axis] = min(max(np.int64(np.floor(place[axis])), 0), max(n - 2, 0))
         f = place[axis] - base[axis]
         g = 1.0 - f
-        for side in range(2):  # the value's weights, and the slope's
+        for side in range(2):  # weights of the value, and of the derivative
             if n == 1:
                 w0, w1, w2, w3 = 0.0, 1.0 - side, 0.0, 0.0
             elif side == 0:
@@ -101,7 +101,7 @@ def _cubic(field, place, weights, gradient):
             else:
                 w0, w3 = -0.5 * g * (1.0 - 3.0 * f), 0.5 * f * (1.0 - 3.0 * g)
                 w1, w2 = f * (4.5 * f - 5.0), -g * (4.5 * g - 5.0)
-            if n > 1 and base[axis] == 0:  # continue straight beyond the walls
+            if n > 1 and base[axis] == 0:  # linear extrapolation beyond the walls
                 w1, w2, w0 = w1 + 2.0 * w0, w2 - w0, 0.0
             if n > 1 and base[axis] == n - 2:
                 w2, w1, w3 = w2 + 2.0 * w3, w1 - w3, 0.0
@@ -152,7 +152,7 @@ def _crossings(field, edges, steps):
         start[axis] += here / (here - there)
         for d in range(4):
             place[d] = start[d]
-        # onto the zero set of the interpolant, along its gradient; back to the crossing if that leads away
+        # Newton's method along the gradient, onto the zero set of the interpolant; back to the crossing if it diverges
         for _ in range(3):
             value = _cubic(field, place, weights, slope)
             square, moved = 0.0, 0.0
@@ -206,7 +206,7 @@ def _crossings(field, edges, steps):
 
 @compiled(nogil=True)
 def _seed(nearest, squares, edges, points, steps):
-    """Both ends of a crossed edge begin with its crossing."""
+    """Give both ends of each crossed edge its crossing as the first candidate."""
     for e in range(len(edges)):
         for end in range(2):
             i, j, k, m = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
@@ -222,7 +222,7 @@ def _seed(nearest, squares, edges, points, steps):
 
 @compiled(nogil=True)
 def _nearest_tiles(nearest, squares, points, steps, tiles):
-    """Take over the nearest crossing of lines already visited, and along each line both ways."""
+    """Take over nearer crossings from neighbouring lines already visited, and along each line in both directions."""
     n0, n1, n2, n = nearest.shape
     step = np.float32(steps[3])
     for tile in tiles:
@@ -259,10 +259,10 @@ def _nearest_tiles(nearest, squares, points, steps, tiles):
 
 @compiled(nogil=True)
 def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
-    """Distance to the touching circle in the plane of node, crossing and normal.
+    """Distance to the osculating circle in the plane of node, crossing and normal.
 
-    With s along the normal, r across it and bending k in the direction of r, the distance to the circle of radius 1/k
-    is ``(√((1 + ks)² + k²r²) − 1) / k``, here without the cancellation.
+    For an offset from the crossing of s along the normal and r across it, and curvature k in the direction of r, the
+    distance to the circle of radius 1/k is ``(√((1 + ks)² + k²r²) − 1) / k``, here without cancellation.
     """
     n0, n1, n2, n = nearest.shape
     away, across = np.empty(4), np.empty(4)

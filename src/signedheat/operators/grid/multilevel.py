@@ -1,13 +1,15 @@
 """Diffusion from sources on a grid, on a hierarchy of coarser grids.
 
-X falls by e over √t. Farther than a few √t from the source its direction varies slowly, and a grid of twice the
-spacing, with the time that belongs to it (``t = τ max(h, h_source)²``, as on the finest grid), carries it on at an
-eighth of the cost. So every level is swept only within `BAND` of its sources, and the coarsest everywhere.
+X falls by a factor of e over the length √t. Farther than a few √t from the source its direction varies slowly, and a
+grid of twice the spacing, with the diffusion time of its own spacing (``t = τ max(h, h_source)²``, as on the finest
+grid), continues it at an eighth of the cost in space. So every level is swept only within `BAND` of its sources, and
+the coarsest level everywhere.
 
-A coarser level starts from what the finer one found within its band: X there, its length raised to the power that
-turns the decay of one level into that of the next, so that a path from the source to a node weighs the same wherever it
-leaves the band. Where a level is left out, sources move on by the transpose of linear interpolation, which keeps their
-sums and first moments: two sides of a sheet thinner than a coarse cell do not cancel.
+A coarser level takes the values that the finer one found within its band: the directions of X, with lengths raised to
+the power that turns the decay rate of the finer level into its own, so that a path from the source to a node has the
+same weight wherever it leaves the band. Where a level is skipped, its sources are restricted to the next by the
+transpose of linear interpolation, which keeps sums and first moments: the two sides of a sheet thinner than a coarse
+cell do not cancel.
 """
 
 from __future__ import annotations
@@ -26,33 +28,33 @@ from .sweeps import TINY, diffuse_by_sweeps
 BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
 MARGIN = 3
-"""Lines at the rim of the band that take their values from the coarser level."""
+"""Width, in nodes, of the rim of the band whose values are taken from the coarser level."""
 SMALL = 0.125
-"""Where the first band is less of the grid than this, it is swept twice as often: much depends on it, at low cost."""
+"""A first band that is a smaller fraction of the grid than this is swept twice as often: it costs little there."""
 COARSEST = 32
 """A grid with no more nodes than this along any axis is not coarsened."""
 FEW = 4
 """Axes with no more nodes than this are not halved."""
 ROUNDS = 2
-"""How often each combination of directions is swept within a band, if nothing else is asked for."""
+"""How often each combination of sweep directions is used within a band, by default."""
 BEYOND = 2
-"""How many times as often a level is swept that carries on what a finer one found."""
+"""Levels that start from values of a finer level are swept so many times as often."""
 ROUNDS_EVERYWHERE = 12
-"""The same on the coarsest grid, where paths from the source are longer, and sweeps cost nothing."""
+"""The same on the coarsest grid, where paths from the source are longer and sweeps are cheap."""
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """What was diffused on one grid of the hierarchy.
+    """The diffused vectors on one grid of the hierarchy.
 
     Attributes
     ----------
-    vectors : (l₀, l₁, l₂, n, 4) float32, or None on a level that was left out
+    vectors : (l₀, l₁, l₂, n, 4) float32, or None on a level that was skipped
         X, within the band.
     inside : (l₀, l₁, l₂, stretches) bool, or None
-        Stretches whose values hold; elsewhere the coarser level's do.
+        Stretches of lines in which these values are valid; elsewhere those of the coarser level are.
     factors : (4,) int
-        What `coarsening` says of the next coarser grid.
+        Cells of this grid per cell of the next coarser one: see `coarsening`.
     """
 
     vectors: NDArray[np.float32] | None
@@ -62,14 +64,14 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class CoarseGuess:
-    """Values that a finer level found.
+    """Known values on a level, taken from a finer one.
 
     Attributes
     ----------
     vectors : (l₀, l₁, l₂, n, 4) float32
         X.
     where : (l₀, l₁, l₂, stretches) bool
-        Stretches that need no sweeping.
+        Stretches in which X is known and not swept.
     """
 
     vectors: NDArray[np.float32]
@@ -79,7 +81,7 @@ class CoarseGuess:
 def diffuse_multilevel(
     sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = ROUNDS
 ) -> list[Level]:
-    """Solve ``(1 − tΔ) X = B`` on every level, from `finest` (0: the grid of the sources) to the coarsest.
+    """Solve ``(1 − tΔ) X = B``, Eq. 12 on a grid, on every level from `finest` (0: the sources' grid) to the coarsest.
 
     Parameters
     ----------
@@ -88,9 +90,14 @@ def diffuse_multilevel(
     time : callable
         Diffusion time t on a grid of a given mean spacing.
     finest : int
-        Levels to leave out, where a coarser answer will do.
+        Number of levels to skip, where a coarser solution suffices.
     rounds : int
-        How often each combination of directions is swept within a band.
+        How often each combination of sweep directions is used within a band.
+
+    Returns
+    -------
+    list of Level
+        One for each grid of the hierarchy, finest first.
     """
     levels: list[Level] = []
     known = None
@@ -113,9 +120,10 @@ def diffuse_multilevel(
 
 
 def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(4,) cells per cell of the next coarser grid: 2 along its finest axes, more than an axis has to make it one node.
+    """(4,) cells of a grid per cell of the next coarser one: 2 along its finest axes, 1 along the others.
 
-    An axis is made one node where it has few and its whole length is below the spacing along the others.
+    An axis with few nodes whose whole length is below the spacing along the others is reduced to one node; its factor
+    is then the number of its nodes or more.
 
     Examples
     --------
@@ -136,7 +144,7 @@ def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np
 def skip_finest(
     shape: tuple[int, ...], steps: NDArray[np.float64], finest: int
 ) -> tuple[list[Level], tuple[int, ...], NDArray[np.float64]]:
-    """The first levels of the hierarchy, with nothing in them; shape and spacing of the coarser grid that follows."""
+    """The first `finest` levels of the hierarchy, empty; and shape and spacing of the grid that follows."""
     levels: list[Level] = []
     while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
         levels.append(Level(None, None, factors))
@@ -176,12 +184,12 @@ def _mean_step(steps: NDArray[np.float64]) -> float:
 
 
 def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """The mask grown by a box of this half width, in nodes."""
+    """The mask dilated by a box of this half width, in nodes."""
     grown = mask
     for axis, n in enumerate(mask.shape):
         wanted = min(n - 1, int(width[axis]) if axis < 3 else -(-int(width[3]) // STRETCH))
         reach = 0
-        while reach < wanted:  # what has grown by r on either side may be shifted by r + 1 and leaves no gap
+        while reach < wanted:  # a mask dilated by r on either side can be shifted by up to r + 1 without leaving a gap
             shift = min(reach + 1, wanted - reach)
             ahead, behind = (
                 (slice(None),) * axis + (slice(shift, None),),
@@ -202,7 +210,7 @@ def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[
 
 
 def _carried(level: Level, shape: tuple[int, ...], power: float) -> CoarseGuess | None:
-    """What a level found, for the next coarser one: in stretches of which it knows every node."""
+    """The values of a level, for the next coarser one: in stretches of which all nodes are known."""
     vectors = np.zeros((*shape, 4), dtype=np.float32)
     counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
     _carry(level.vectors, level.inside, level.factors, np.float32(power), vectors, counts)
@@ -215,9 +223,9 @@ def _carried(level: Level, shape: tuple[int, ...], power: float) -> CoarseGuess 
 def collapse(
     levels: list[Level], shape: tuple[int, ...], components: int, extract: Callable[..., None]
 ) -> NDArray[np.float32]:
-    """(components, *shape) what `extract` makes of X at each node, from the finest level that knows it.
+    """(components, *shape) a function of X at each node, evaluated on the finest level whose values are valid there.
 
-    `extract(vectors, inside, out, axis, start, stop)` fills `out` where `inside`.
+    The kernel ``extract(vectors, inside, out, axis, start, stop)`` fills `out` where `inside` is true.
     """
     shapes = [tuple(shape)]
     for level in levels[:-1]:
@@ -239,7 +247,7 @@ def collapse(
 
 @compiled(nogil=True)
 def _carry(vectors, inside, factors, power, coarse, counts):
-    """Vectors at the nodes that both grids share, with their lengths raised to a power; how many in each stretch."""
+    """Copy vectors to the nodes of both grids, lengths raised to a power; count the known nodes of each stretch."""
     n0, n1, n2, n3 = vectors.shape[:4]
     for i in range(0, n0, 2 if factors[0] == 2 else 1):
         for j in range(0, n1, 2 if factors[1] == 2 else 1):
@@ -261,7 +269,7 @@ def _carry(vectors, inside, factors, power, coarse, counts):
 
 @compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
 def _interpolate(coarse, factors, out, axis, start, stop):
-    """Values of a coarser grid at all nodes, linear along every axis that was halved."""
+    """Interpolate the values of a coarser grid to all nodes, linearly along every axis that was coarsened."""
     _, n0, n1, n2, n = out.shape
     row = np.empty(coarse.shape[4], dtype=np.float32)
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):

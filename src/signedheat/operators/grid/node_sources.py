@@ -1,4 +1,4 @@
-"""Vectors that act at nodes of a grid, held in the few stretches of its lines in which they are not zero."""
+"""Source vectors at the nodes of a grid, stored sparsely, in the stretches of grid lines in which they are not zero."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...compiled import compiled
 
 STRETCH = 8
-"""Nodes of a line that are stored, swept, or left out, together."""
+"""Number of consecutive nodes of a line that are stored, swept, or skipped together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class NodeSources:
         return cls(result.places, _scatter(nodes, weights, four, lines, result.sums, shape[3]), shape, steps)
 
     def restricted(self, factors: NDArray[np.int64], shape: tuple[int, ...], steps: NDArray[np.float64]) -> NodeSources:
-        """The same on a coarser grid, by the transpose of linear interpolation."""
+        """The sources on a coarser grid, by the transpose of linear interpolation."""
         coarse = NodeSources.empty(shape, steps)
         sums = _restrict(self.places, self.sums, np.array(self.shape), factors, coarse.places, coarse.sums)
         return NodeSources(coarse.places, sums, shape, steps)
@@ -66,7 +66,7 @@ class NodeSources:
 
 @compiled(nogil=True)
 def with_room(sums, used, more):
-    """Rows enough for `more` beyond those that are used."""
+    """`sums`, or a longer copy of it, with room for `more` rows beyond the `used` ones."""
     if used + more <= sums.shape[0]:
         return sums
     grown = np.zeros((2 * sums.shape[0] + more, STRETCH, 4), dtype=np.float32)

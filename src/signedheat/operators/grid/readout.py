@@ -1,4 +1,4 @@
-"""Kernels: what is made of diffused vectors, node by node. A common factor of a node's components is of no matter."""
+"""Kernels: functions of the diffused vectors at each node. None depends on a common factor of a node's components."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .sweeps import TINY
 
 @compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
 def unit_vectors(vectors, inside, out, axis, start, stop):
-    """The vectors scaled to length one, where they are not lost beneath the range of numbers."""
+    """The vectors scaled to length one; where they have underflowed, `out` keeps the values of a coarser level."""
     dimension, n0, n1, n2, n = out.shape
     stretches = inside.shape[3]
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
@@ -36,7 +36,7 @@ def unit_vectors(vectors, inside, out, axis, start, stop):
 
 @compiled(nogil=True)
 def quotients(vectors, inside, out, axis, start, stop):
-    """Second component over first."""
+    """The second component divided by the first; `out` keeps its values where the first has underflowed."""
     _, n0, n1, n2, n = out.shape
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
         for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):

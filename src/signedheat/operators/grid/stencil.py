@@ -1,7 +1,6 @@
-"""The regular grid's Laplacian, matrix free: divergence of node vectors, and the inverse by cosine transforms.
+"""Laplacian of a regular grid, matrix free: divergence of node vectors, and the inverse by cosine transforms.
 
-Everything is second order, for any dimension. Axes of one node stand in front of a grid of less than four dimensions
-where kernels want four.
+Everything is second order, in any dimension. For kernels on four axes, axes of one node are put in front of the others.
 """
 
 from __future__ import annotations
@@ -18,11 +17,11 @@ from ...parallel import n_threads
 from .wavefront import SMALL, padded_shape
 
 SLAB = 16
-"""Rows of lines that one job works on."""
+"""Rows of grid lines in one job of a thread."""
 
 
 def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(*shape) −∇·Y, each face between two nodes taking the mean of theirs, and the walls nothing.
+    """(*shape) −∇·Y, which is b of Eq. 13. The flux between two nodes is the mean of theirs, that through walls zero.
 
     Examples
     --------
@@ -38,7 +37,7 @@ def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -
 
 
 def laplacian(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
-    """C φ: the positive semidefinite Laplacian with no flux through the walls."""
+    """C φ, Eq. 10 on a grid: the positive semidefinite Laplacian of 2d + 1 points, with no flux through the walls."""
     result = np.zeros_like(values)
     for axis, h in enumerate(spacing):
         rise = np.diff(values, axis=axis) / h**2
@@ -52,7 +51,7 @@ def laplacian(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDAr
 def solve_poisson(
     right_hand_side: NDArray[np.float64], spacing: NDArray[np.float64], overwrite: bool = False
 ) -> NDArray[np.float64]:
-    """φ of mean zero with C φ = b, by the cosine transform that diagonalises C.
+    """φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform that diagonalises C.
 
     Examples
     --------
@@ -78,7 +77,7 @@ def solve_poisson(
 def interpolation_stencil(
     positions: NDArray[np.float64], shape: tuple[int, ...]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """(s, 2^d) nodes and weights that interpolate linearly at positions given in cells, along axes of several nodes."""
+    """(s, 2^k) nodes and weights of multilinear interpolation at positions in cells; k axes have more than one node."""
     cell = np.minimum(positions.astype(np.int64), np.array(shape) - 2)
     part = positions - cell
     nodes = np.zeros((len(positions), 1), dtype=np.int64)
@@ -108,7 +107,7 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
 
 @compiled(nogil=True, error_model="numpy")
 def _divide(values0, values1, values2, values3, transformed, axis, start, stop):
-    """Divide by sums of one-dimensional eigenvalues; where they are zero the quotient is."""
+    """Divide by the eigenvalues of C, sums of one-dimensional ones; the quotient is zero where they are zero."""
     n0, n1, n2, n = transformed.shape
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
         for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):

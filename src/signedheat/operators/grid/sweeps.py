@@ -1,8 +1,8 @@
-"""Diffusion on a grid by Gauss–Seidel sweeps of lines: ``(1 − tΔ) X = B``, right in direction however small X becomes.
+"""Diffusion on a grid by line Gauss–Seidel sweeps: ``(1 − tΔ) X = B``, with directions right however small X becomes.
 
-The matrix has no positive off-diagonal entry, so neither the elimination within a line nor the sweeps ever subtract:
-X decays over many decades and keeps its relative accuracy. Lines along the last axis are solved exactly; along all
-other axes lines are updated in order, in every combination of directions.
+The matrix has no positive off-diagonal entry, so neither the elimination within a line nor the sweeps subtract: X
+decays over many decades and keeps its relative accuracy. Lines along the last axis are solved exactly; along all other
+axes lines are updated in order, in every combination of directions.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .node_sources import STRETCH, NodeSources
 from .wavefront import sweep_lines
 
 TINY = np.float32(1e-34)
-"""Where nothing greater arrives, a coarser level knows better."""
+"""Values below this are treated as unknown, and taken from a coarser level."""
 
 
 def diffuse_by_sweeps(
@@ -25,7 +25,7 @@ def diffuse_by_sweeps(
     rounds: int,
     given: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j`` with no flux through the walls.
+    """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, with no flux through the walls.
 
     Parameters
     ----------
@@ -36,14 +36,14 @@ def diffuse_by_sweeps(
     ratios : (4,) float
         a = t / h² along each axis.
     rounds : int
-        How often each combination of directions is swept.
+        How often each combination of sweep directions is used.
     given : (l₀, l₁, l₂, n, 4) float32, optional
         X in all other stretches, zero by default; overwritten.
 
     Returns
     -------
     (l₀, l₁, l₂, n, 4) float32
-        X; pages outside the active stretches are never touched.
+        X; memory outside the active stretches is never touched, so that it costs nothing.
     """
     shape = sources.shape
     vectors = np.zeros((*shape, 4), dtype=np.float32) if given is None else given
@@ -64,7 +64,7 @@ def diffuse_by_sweeps(
 
 
 def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(8, n) reciprocal pivots of the tridiagonal matrix of a line; bit k is set for lines at a wall of axis k."""
+    """(8, n) reciprocal pivots of the tridiagonal matrix of a line; row bit k is set for lines at a wall of axis k."""
     n = shape[3]
     along = np.full(n, 2.0)
     along[0] = along[-1] = 1.0
@@ -80,11 +80,11 @@ def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[
 
 @compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
 def _sweep_tiles(vectors, sums, places, active, shape, ratios, pivots, tiles):
-    """Update the lines of tiles in order: four components side by side. Parts of lines are sliced, for vector code."""
+    """Update the lines of tiles in order, four components at once. Slices of lines help the compiler to vectorise."""
     n0, n1, n2, n = shape
     ratio0, ratio1, ratio2, along = ratios
     scratch = np.empty(4 * n, dtype=np.float32)
-    none = np.zeros(4 * n, dtype=np.float32)  # beyond the walls
+    none = np.zeros(4 * n, dtype=np.float32)  # neighbours beyond the walls
     stretches = active.shape[1]
     for tile in tiles:
         for i in range(tile[0], tile[1], tile[2]):
@@ -103,7 +103,7 @@ def _sweep_tiles(vectors, sums, places, active, shape, ratios, pivots, tiles):
                         begin, end = first * STRETCH, min(stretch * STRETCH, n)
                         part = slice(4 * begin, 4 * end)
                         inflow, out, pivot = scratch[: 4 * (end - begin)], vectors[here, part], pivots[walls, begin:end]
-                        # what flows in from the lines around, the source, and the values that stay on the line
+                        # inflow from neighbouring lines, the source, and fixed values on the line itself
                         low = vectors[here - n2, part] if j > 0 else none[part]
                         high = vectors[here + n2, part] if j < n1 - 1 else none[part]
                         left = vectors[here - 1, part] if k > 0 else none[part]
@@ -122,7 +122,7 @@ def _sweep_tiles(vectors, sums, places, active, shape, ratios, pivots, tiles):
                                 for m in range(min(len(into), 4 * STRETCH)):
                                     into[m] += sums[row, m]
                         x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-                        if begin > 0:  # the neighbour was eliminated: its value is x + q · (value here)
+                        if begin > 0:  # the previous node has been eliminated: its value is x + q · (value here)
                             before = vectors[here, 4 * begin - 4 : 4 * begin]
                             q = along * pivots[walls, begin - 1]
                             x, y = before[0] - q * out[0], before[1] - q * out[1]
@@ -130,7 +130,7 @@ def _sweep_tiles(vectors, sums, places, active, shape, ratios, pivots, tiles):
                         if end < n:
                             for c in range(4):
                                 inflow[4 * (end - begin) - 4 + c] += along * vectors[here, 4 * end + c]
-                        # elimination and substitution
+                        # forward elimination and back substitution
                         for m in range(end - begin):
                             p = pivot[m]
                             q = along * p

@@ -1,7 +1,7 @@
-"""Lines of a grid updated in order, on several threads.
+"""Ordered updates of the lines of a grid, on several threads.
 
 Tiles of lines on one diagonal of a plane of lines do not depend on each other. Each line reads the same values as in
-plain order, so results do not depend on the number of threads.
+sequential order, so results do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import numpy as np
 from ...parallel import n_threads
 
 SMALL = 100_000
-"""Grids of fewer nodes are not worth a second thread."""
+"""Grids of fewer nodes are swept on one thread."""
 
 
 def padded_shape(shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """Shape with axes of one node in front, to make four."""
+    """The shape, preceded by axes of one node to make four."""
     return (1,) * (4 - len(shape)) + tuple(shape)
 
 
@@ -46,7 +46,7 @@ def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int
 
 
 def wavefronts(shape: tuple[int, ...], size: list[int], direction: tuple[int, ...]) -> list[list[list[int]]]:
-    """Tiles of a plane of lines, in groups that may run at the same time, one group after the other.
+    """Tiles of a plane of lines, in groups; the tiles of one group can run at the same time.
 
     Examples
     --------

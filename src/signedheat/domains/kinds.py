@@ -1,0 +1,49 @@
+"""The kinds of domains and of sources, as types: what a function takes is said by one of these names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias, TypeVar
+
+from .curves import CurveOrPoints
+from .digital_surface import DigitalSurface
+from .grid import Grid
+from .intrinsic_triangulation import IntrinsicTriangulation
+from .point_cloud import PointCloud
+from .polygon_mesh import PolygonMesh
+from .polyline import Polyline
+from .tet_mesh import TetMesh
+from .triangle_mesh import TriangleMesh
+
+Shape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh
+"""What a file of a shape may hold. In space points need normals, and volumes are refused: give their boundary."""
+
+EmbeddedSurface: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface
+"""Surfaces with positions in space, on which curves and points are given."""
+
+SurfaceDomain: TypeAlias = EmbeddedSurface | IntrinsicTriangulation
+"""What distance along a surface is measured on."""
+
+Domain: TypeAlias = SurfaceDomain | TetMesh | Grid[int]
+"""What distance is measured on."""
+
+AnySurface = TypeVar("AnySurface", bound=SurfaceDomain)
+"""A surface of one kind."""
+
+Shapes: TypeAlias = Shape | Sequence[Shape]
+"""One shape in space or several."""
+
+Polylines: TypeAlias = Polyline | Sequence[Polyline]
+"""One line in the plane or several."""
+
+SpaceSource: TypeAlias = Shape | Polyline
+"""What distance on grids is measured to."""
+
+SpaceSources: TypeAlias = SpaceSource | Sequence[SpaceSource]
+"""One of them or several."""
+
+Source: TypeAlias = SpaceSource | CurveOrPoints
+"""What distance is measured to, on any domain."""
+
+Sources: TypeAlias = Source | Sequence[Source | Sequence[CurveOrPoints]]
+"""One source or several."""

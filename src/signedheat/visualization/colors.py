@@ -1,0 +1,80 @@
+"""Colours and isolines of distance: blue inside, orange outside, one scale for both sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure
+
+INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]
+"""Deep to far: blue inside, light at the surface, orange outside."""
+TICKS = 7
+"""About how many numbers stand at a colour bar."""
+
+
+def distance_colors(low: float, high: float) -> ScalarMappable:
+    """Colours for distances between two values, light at zero.
+
+    Equal distances inside and outside are equally deep in colour. Colours go with the root of distance, so that a thin
+    inside still shows beside a wide outside.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import FuncNorm, LinearSegmentedColormap
+
+    reach = max(abs(low), abs(high), 1e-300)
+    norm = FuncNorm((signed_root, signed_square), -reach, reach)
+    return ScalarMappable(norm, LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE))
+
+
+def signed_root(values: Any) -> Any:
+    """√|x|, with the sign of x."""
+    return np.sign(values) * np.sqrt(np.abs(values))
+
+
+def signed_square(values: Any) -> Any:
+    """x², with the sign of x."""
+    return np.sign(values) * np.square(values)
+
+
+def isolines_between(low: float, high: float, most: int = 16) -> tuple[NDArray[np.float64], float]:
+    """Levels between two values, zero left out, about `most` of them; and the round step from one to the next.
+
+    Examples
+    --------
+    >>> levels, step = isolines_between(-0.25, 0.5, 8)
+    >>> levels.tolist(), step
+    ([-0.2, -0.1, 0.1, 0.2, 0.30000000000000004, 0.4, 0.5], 0.1)
+    """
+    step = round_step((high - low) / max(most, 1))
+    levels = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
+    return levels[np.abs(levels) > 0.5 * step], step
+
+
+def round_step(width: float) -> float:
+    """1, 2 or 5 times a power of ten, about as large as `width`."""
+    if not width > 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(width))
+    return float(power * min((1, 2, 5, 10), key=lambda digit: abs(np.log(width / power / digit))))
+
+
+def add_color_bar(
+    figure: Figure, axes: Sequence[Axes], colors: ScalarMappable, isolines: NDArray[np.float64], step: float
+) -> None:
+    """A colour bar that spans the isolines, with round numbers on both sides of zero."""
+    bar = figure.colorbar(colors, ax=list(axes), shrink=0.85, pad=0.015)
+    bar.set_label(f"signed distance, a line every {step:g}")
+    if len(isolines):
+        apart = round_step((isolines[-1] - isolines[0]) / TICKS)
+        ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
+        reach = float(colors.norm.vmax or 0.0)
+        bar.ax.set_ylim(max(min(isolines[0] - step, 0.0), -reach), min(max(isolines[-1] + step, 0.0), reach))
+        bar.set_ticks(np.union1d(ticks, [0.0]))
+        bar.ax.yaxis.set_major_formatter("{x:g}")

@@ -1,0 +1,119 @@
+"""A small rasteriser that needs no screen: triangles, with depth, face and value at each pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+
+SIZE = 900
+"""Pixels along the longer side."""
+MARGIN = 10
+"""Empty pixels at each side."""
+LIGHT = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
+"""From where light comes: right, up and towards the eye."""
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A parallel projection.
+
+    Attributes
+    ----------
+    frame : (3, 3) float
+        Right, up and towards the eye.
+    lower : (2,) float
+        Lower left corner of what is seen.
+    scale : float
+        Pixels per unit of length.
+    width, height : int
+        Pixels.
+    """
+
+    frame: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    scale: float
+    width: int
+    height: int
+
+    @classmethod
+    def around(cls, points: NDArray[np.float64], direction: NDArray[np.float64], up: int = 2) -> Camera:
+        """Look at points from a direction, axis `up` upwards, so that they fill the picture."""
+        frame = looking(direction, up)
+        seen = points @ frame[:2].T
+        lower, upper = seen.min(axis=0), seen.max(axis=0)
+        scale = (SIZE - 2 * MARGIN) / max(float((upper - lower).max()), 1e-300)
+        width, height = (np.ceil((upper - lower) * scale).astype(int) + 2 * MARGIN).tolist()
+        return cls(frame, lower, scale, width, height)
+
+    def pixels(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, 3) column, row and depth of points in space; larger depths are nearer."""
+        seen = points @ self.frame.T
+        return np.column_stack([(seen[:, :2] - self.lower) * self.scale + MARGIN, seen[:, 2] * self.scale])
+
+    def shades(self, area_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m,) brightness of faces, from 0.45 to 1; their sides look alike."""
+        normals = area_vectors @ self.frame.T
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        return 0.45 + 0.55 * np.abs(normals @ LIGHT)
+
+
+def looking(direction: NDArray[np.float64], up: int = 2) -> NDArray[np.float64]:
+    """(3, 3) right, up and towards the eye, for a direction to the eye.
+
+    Examples
+    --------
+    >>> looking(np.array([0.0, -1.0, 0.0])).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
+    """
+    towards = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
+    upwards = np.eye(3)[up] if abs(towards[up]) < 0.95 else np.eye(3)[up - 1]
+    right = np.cross(upwards, towards)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(towards, right), towards]) + 0.0
+
+
+def oblique(elevation: float, azimuth: float, up: int = 2) -> NDArray[np.float64]:
+    """Direction to an eye at angles in degrees, above the plane across axis `up` and around that axis."""
+    e, a = np.radians([elevation, azimuth])
+    return np.roll([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], up - 2)
+
+
+def rasterize(
+    corners: NDArray[np.float64], values: NDArray[np.float64], width: int, height: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Draw triangles (m, 3, 3), given in pixels and depth, with values (m, 3) at their corners.
+
+    Returns
+    -------
+    depth, face, value : (height, width)
+        Of the nearest triangle at each pixel; face −1 and value NaN where there is none.
+    """
+    depth = np.full((height, width), -np.inf)
+    face = np.full((height, width), -1, dtype=np.int64)
+    shown = np.full((height, width), np.nan)
+    _fill(corners, values, depth, face, shown)
+    return depth, face, shown
+
+
+@compiled
+def _fill(corners, values, depth, face, shown):
+    height, width = depth.shape
+    for f in range(len(corners)):
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[f]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if area == 0.0:
+            continue
+        for row in range(max(int(np.ceil(min(ay, by, cy))), 0), min(int(max(ay, by, cy)), height - 1) + 1):
+            for column in range(max(int(np.ceil(min(ax, bx, cx))), 0), min(int(max(ax, bx, cx)), width - 1) + 1):
+                u = ((column - ax) * (cy - ay) - (row - ay) * (cx - ax)) / area
+                v = ((bx - ax) * (row - ay) - (by - ay) * (column - ax)) / area
+                if u < 0.0 or v < 0.0 or u + v > 1.0:
+                    continue
+                z = az + u * (bz - az) + v * (cz - az)
+                if z > depth[row, column]:
+                    depth[row, column], face[row, column] = z, f
+                    shown[row, column] = (1 - u - v) * values[f, 0] + u * values[f, 1] + v * values[f, 2]

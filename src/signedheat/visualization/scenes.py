@@ -1,0 +1,67 @@
+"""Pictures of shapes: outsides light, insides red, so that holes and flipped faces show."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..io.files import PathLike, ensure_writable
+from .figures import PICTURE_FORMATS, new_figure, write_figure
+from .rasterizer import Camera, oblique, rasterize
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+OUTSIDE, INSIDE = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
+MOST_POINTS = 200_000
+"""Of larger clouds an even selection is drawn."""
+
+
+def save_scene(shape: TriangleMesh | PolygonMesh | PointCloud, path: PathLike, up: int = 2) -> None:
+    """A shape seen obliquely from above, axis `up` upwards.
+
+    Raises
+    ------
+    FileFormatError
+        If the picture cannot be written.
+    """
+    ensure_writable(path, PICTURE_FORMATS, "a picture")
+    figure = new_figure(7, 6)
+    draw_shape(shape, figure.add_subplot(), up=up)
+    write_figure(figure, path)
+
+
+def draw_shape(
+    shape: TriangleMesh | PolygonMesh | PointCloud, axes: Axes, view: tuple[float, float] = (18, -58), up: int = 2
+) -> None:
+    """Draw a shape into axes, seen from an elevation and an azimuth in degrees."""
+    direction = oblique(*view, up)
+    axes.set_axis_off()
+    if isinstance(shape, PointCloud):
+        points = shape.points[:: max(1, shape.n_points // MOST_POINTS)]
+        pixels = Camera.around(points, direction, up).pixels(points)
+        near = np.argsort(pixels[:, 2])
+        depth = pixels[near, 2]
+        axes.scatter(*pixels[near, :2].T, s=4, c=depth, cmap="Blues", vmin=depth[0] - np.ptp(depth), linewidths=0)
+        axes.set_aspect("equal")
+        return
+    mesh = triangulated(shape)
+    camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
+    corners = camera.pixels(mesh.vertices)[mesh.faces]
+    _, face, _ = rasterize(corners, np.zeros((mesh.n_faces, 3)), camera.width, camera.height)
+    outwards = mesh.face_area_vectors @ camera.frame[2] > 0
+    colors = np.where(outwards[:, None], OUTSIDE, INSIDE) * camera.shades(mesh.face_area_vectors)[:, None]
+    axes.imshow(np.where((face >= 0)[..., None], colors[face], 1.0), origin="lower", interpolation="antialiased")
+
+
+def triangulated(mesh: Any) -> TriangleMesh:
+    """Polygons as fans around their centroids, for drawing."""
+    if isinstance(mesh, TriangleMesh):
+        return mesh
+    center = mesh.n_vertices + mesh.corner_polygons
+    faces = np.stack([mesh.corners, mesh.next_corners, center], axis=1)
+    return TriangleMesh(np.concatenate([mesh.vertices, mesh.polygon_centroids]), faces)

@@ -1,0 +1,17 @@
+"""Settings that all tests share."""
+
+from __future__ import annotations
+
+import os
+
+from hypothesis import HealthCheck, settings
+
+settings.register_profile(
+    "suite",
+    max_examples=20,
+    deadline=None,
+    derandomize=True,  # the same cases every time; `HYPOTHESIS_PROFILE=search` looks for new ones
+    suppress_health_check=list(HealthCheck),
+)
+settings.register_profile("search", max_examples=500, deadline=None, suppress_health_check=list(HealthCheck))
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))

@@ -1,0 +1,42 @@
+"""One small run of everything that has kernels; its values, as one flat array for each.
+
+Run as a program, it writes them to the file that it is given.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+
+import signedheat as sh
+from signedheat import samples
+
+
+def runs() -> dict[str, np.ndarray]:
+    """Values by name."""
+    ball = samples.sphere(1)
+    broken = samples.without_faces(ball, 0.2, 0)
+    found = {}
+    grid = sh.signed_distance(broken, resolution=9)
+    found["grid"] = grid.values
+    found["sharpened grid"] = sh.sharpen(grid).values
+    curve = ball.polyline([[1.0, 0.1, 0.2], [0.0, 1.0, -0.1], [-1.0, 0.0, 0.3]])
+    surface = sh.SignedHeatSolver(ball).distance(curve)
+    found["surface"] = surface.values
+    found["sharpened surface"] = sh.sharpen(surface).values
+    found["refined"] = np.sort(sh.intrinsic_delaunay(ball, refine=True).triangles.edge_lengths, axis=None)
+    found["points"] = sh.SignedHeatSolver(sh.PointCloud(ball.vertices)).distance(ball.points_at(3)).values
+    tets = sh.tetrahedralize(broken, resolution=5)
+    field = sh.signed_distance(broken, tets)
+    found["tets"] = field.values
+    found["sharpened tets"] = sh.sharpen(field).values
+    walls = np.zeros((9, 9), dtype=bool)
+    walls[4, :6] = True
+    line = sh.Polyline([[0.5, 0.2], [0.2, 7.5]])
+    found["walls"] = sh.signed_distance(line, sh.Grid((0, 0), 1.0, (9, 9), walls)).values
+    return {name: np.asarray(values, dtype=np.float64).ravel() for name, values in found.items()}
+
+
+if __name__ == "__main__":
+    np.savez(sys.argv[1], **runs())

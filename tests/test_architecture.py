@@ -1,0 +1,103 @@
+"""The floors of the package: what may import what, how long a module may be, what importing it may cost."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import signedheat
+from import_graph import circles, import_graph, upward_imports
+
+PACKAGE = Path(signedheat.__file__).parent
+
+FLOORS = [
+    {"cache", "compiled", "diagnostics", "errors", "memory", "parallel", "progress", "slots"},
+    {"geometry"},
+    {"linear"},
+    {"operators"},
+    {"domains"},
+    {"discretization"},
+    {"lowering"},
+    {"constraints"},
+    {"method"},
+    {"fields"},
+    {"solver"},
+    {"extensions"},
+    {"io"},
+    {""},  # the package itself, which holds the public names
+    {"samples"},
+    {"visualization"},
+    {"cli"},
+]
+"""From the ground up: a module may import what is on its own floor or below. docs/architecture.md shows the same."""
+
+MOST_LINES = 400
+SLOW_TO_IMPORT = ("numba", "matplotlib", "trimesh", "meshio", "skimage", "svgpathtools", "nrrd")
+
+
+def test_no_circle_of_imports():
+    assert circles(import_graph(PACKAGE)) == []
+
+
+def test_imports_point_down():
+    assert upward_imports(import_graph(PACKAGE), FLOORS) == []
+
+
+def test_modules_are_short():
+    lines = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in PACKAGE.rglob("*.py")}
+    assert {str(path.relative_to(PACKAGE)): n for path, n in lines.items() if n > MOST_LINES} == {}
+
+
+def test_importing_the_package_leaves_slow_packages_alone():
+    code = f"import signedheat, sys; print(*sorted(set({SLOW_TO_IMPORT!r}) & set(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == []
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package whose modules are given by their text."""
+
+    def write(**modules: str) -> Path:
+        for name, text in {"__init__": "", **modules}.items():
+            path = tmp_path.joinpath("house", *name.split("__")) if name != "__init__" else tmp_path / "house/__init__"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            (path.parent / "__init__.py").touch()
+            path.with_suffix(".py").write_text(text)
+        return tmp_path / "house"
+
+    return write
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from ..roof import tile",
+        "from .. import roof",
+        "import house.roof",
+        "from house.roof import tile",
+        "from house import roof",
+        "def lazily():\n    from ..roof import tile",
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from ..roof import tile",
+    ],
+)
+def test_every_way_to_import_is_seen(package, line):
+    graph = import_graph(package(cellar__wine=line, roof="from .cellar.wine import bottle"))
+    assert graph["house.cellar.wine"] == {"house.roof"}
+    assert circles(graph) == [["house.cellar.wine", "house.roof"]]
+    assert upward_imports(graph, [{"cellar"}, {"roof", ""}]) == [("house.cellar.wine", "house.roof")]
+
+
+def test_what_is_in_order_passes(package):
+    graph = import_graph(package(cellar__wine="import numpy", cellar__beer="from .wine import x", roof="import house"))
+    assert graph["house.cellar.beer"] == {"house.cellar.wine"} and graph["house.cellar.wine"] == set()
+    assert circles(graph) == [] and upward_imports(graph, [{"cellar"}, {""}, {"roof"}]) == []
+
+
+def test_a_folder_without_a_floor_is_refused(package):
+    graph = import_graph(package(attic="from . import roof", roof=""))
+    with pytest.raises(LookupError, match=r"house\.attic"):
+        upward_imports(graph, [{""}, {"roof"}])

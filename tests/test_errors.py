@@ -1,0 +1,84 @@
+"""Errors say what is wrong, with what, and what to do: as attributes, so that no one has to read sentences."""
+
+from __future__ import annotations
+
+import ast
+import copy
+import pickle
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat.cli.computing import prefix_errors
+
+TRIANGLE = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+KINDS = [kind for kind in vars(sh).values() if isinstance(kind, type) and issubclass(kind, sh.SignedHeatError)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_parts_and_text(kind):
+    error = kind("point 3 is nowhere", remedy="move it", element="point 3")
+    assert (error.cause, error.remedy, error.element, error.path) == ("point 3 is nowhere", "move it", "point 3", None)
+    assert str(error) == "point 3 is nowhere: move it"
+    for same in (pickle.loads(pickle.dumps(error)), copy.copy(error)):
+        assert type(same) is kind and vars(same) == vars(error) and str(same) == str(error)
+    there = error.at(Path("a.ply"))
+    assert type(there) is kind and (there.path, there.remedy, there.element) == ("a.ply", "move it", "point 3")
+    assert str(there) == "a.ply: point 3 is nowhere: move it"
+
+
+@pytest.mark.parametrize(
+    "call, kind, element",
+    [
+        (lambda: sh.TriangleMesh([[0, 0, np.nan]], [[0, 0, 0]]), sh.GeometryError, "number 0"),
+        (lambda: sh.PointCloud([[0, 0, 0], [1, 0, 0]], normals=[[0, 0, 1], [0, 0, 0]]), sh.GeometryError, "point 1"),
+        (lambda: TRIANGLE.points_at(7), sh.SourceError, "vertex 7"),
+        (lambda: sh.SignedHeatSolver(TRIANGLE).distance([]), sh.SourceError, None),
+        (lambda: sh.SignedHeatSolver(TRIANGLE).distance(TRIANGLE.path([0, 1]), "free"), sh.UnsupportedTypeError, None),
+        (lambda: sh.SignedHeatSolver(TRIANGLE.path([0, 1])).discretization, sh.UnsupportedTypeError, None),
+        (lambda: sh.sharpen(np.zeros(3)), sh.UnsupportedTypeError, None),
+        (lambda: sh.shell(TRIANGLE, 0.0, 0.1, TRIANGLE), sh.UnsupportedTypeError, None),
+    ],
+)
+def test_cause_element_and_remedy(call, kind, element):
+    with pytest.raises(kind) as caught:
+        call()
+    assert caught.value.remedy and caught.value.element == element
+    assert str(caught.value) == f"{caught.value.cause}: {caught.value.remedy}"
+    assert element is None or element in caught.value.cause
+
+
+def test_errors_of_files_name_them(tmp_path):
+    for name, content in (("none.stl", None), ("empty.obj", ""), ("folder.unknown", "x")):
+        path = tmp_path / name
+        if content is not None:
+            path.write_text(content)
+        with pytest.raises(sh.FileFormatError) as caught:
+            sh.read(path)
+        assert caught.value.path == str(path) and caught.value.remedy and str(path) not in caught.value.cause
+
+
+def test_wrong_types_are_type_errors_too():
+    with pytest.raises(TypeError), prefix_errors("input.ply"):
+        raise sh.UnsupportedTypeError("no")
+    with pytest.raises(sh.SignedHeatError) as caught, prefix_errors("input.ply"):
+        raise sh.UnsupportedTypeError("no")
+    assert caught.value.path == "input.ply"
+
+
+def test_no_remedy_hides_in_a_cause():
+    """Where errors are raised, what to do is an argument of its own."""
+    names = {kind.__name__ for kind in KINDS}
+    verbs = r": (use|pass|give|choose|write|save|raise|lower|remove|check|convert|move|turn|orient|leave|make|try) "
+    found = []
+    for path in Path(sh.__file__).parent.rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names and node.args:
+                cause = ast.get_source_segment(text, node.args[0]) or ""
+                if re.search(verbs, cause) or cause.startswith('f"{path}: '):
+                    found.append(f"{path.name}:{node.lineno}")
+    assert found == []

@@ -1,0 +1,3 @@
+"""What is here to be checked, not run."""
+
+collect_ignore = ["user_code.py"]

@@ -1,0 +1,75 @@
+"""Pictures look as they did: compared, small, with stored ones (`STORE_PICTURES=1` stores them anew)."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples, visualization
+
+STORED = Path(__file__).parent / "pictures"
+CELL = 13
+"""Pixels averaged along each side, so that fonts and edges of other versions of matplotlib make no difference."""
+
+
+def slices(path):
+    grid = sh.Grid((-1.5, -1.2, -1.2), 0.1, (31, 25, 25))
+    values = np.maximum(np.linalg.norm(grid.points, axis=-1) - 1, 0.3 - np.linalg.norm(grid.points - 0.5, axis=-1))
+    visualization.save_slices(sh.GridField(grid, values), path, samples.sphere(2), levels=[0.2])
+
+
+def plane(path):
+    grid = sh.Grid((0, 0), 0.1, (41, 31))
+    line = sh.Polyline([[1, 1], [1, 2], [3, 2], [3, 1]], closed=True)
+    x, y = np.moveaxis(np.abs(grid.points - [2, 1.5]) - [1, 0.5], -1, 0)
+    visualization.save_slices(sh.GridField(grid, np.maximum(x, y)), path, [line])
+
+
+def broken_shape(path):
+    visualization.save_scene(
+        samples.with_flipped_faces(samples.without_patches(samples.torus(1.0, 0.4), 3, 0.4), 0.1), path
+    )
+
+
+def shape_with_y_upwards(path):
+    visualization.save_scene(samples.torus(1.0, 0.4), path, up=1)
+
+
+def points(path):
+    visualization.save_scene(samples.oriented_points(samples.torus(1.0, 0.4), 2000), path)
+
+
+def surface(path):
+    ball = samples.sphere(3)
+    curve = ball.polyline([[1.0, 0.0, 0.4], [0.0, -1.0, 0.5], [-1.0, 0.0, 0.4]])
+    field = sh.VertexField(ball, np.where(ball.vertices[:, 0] > 0.9, np.nan, ball.vertices[:, 2] - 0.4))
+    visualization.save_surface(field, path, [curve])
+
+
+@pytest.mark.parametrize("draw", [slices, plane, broken_shape, shape_with_y_upwards, points, surface])
+def test_pictures_look_as_stored(draw, tmp_path):
+    draw(tmp_path / "picture.png")
+    picture = matplotlib.image.imread(tmp_path / "picture.png")[..., :3]
+    rows, columns = (n - n % CELL for n in picture.shape[:2])
+    small = picture[:rows, :columns].reshape(rows // CELL, CELL, columns // CELL, CELL, 3).mean(axis=(1, 3))
+    stored = STORED / f"{draw.__name__}.png"
+    if os.environ.get("STORE_PICTURES"):
+        matplotlib.image.imsave(stored, small)
+    known = matplotlib.image.imread(stored)[..., :3]
+    assert known.shape == small.shape
+    assert np.abs(known - small).mean() < 0.01
+    assert (np.abs(known - small).max(axis=-1) > 0.15).mean() < 0.01
+
+
+def test_a_picture_of_something_else_is_told_apart():
+    known = [
+        matplotlib.image.imread(STORED / f"{name}.png")[..., :3] for name in ("broken_shape", "shape_with_y_upwards")
+    ]
+    n = min(len(k) for k in known)
+    m = min(k.shape[1] for k in known)
+    assert np.abs(known[0][:n, :m] - known[1][:n, :m]).mean() > 0.03
