@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
-.PHONY: demo test lint types clean
+.PHONY: demo test lint types coverage matrix dist clean
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -29,5 +29,21 @@ lint: $(VENV)/.installed-test
 types: $(VENV)/.installed-test
 	$(BIN)/python tools/check_types.py
 
+coverage: $(VENV)/.installed-test
+	$(BIN)/python -m coverage run -m pytest $(TESTS)
+	$(BIN)/python -m coverage report
+
+$(VENV)/.installed-matrix: $(VENV)/.installed
+	$(PIP) uv
+	touch $@
+
+matrix: $(VENV)/.installed-matrix  # ROWS="3.10-lowest 3.13-highest" runs these rows alone
+	$(BIN)/python .ci/matrix $(ROWS)
+
+dist: $(VENV)/.installed
+	rm -rf dist
+	$(BIN)/python -m hatchling build
+
 clean:
-	rm -rf $(VENV) demo
+	rm -rf $(VENV) .venv-matrix demo dist htmlcov .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find src tests benchmarks examples -name __pycache__ -prune -exec rm -rf {} +

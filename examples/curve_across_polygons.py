@@ -1,11 +1,11 @@
-"""Two dashed circles across the hexagons of a torus: how far round the tube every corner lies from them."""
+"""Two dashed circles across the hexagons of a torus: distance of every corner from them, around the tube."""
 
 from pathlib import Path
 
 import numpy as np
 
 import signedheat as sh
-from signedheat import surface_pictures
+from signedheat import visualization
 
 EXPECTED = (0.5 * np.pi, 0.08)
 """Distance from the equators to the top of the torus, a quarter of the way round a tube of radius 1."""
@@ -40,7 +40,7 @@ def main(folder: Path) -> float:
 
     phi = sh.SignedHeatSolver(mesh, diffusion=4).distance(dashes, sh.Free())
 
-    surface_pictures.save_surface(phi, folder / "curve_across_polygons.png", dashes)
+    visualization.save_surface(phi, folder / "curve_across_polygons.png", dashes)
     return float(phi.values[np.isclose(mesh.vertices[:, 2], 1.0)].mean())
 
 

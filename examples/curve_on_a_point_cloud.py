@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import surface_pictures
+from signedheat import visualization
 
 EXPECTED = (0.5 * np.pi - np.arcsin(0.4), 0.03)
 """Distance from the circle at height 0.4 to the north pole."""
@@ -27,7 +27,7 @@ def main(folder: Path) -> float:
 
     phi = sh.SignedHeatSolver(cloud).distance(curves, sh.Free())
 
-    surface_pictures.save_surface(phi, folder / "curve_on_a_point_cloud.png", curves)
+    visualization.save_surface(phi, folder / "curve_on_a_point_cloud.png", curves)
     return float(phi.values[np.argmax(points[:, 2])])
 
 

@@ -1,4 +1,4 @@
-"""Distance inside a tank with a baffle goes round the baffle; the tets need not follow the source.
+"""Distance inside a tank with a baffle, measured around the baffle; the tets need not conform to the source.
 
 The source is a broken sphere in one corner: a third of its faces are gone.
 """

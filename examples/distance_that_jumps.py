@@ -1,7 +1,7 @@
-"""Curves that bound nothing (Sec. 7.2, Figs. 12–14): distance is continuous but for a cut, which is kept short.
+"""Curves that bound no region (Sec. 7.2, Figs. 12–14): distance is continuous except across a short cut.
 
-Once round the tube of a torus; once round its hole; and on a sphere an equator whose halves are oriented against
-each other. The sources are yellow.
+A loop around the tube of a torus; one around its hole; and on a sphere an equator whose halves have opposite
+orientations. The sources are yellow.
 """
 
 from pathlib import Path

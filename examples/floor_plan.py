@@ -1,4 +1,4 @@
-"""A floor plan: how far every place is from the north wall of a hall, through doors and around their posts."""
+"""A floor plan: distance of every point from the north wall of a hall, through doors and around their posts."""
 
 from pathlib import Path
 

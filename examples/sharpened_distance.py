@@ -1,6 +1,6 @@
 """Sharpening (Sec. 7.3): the error of the heat method around a star, before and after, on flat triangles.
 
-Even a very long diffusion, which rounds the field off far from the curve, is mended: the zero set is all that counts.
+Sharpening also removes the error of a very long diffusion, since only the zero set of the field matters.
 """
 
 from pathlib import Path

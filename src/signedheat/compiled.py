@@ -1,20 +1,27 @@
-"""Kernels: loops compiled by Numba when they are first called, so that importing them costs nothing."""
+"""Kernels: functions that Numba compiles at their first call, so that importing them does not import Numba."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
+from pathlib import Path
 from threading import RLock
 from typing import Any, overload
+
+from .packages import lazy_module
+
+numba = lazy_module("numba", "compiled kernels")
+extending = lazy_module("numba.extending", "compiled kernels")
+types = lazy_module("numba.core.types", "compiled kernels")
 
 _LOCK = RLock()
 
 prange = range
-"""Iterations that may run at the same time, in kernels compiled with ``parallel=True``."""
+"""A range whose iterations may run in parallel, in kernels compiled with ``parallel=True``."""
 
 
 class Kernel:
-    """A function that Numba compiles at its first call; kept on disk afterwards. Kernels may call kernels.
+    """A function that Numba compiles at its first call, with a cache on disk. Kernels may call kernels.
 
     Examples
     --------
@@ -35,12 +42,13 @@ class Kernel:
 
     @cached_property
     def dispatcher(self) -> Callable[..., Any]:
-        """What Numba makes of the function; the function itself where ``NUMBA_DISABLE_JIT`` is set."""
+        """The compiled function; the function itself if ``NUMBA_DISABLE_JIT`` is set."""
         with _LOCK:
             compiler = _compiler()
             if "prange" in self.function.__globals__:
                 self.function.__globals__["prange"] = _parallel_range()
-            return compiler(cache=True, **self.options)(self.function)  # type: ignore[no-any-return]
+            kept = Path(self.function.__code__.co_filename).is_file()  # what was typed in has no place on disk
+            return compiler(cache=kept, **self.options)(self.function)  # type: ignore[no-any-return]
 
 
 @overload
@@ -55,17 +63,11 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def _compiler() -> Any:
-    """``numba.njit``, which from now on takes kernels in compiled code for what they are."""
-    import numba
-    from numba.core import types
-    from numba.extending import typeof_impl
-
-    if Kernel not in typeof_impl.registry:
-        typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.dispatcher))
+    """``numba.njit``, after registering `Kernel` with Numba so that compiled code can call kernels."""
+    if Kernel not in extending.typeof_impl.registry:
+        extending.typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.dispatcher))
     return numba.njit
 
 
 def _parallel_range() -> Any:
-    import numba
-
     return numba.prange

@@ -1,4 +1,4 @@
-"""Constraints on φ at the source (Sec. 7.1): values that say how the integration step changes."""
+"""Constraints on φ at the source (Sec. 7.1): values that determine how step 3 is solved."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from .errors import ConstraintError
 
 @runtime_checkable
 class Constraint(Protocol):
-    """Anything that can finish step 3."""
+    """The protocol of constraints: they finish step 3."""
 
     def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
-        """φ, from the divergence of Y."""
+        """φ at the unknowns, from b, the divergence of Y."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class ZeroSet:
     Parameters
     ----------
     hard : bool
-        Interpolate every point of the source. By default φ is zero, to rounding, where a curve passes vertices and
-        edges of a surface, but free at points inside faces, since several of them in one face would flatten φ there;
-        on grids and tets φ is pulled to zero along the source by a smooth correction, which is cheaper and, on broken
-        input, more accurate.
+        Impose φ = 0 at every sample of the source. By default, on surfaces φ is zero (up to rounding) where a curve
+        passes vertices and edges, but free at samples inside faces, since several of them in one face would force φ to
+        be constant there; on grids and tets φ is corrected to zero along the source by a smooth function or by springs,
+        which is cheaper and, on broken input, more accurate.
 
     Examples
     --------
@@ -81,13 +81,13 @@ class LevelValues:
     Parameters
     ----------
     values : sequence of float
-        One level for each source passed to the solver; or, where there are as many values as the sources have connected
-        components in all, one for each component (components of the first source first).
+        One level for each source passed to the solver; or one for each connected component of the sources, components
+        of the first source first.
 
     Raises
     ------
     ConstraintError
-        If a value is not finite; when solving, if their number fits neither.
+        If a value is not finite; when solving, if their number is neither that of the sources nor of the components.
 
     Examples
     --------
@@ -125,7 +125,7 @@ class Soft:
     Parameters
     ----------
     weight : float
-        λ, in 1/length: residuals at the source decay over a width of about 1/λ.
+        λ, in 1/length: φ differs from the free solution up to a distance of about 1/λ from the source.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What happened on the way to a field: one class for each kind of thing that there is to tell."""
+"""Diagnostics of the computation of a field: one class for each kind of note."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ AnyNote = TypeVar("AnyNote", bound="Note")
 
 @dataclass(frozen=True, eq=False)
 class Note:
-    """One thing to tell; its text says it in words."""
+    """A note on a computation; ``str(note)`` is its text."""
 
     def as_dict(self) -> dict[str, object]:
-        """The note's numbers by name, as JSON has them."""
+        """The values of the note by name, ready for JSON."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class SampledSource(Note):
-    """The source of a grid, merged in its cells: fractions of its area that play no part."""
+    """The source on a grid, merged in its cells: number of samples, fractions of the area outside and cancelled."""
 
     samples: int
     area_outside: float
@@ -39,7 +39,7 @@ class SampledSource(Note):
 
 @dataclass(frozen=True, eq=False)
 class OutsideMesh(Note):
-    """Sources that leave the tet mesh: which, and the fraction of the area of each that is left out."""
+    """Sources that leave the tet mesh: their indices, and the fraction of the area of each that is dropped."""
 
     sources_outside: NDArray[np.int64]
     area_left_out: NDArray[np.float64]
@@ -51,7 +51,7 @@ class OutsideMesh(Note):
 
 @dataclass(frozen=True, eq=False)
 class TetsTurned(Note):
-    """Tets that were given inside out."""
+    """Number of tets given with negative volume, which have been turned."""
 
     tets_turned: int
 
@@ -61,7 +61,7 @@ class TetsTurned(Note):
 
 @dataclass(frozen=True, eq=False)
 class EdgesLengthened(Note):
-    """Length added to every edge so that no triangle is flat."""
+    """Length that mollification has added to every edge, so that no triangle is flat."""
 
     added_to_edge_lengths: float
 
@@ -71,7 +71,7 @@ class EdgesLengthened(Note):
 
 @dataclass(frozen=True, eq=False)
 class LargeAngles(Note):
-    """Share of angles above 120°, where it matters: an intrinsic triangulation is then more accurate."""
+    """Fraction of angles above 120°, if it is 1 % or more: an intrinsic triangulation is then more accurate."""
 
     large_angles: float
 
@@ -81,7 +81,7 @@ class LargeAngles(Note):
 
 @dataclass(frozen=True, eq=False)
 class VerticesAdded(Note):
-    """Vertices that were added so that sources run along edges."""
+    """Number of vertices added so that sources run along edges."""
 
     vertices_added: int
 
@@ -91,7 +91,7 @@ class VerticesAdded(Note):
 
 @dataclass(frozen=True, eq=False)
 class IntrinsicTriangles(Note):
-    """The intrinsic triangulation that was measured on: what its angles have reached."""
+    """The intrinsic triangulation on which distance was computed: summary of its angles."""
 
     intrinsic_triangulation: str
 
@@ -101,7 +101,7 @@ class IntrinsicTriangles(Note):
 
 @dataclass(frozen=True, eq=False)
 class PointsLeftOut(Note):
-    """Points of a cloud that stand at the same place as others, and those that no triangle could be made of."""
+    """Points of a cloud that coincide with earlier ones, and points without a triangle."""
 
     duplicate_points: int
     points_without_triangles: NDArray[np.int64]
@@ -123,7 +123,7 @@ class SlopeErrors(Note):
 
 @dataclass(frozen=True, eq=False)
 class GeodesicWindows(Note):
-    """Windows that straight lines across faces were propagated in."""
+    """Number of windows in the exact polyhedral distance."""
 
     windows: int
 
@@ -133,7 +133,7 @@ class GeodesicWindows(Note):
 
 @dataclass(frozen=True, eq=False)
 class RoundCorners(Note):
-    """Vertices whose straight line to the zero set bends round walls of the mesh."""
+    """Number of vertices whose path to the zero set bends around the boundary of the mesh."""
 
     round_corners: int
 
@@ -143,7 +143,7 @@ class RoundCorners(Note):
 
 @dataclass(frozen=True, eq=False)
 class ConvexRounds(Note):
-    """How the convex method of sharpening ended."""
+    """Number of iterations and final residual of the convex method of sharpening."""
 
     rounds: int
     residual: float
@@ -154,18 +154,18 @@ class ConvexRounds(Note):
 
 @dataclass(frozen=True, eq=False)
 class Jumps(Note):
-    """How a piecewise distance was found, and what its jumps are.
+    """Objective of a piecewise distance with its lower bound, and the size of its jumps.
 
     Attributes
     ----------
     objective, bound, gap : float
-        What was minimised, what none is smaller than, and the relative difference of the two.
+        The objective of Eq. 16, a lower bound of it, and the relative difference of the two.
     rounds : int
-        Rounds that it took.
+        Number of iterations.
     continuous : bool
         Whether there is no cut.
     largest_jump, cut_length : float
-        Of all jumps the largest, and the length of all cuts.
+        The largest jump, and the total length of all cuts.
     integration_error : float
         Root mean square of ∇φ̄ − Y, φ̄ being φ averaged at the vertices of `PiecewiseField.split`.
     """
@@ -186,7 +186,7 @@ class Jumps(Note):
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """What happened on the way to a field.
+    """Timings, diffusion time, and notes on the computation of a field.
 
     Attributes
     ----------
@@ -195,9 +195,9 @@ class Diagnostics:
     time : float
         Diffusion time t, in squared units of length.
     unreached : (k,) int
-        Unknowns to which no source is connected; φ is NaN there.
+        Unknowns that are connected to no source; φ is NaN there.
     notes : tuple of Note
-        Residuals, what was repaired, subdivided or left out; `note` finds one by its type.
+        Residuals, repairs, subdivisions, dropped parts of sources; `note` finds one by its type.
 
     Examples
     --------
@@ -214,10 +214,10 @@ class Diagnostics:
     notes: tuple[Note, ...] = ()
 
     def note(self, kind: type[AnyNote]) -> AnyNote | None:
-        """The note of a kind, if there is one."""
+        """The note of a given type, or None."""
         return next((note for note in self.notes if isinstance(note, kind)), None)
 
     def noting(self, *notes: Note) -> Diagnostics:
-        """The same with further notes, each in place of an older one of its kind."""
+        """The same with further notes, each replacing an older one of the same type."""
         kinds = {type(note) for note in notes}
         return replace(self, notes=(*(note for note in self.notes if type(note) not in kinds), *notes))

@@ -1,7 +1,7 @@
-"""What the method needs to know of a domain, and how a domain comes to say it.
+"""The protocols between domains and the method.
 
-Every domain lowers to a `Discretization` through `discretize`, a function that dispatches on the domain's type.
-The method (`method.py`) runs once, on discretisations, and never learns what the domain was.
+Every domain lowers to a `Discretization` by `discretize`, a function that dispatches on the type of the domain. The
+method (`method.py`) is written once, for discretisations, and does not depend on any domain.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ class SourceTerm(Protocol):
 
     @property
     def source_ids(self) -> NDArray[np.int64]:
-        """(s,) which of the sources that were passed in each sample comes from, from 0."""
+        """(s,) index of the source, among those passed to the solver, that each sample lies on."""
 
 
 class Integration(Protocol):
-    """Step 3 on one discretisation: C, and the ways to constrain it.
+    """Step 3 on one discretisation: solves ``C φ = b`` with and without constraints.
 
-    Without given levels, φ is known up to a constant on each connected part of the domain; what comes back has a
-    weighted mean of zero over the source samples of each part. A part without samples is NaN.
+    Without absolute levels φ is determined up to a constant on each connected component of the domain; the φ returned
+    has a weighted mean of zero over the source samples of each component. Components without samples are NaN.
     """
 
     def solve(self, divergence: Any, source: Any) -> NDArray[np.float64]:
@@ -69,24 +69,27 @@ class Integration(Protocol):
 
 
 class Adaptable(Protocol):
-    """What becomes a discretisation when the sources are known."""
+    """What becomes a discretisation once the sources are known."""
 
     def adapt(self, sources: Sequence[Any]) -> tuple[Discretization, Sequence[Any]]:
-        """A discretisation that can hold these sources, and the sources as it knows them: most often itself and they.
+        """A discretisation that can represent these sources, and the sources on it: usually ``(self, sources)``.
 
-        Isolated points and unoriented curves inside faces need edges and vertices of their own.
+        Unoriented curves inside faces of a surface, for instance, need edges of their own.
         """
 
 
 class Discretization(Adaptable, Protocol):
-    """A domain, as the three steps see it. Source terms that it is given are those that it has made itself."""
+    """A domain as the method needs it: what each of the three steps does on it.
+
+    The source terms that it is given are those that its own `lower` has made.
+    """
 
     @property
     def integration(self) -> Integration:
         """Step 3."""
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> SourceTerm:
-        """Bring sources into this discretisation."""
+        """Lower sources to this discretisation; `diffusion` is τ in ``t = τ h²``."""
 
     def diffuse(self, source: Any) -> Any:
         """Solve ``(M + tL) X = X₀`` (Eq. 12); directions stay right however small X becomes."""
@@ -121,14 +124,14 @@ class SolvesEach:
 
 @dataclass(frozen=True)
 class Levels:
-    """What a constraint says of φ at the source samples.
+    """The levels that a constraint imposes on φ at the source samples.
 
     Attributes
     ----------
     values : (s,) float
-        Level of each sample: absolute, or up to its group's unknown constant where there are groups.
+        Level of each sample; absolute, or, with groups, up to an unknown constant per group.
     groups : (s,) int, optional
-        Samples of one group share one unknown constant.
+        Group of each sample.
     """
 
     values: NDArray[np.float64]
@@ -137,7 +140,7 @@ class Levels:
 
 @singledispatch
 def discretize(domain: Any, **options: Any) -> Discretization:
-    """Lower a domain to its discretisation; each kind of domain registers its own way."""
+    """Lower a domain to its discretisation; every kind of domain registers a function of its own."""
     raise UnsupportedTypeError(
         f"{type(domain).__name__} is not a domain",
         remedy="use TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid",

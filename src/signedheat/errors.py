@@ -1,4 +1,4 @@
-"""Exceptions and warnings. Every message names the cause, the element and the remedy."""
+"""Exceptions and warnings. Every message names the cause, the element concerned and the remedy."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ AnyError = TypeVar("AnyError", bound=SignedHeatError)
 
 
 class GeometryError(SignedHeatError):
-    """A shape or domain that is not one: no elements, NaN coordinates, ids out of range, no area at all."""
+    """An invalid shape or domain: no elements, NaN coordinates, ids out of range, zero area."""
 
 
 class SourceError(SignedHeatError):
@@ -67,31 +67,35 @@ class ConstraintError(SignedHeatError):
 
 
 class OutsideError(SignedHeatError):
-    """A level or a point that leaves the domain on which the field is known."""
+    """A level or a point outside the range or the domain of a field."""
 
 
 class MemoryLimitError(SignedHeatError):
-    """A problem that cannot fit in memory, refused before anything is allocated."""
+    """A problem that does not fit in memory, refused before anything is allocated."""
 
 
 class FactorizationError(SignedHeatError):
-    """A matrix that cannot be factorised: not positive definite, or too large for the memory."""
+    """A matrix that cannot be factorised: not positive definite, or its factor does not fit in memory."""
 
 
 class FileFormatError(SignedHeatError):
-    """A file that cannot be read or written: missing, truncated, of unknown kind, unwritable."""
+    """A file that cannot be read or written: missing, truncated, of unknown format, not writable."""
 
 
 class UnsupportedTypeError(SignedHeatError, TypeError):
     """An argument of a type that is not known here: no domain, no constraint, no field."""
 
 
+class MissingPackageError(SignedHeatError, ImportError):
+    """A package that only some formats or functions need, and that is not installed."""
+
+
 class UnreachedWarning(UserWarning):
-    """Parts of the domain hold no source; their distance is NaN."""
+    """A connected component of the domain has no source; the distance there is NaN."""
 
 
 def warn_user(message: str, category: type[Warning]) -> None:
-    """Warn at the line of the caller that called this package, however deep within it the reason was found."""
+    """Issue a warning attributed to the line of user code that called this package."""
     package = __name__.partition(".")[0]
     depth, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:

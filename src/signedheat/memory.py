@@ -1,4 +1,4 @@
-"""How much memory there is to use: what is free, what limits allow, what this process holds already."""
+"""Available memory: free memory of the machine, and what limits leave to this process."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ LIMITS = (
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
-"""Files that hold the limit of a container and what it uses of it, for the second and the first version of cgroups."""
+"""Files with the memory limit of a container and its present use, for version 2 and version 1 of cgroups."""
 
 
 def available_memory() -> int | None:
-    """Bytes that this process may still take; nothing where the system does not tell.
+    """Bytes that this process can still allocate; None if the system does not tell.
 
     The least of what is free in the machine, what its container leaves (cgroups), and what its own limit on address
     space leaves (``ulimit -v``).

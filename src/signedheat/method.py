@@ -1,4 +1,4 @@
-"""The signed heat method (Feng & Crane, ACM TOG 43(4) 92, 2024), once, for every domain.
+"""The signed heat method (Feng & Crane, ACM TOG 43(4) 92, 2024), written once for all domains.
 
 Diffuse the source normals for a short time; normalise; integrate.
 """

@@ -1,4 +1,4 @@
-"""Threads: how many there are to use, and work that runs on one while another attends to it."""
+"""Threads: their number, and jobs that run on a thread of their own so that they can be cancelled."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from threading import Thread
 from typing import Any
 
 INTERVAL = 0.1
-"""Seconds between two reports."""
+"""Seconds between two progress reports."""
 
 
 def n_threads() -> int:
-    """Processors this process may run on, or fewer where ``NUMBA_NUM_THREADS`` says so."""
+    """Number of processors that this process may use, limited by ``NUMBA_NUM_THREADS``."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
     wanted = os.environ.get("NUMBA_NUM_THREADS", "")
     return min(available, int(wanted)) if wanted.isdigit() and int(wanted) > 0 else available
 
 
 def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
-    """What a job returns. It runs on a thread of its own, and `report` is called until it has ended.
+    """Run a job on a thread of its own, calling `report` every `INTERVAL` until it ends; returns the job's result.
 
-    What `report` raises is raised at once, and what the job does from then on is lost.
+    An exception that `report` raises is raised at once; the job then runs to its end, and its result is discarded.
 
     Examples
     --------
@@ -44,6 +44,6 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
         try:
             return future.result(INTERVAL)
         except TimeoutError:
-            if future.done():  # the job's own
+            if future.done():  # the timeout is the job's own
                 raise
             report()

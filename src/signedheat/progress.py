@@ -1,4 +1,4 @@
-"""How long steps take, and how far they are."""
+"""Timing, logging and progress of the steps of a computation."""
 
 from __future__ import annotations
 

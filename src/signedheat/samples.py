@@ -1,6 +1,6 @@
-"""Shapes to try things on: a few closed ones, ways to break them, and the broken duck of `signedheat demo`.
+"""Sample shapes: a few closed ones, functions that damage them, and the broken duck of `signedheat demo`.
 
-Everything is generated, from fixed seeds.
+All are generated, from fixed seeds.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .fields.grid_field import GridField
 
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:
-    """An icosahedron, each face split in four `subdivisions` times, its vertices on a sphere.
+    """A sphere: an icosahedron whose faces are split into four `subdivisions` times.
 
     Examples
     --------
@@ -69,12 +69,12 @@ def torus(major: float = 1.0, minor: float = 0.4, n_around: int = 96, n_across: 
 
 
 def duck(n: int = 56) -> TriangleMesh:
-    """A rubber duck, closed, about 2 long: its beak is a body of its own, stuck into the head as modellers do.
+    """A rubber duck of length 2, closed. Its beak is a separate body that intersects the head, as modellers do it.
 
     Parameters
     ----------
     n : int
-        Cells along the length from which the body is contoured.
+        Number of grid cells along its length from which the body is contoured.
     """
     lower, upper = np.array([-1.15, -0.8, -0.75]), np.array([1.0, 0.8, 1.15])
     spacing = 2.15 / n
@@ -97,21 +97,21 @@ def duck(n: int = 56) -> TriangleMesh:
 
 
 def broken_duck() -> TriangleMesh:
-    """The duck as no one wants it: holes, noise, flipped and duplicate faces, and the beak's end inside the head."""
+    """The duck with holes, noise, flipped and duplicate faces; the end of its beak is inside the head."""
     mesh = without_patches(duck(), n_patches=7, radius=0.26, seed=3)
     mesh = with_noise(mesh, 0.006, seed=1)
     return with_duplicate_faces(with_flipped_faces(mesh, 0.05, seed=2), 0.02, seed=5)
 
 
 def union(*meshes: TriangleMesh) -> TriangleMesh:
-    """All faces of some meshes; nothing is merged."""
+    """One mesh with all faces of several; no vertices are merged."""
     starts = np.cumsum([0] + [mesh.n_vertices for mesh in meshes])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int = 0) -> TriangleMesh:
-    """Without the faces within `radius` of some vertices picked far from each other."""
+    """The mesh without the faces within `radius` of some vertices, which are chosen far from each other."""
     picked = [int(np.random.default_rng(seed).integers(mesh.n_vertices))]
     nearest = np.linalg.norm(mesh.vertices - mesh.vertices[picked[0]], axis=1)
     while len(picked) < n_patches:
@@ -123,37 +123,37 @@ def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int
 
 
 def without_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """Without a random fraction of the faces."""
+    """The mesh without a random fraction of its faces."""
     return TriangleMesh(mesh.vertices, mesh.faces[np.random.default_rng(seed).random(mesh.n_faces) >= fraction])
 
 
 def with_noise(mesh: TriangleMesh, amplitude: float, seed: int = 0) -> TriangleMesh:
-    """With vertices moved at random; `amplitude` is the standard deviation along each axis."""
+    """The mesh with vertices moved at random; `amplitude` is the standard deviation along each axis."""
     moves = np.random.default_rng(seed).normal(scale=amplitude, size=mesh.vertices.shape)
     return TriangleMesh(mesh.vertices + moves, mesh.faces)
 
 
 def with_flipped_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """With a random fraction of the faces turned inside out."""
+    """The mesh with the orientation of a random fraction of its faces reversed."""
     flipped = np.random.default_rng(seed).random(mesh.n_faces) < fraction
     return TriangleMesh(mesh.vertices, np.where(flipped[:, None], mesh.faces[:, ::-1], mesh.faces))
 
 
 def with_duplicate_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """With a random fraction of the faces there twice."""
+    """The mesh with a random fraction of its faces duplicated."""
     doubled = np.random.default_rng(seed).random(mesh.n_faces) < fraction
     return TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[doubled]]))
 
 
 def soup(mesh: TriangleMesh, jitter: float = 0.0, seed: int = 0) -> TriangleMesh:
-    """Every face on its own three vertices, each face moved at random by about `jitter`."""
+    """The faces of the mesh as a triangle soup: each has three vertices of its own, and is moved by about `jitter`."""
     corners = mesh.vertices[mesh.faces]
     corners = corners + np.random.default_rng(seed).normal(scale=jitter or 0.0, size=(mesh.n_faces, 1, 3))
     return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
 
 
 def oriented_points(mesh: TriangleMesh, n_points: int, seed: int = 0) -> PointCloud:
-    """Points at random places of the surface, evenly by area, with the normals of their faces."""
+    """Random points on the surface, uniform in area, with the normals of their faces."""
     rng = np.random.default_rng(seed)
     face = rng.choice(mesh.n_faces, size=n_points, p=mesh.face_areas / mesh.face_areas.sum())
     weights = _barycentric(rng, n_points)

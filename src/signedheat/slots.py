@@ -1,4 +1,4 @@
-"""Functions that a higher floor provides, so that a lower one can call them and never import it."""
+"""Functions that lower floors call and higher floors provide, so that imports point downwards only."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ R = TypeVar("R")
 
 
 class Slot(Generic[P, R]):
-    """A function that is called here and written on a higher floor, which puts it in when it is imported.
+    """A function that a lower floor declares and calls, and a higher floor provides when it is imported.
 
-    ``import signedheat`` imports every floor, so that no slot is ever found empty by a user.
+    ``import signedheat`` imports every floor, so that all slots are filled.
 
     Examples
     --------
@@ -29,7 +29,7 @@ class Slot(Generic[P, R]):
         self._function: Callable[P, R] | None = None
 
     def provide(self, function: Callable[P, R]) -> Callable[P, R]:
-        """Put a function in; usable as a decorator."""
+        """Fill the slot with a function; usable as a decorator."""
         self._function = function
         return function
 

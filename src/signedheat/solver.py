@@ -1,4 +1,4 @@
-"""The solver: a domain and a diffusion time, held together with whatever has been factorised for them."""
+"""The solver: a domain and a diffusion time, with the factorisations made for them."""
 
 from __future__ import annotations
 
@@ -37,20 +37,21 @@ AnyDomain = TypeVar("AnyDomain", bound=Domain, covariant=True)
 class SignedHeatSolver(Generic[AnyDomain]):
     """Generalized signed distance on one domain.
 
-    What a domain needs factorised is factorised at first use and kept, so that a second distance is cheap.
+    Matrices are factorised at first use and kept, so that further distances are cheap.
 
     Parameters
     ----------
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid
-        What distance is measured on.
+        Where distance is measured.
     diffusion : float
-        τ in ``t = τ h²``, h the mean distance between unknowns. Larger values complete broken sources more roundly.
+        τ in ``t = τ h²``, h the mean distance between unknowns. Larger values close gaps in broken sources along
+        rounder lines.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; what it raises cancels.
+        Called as ``progress(fraction, step)``; an exception that it raises cancels.
     intrinsic : bool
-        Triangulate a triangle mesh anew, along its surface, for every set of sources: slower, since nothing is kept
-        from one distance to the next, and far more accurate where triangles are bad or curves cross them. For control
-        over it, or several distances, make the domain yourself with `intrinsic_delaunay`.
+        Make an intrinsic Delaunay refinement of a triangle mesh for every set of sources. This is slower, since no
+        factorisation is reused, and far more accurate on bad triangles and for curves that cross faces. For more
+        control, or several distances on one triangulation, use `intrinsic_delaunay` as the domain.
 
     Raises
     ------
@@ -68,7 +69,7 @@ class SignedHeatSolver(Generic[AnyDomain]):
 
     @cached_property
     def discretization(self) -> Adaptable:
-        """The domain as the method sees it."""
+        """The discretisation of the domain."""
         if self.intrinsic:
             progress = self.progress
             report = None if progress is None else lambda share: progress((1 + share) / 5, "refine")
@@ -76,7 +77,7 @@ class SignedHeatSolver(Generic[AnyDomain]):
         return discretize(self.domain)
 
     def with_diffusion(self, diffusion: float) -> SignedHeatSolver[AnyDomain]:
-        """The same with another τ; keeps what does not depend on it, which is half of what is factorised.
+        """The same solver with another τ; shares everything that does not depend on τ, such as the factor of C.
 
         Examples
         --------
@@ -112,7 +113,7 @@ class SignedHeatSolver(Generic[AnyDomain]):
             On surfaces: `Curve`, `SurfacePoints`. In space: `TriangleMesh`, `PolygonMesh`, `PointCloud`; in the plane:
             `Polyline`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            What to impose on φ at the sources; `ZeroSet` by default.
+            Imposed on φ at the sources; `ZeroSet` by default.
 
         Returns
         -------
@@ -161,19 +162,19 @@ class SignedHeatSolver(Generic[AnyDomain]):
     @overload
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]: ...
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]:
-        """Signed distance to each of several sources on its own; cheaper than one after the other.
+        """Signed distance to each of several sources; faster than one call of `distance` for each.
 
         Parameters
         ----------
         sources : sequence
-            Each entry is what `distance` takes.
+            Each entry is an argument of `distance`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            Imposed on every one; `ZeroSet` by default. `Free` shares most work.
+            Imposed on each; `ZeroSet` by default. `Free` shares most of the work.
 
         Returns
         -------
         list of VertexField, GridField or TetField
-            What `distance` gives for each, up to rounding. Timings are those of each source's share.
+            The result of `distance` for each, up to rounding. Timings are divided equally among the sources.
         """
         constraint = checked(constraint)
         fields: list[Field] = []
@@ -200,7 +201,7 @@ One = TypeVar("One")
 
 
 def checked(constraint: Constraint | None) -> Constraint:
-    """The constraint, or the default for none."""
+    """The constraint, or the default for None."""
     if constraint is None:
         return ZeroSet()
     if isinstance(constraint, type) or not isinstance(constraint, Constraint):
@@ -212,7 +213,7 @@ def checked(constraint: Constraint | None) -> Constraint:
 
 
 def as_list(sources: One | Sequence[One]) -> list[One]:
-    """One source or several, as a list."""
+    """One source or several sources, as a list."""
     listed: list[One] = list(sources) if isinstance(sources, Sequence) else [sources]
     if not listed:
         raise SourceError(
@@ -297,19 +298,19 @@ def signed_distance(
     Parameters
     ----------
     source : TriangleMesh, PolygonMesh, PointCloud with normals or Polyline, or a sequence of them
-        The shape, in the plane a `Polyline`; any source of `SignedHeatSolver.distance` where a domain is given.
+        The shape; in the plane a `Polyline`. If a domain is given, any source of `SignedHeatSolver.distance` on it.
     domain : Grid, TetMesh, TriangleMesh, …, optional
-        Where to measure; by default a grid of cubic cells around the shape.
+        Where distance is measured; by default on a grid of cubic cells around the shape.
     resolution : int
         Number of nodes along the longest side of that grid.
     padding : float, optional
-        Room around the shape, in its units; by default a fifth of its longest side.
+        Least distance between the shape and the boundary of that grid; by default a fifth of its longest side.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-        What to impose on φ at the source; `ZeroSet` by default.
+        Imposed on φ at the source; `ZeroSet` by default.
     diffusion : float
-        τ in ``t = τ h²``. Larger values complete broken shapes more roundly.
+        τ in ``t = τ h²``. Larger values close gaps in broken shapes along rounder surfaces.
     progress : callable, optional
-        Called as ``progress(fraction, step)``.
+        Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
     Returns
     -------
@@ -319,11 +320,11 @@ def signed_distance(
     Raises
     ------
     GeometryError
-        If resolution or padding make no grid.
+        If resolution or padding are out of range.
     SourceError
         If the shape cannot be a source, for instance points without normals.
     MemoryLimitError
-        If the grid cannot fit in memory; nothing has been allocated then.
+        If the grid does not fit in memory; raised before anything is allocated.
 
     Examples
     --------

@@ -1,6 +1,7 @@
 """Fields on grids, to files and back, exact to the last bit."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -51,7 +52,7 @@ def test_vtk_reads_our_vti_with_the_same_axes(tmp_path):
     image = pyvista.read(tmp_path / "phi.vti")
     values = np.asarray(image.point_data["signed_distance"])
     nodes = phi.grid.points.reshape(-1, 3)
-    order = [image.FindPoint(*node) for node in nodes]
+    order = [image.FindPoint(node) for node in nodes]
     np.testing.assert_array_equal(values[order], phi.values.ravel())
     np.testing.assert_allclose(np.asarray(image.points)[order], nodes, rtol=1e-14, atol=1e-12)
 
@@ -95,11 +96,12 @@ def test_nrrd_along_turned_axes_is_refused(tmp_path):
         load_field(tmp_path / "turned.nrrd")
 
 
-def test_vdb_without_its_module_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr("importlib.import_module", lambda name: (_ for _ in ()).throw(ImportError(name)))
+@pytest.mark.parametrize(("ending", "module"), [("vdb", "openvdb"), ("nrrd", "nrrd")])
+def test_formats_whose_package_is_missing_are_refused_before_anything_is_written(tmp_path, monkeypatch, ending, module):
+    monkeypatch.setitem(sys.modules, module, None)
     for attempt in (lambda path: save_field(field(), path), ensure_field_writable):
-        with pytest.raises(sh.FileFormatError, match=r"phi\.vdb: \.vdb needs OpenVDB's Python module"):
-            attempt(tmp_path / "phi.vdb")
+        with pytest.raises(sh.MissingPackageError, match=module):
+            attempt(tmp_path / f"phi.{ending}")
     assert not list(tmp_path.iterdir())
 
 

@@ -1,4 +1,4 @@
-"""``signedheat close``: broken curves on a surface in, whole ones out."""
+"""``signedheat close``: completes broken curves on a surface."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from ..extensions.close_curves import refuse_without_sides
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
-from ..visualization import PICTURE_FORMATS, save_surface
+from ..visualization import ensure_picture_writable, save_surface
 from .computing import prefix_errors
 from .options import Summary, add_command
 from .surface import add_curves_and_output, advice, measured
@@ -31,7 +31,7 @@ def run(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, complete, write."""
     ensure_writable(arguments.output, CURVE_FORMATS, "curves")
     if arguments.preview:
-        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+        ensure_picture_writable(arguments.preview)
     surface, curves, field = measured(arguments)
     with prefix_errors(arguments.curves):
         refuse_without_sides(curves)

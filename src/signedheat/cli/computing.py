@@ -1,4 +1,4 @@
-"""From options to a field: what `volume`, `offset` and `demo` have in common."""
+"""From options to a field, for the commands `volume`, `offset` and `demo`."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from .progress import ProgressBar
 
 RESOLUTION = 128
 MOST = 0.9
-"""Fraction of the area that may cancel without a word."""
+"""Fraction of the area that may cancel without a warning."""
 
 
 @contextmanager
 def prefix_errors(path: Any) -> Iterator[None]:
-    """Put the name of the input in front of errors that concern it."""
+    """Prefix the messages of errors with the name of the input."""
     try:
         yield
     except SignedHeatError as error:
@@ -38,7 +38,7 @@ def prefix_errors(path: Any) -> Iterator[None]:
 
 
 def check_grid_options(parser: Parser, arguments: Namespace) -> None:
-    """Refuse options that contradict each other."""
+    """Reject options that contradict each other."""
     own = arguments.origin is not None or arguments.grid_shape is not None
     spacing = arguments.spacing
     dimension = 2 if is_planar(arguments.shape) else 3
@@ -65,12 +65,12 @@ def is_planar(path: Any) -> bool:
 
 
 def read_source(path: Any) -> Any:
-    """What distance is to be measured to: a shape in space, or a list of polylines in the plane."""
+    """The source: a shape in space, or a list of polylines in the plane."""
     return read_polylines(path) if is_planar(path) else read(path)
 
 
 def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
-    """The grid that the options ask for, with room for offsets up to `reach` unless they say otherwise."""
+    """The grid given by the options, by default with room for offsets up to `reach`."""
     spacing = arguments.spacing
     if spacing is not None and len(spacing) == 1:
         spacing = spacing[0]
@@ -86,7 +86,7 @@ def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
 
 
 def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
-    """The field, sharpened unless the options say otherwise, or the grid has walls."""
+    """The field, sharpened unless ``--plain`` is given or the grid has walls."""
     plain = arguments.plain or grid.mask is not None
     with ProgressBar(arguments.quiet or arguments.json) as progress:
         share = 1.0 if plain else 0.8
@@ -99,7 +99,7 @@ def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
 
 
 def hint(field: GridField) -> str:
-    """A further line on sources that may have been given twice."""
+    """A further line of output about sources that may have been given twice, or nothing."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
     if cancelled < MOST:
@@ -111,7 +111,7 @@ def hint(field: GridField) -> str:
 
 
 def describe(field: Any) -> dict[str, Any]:
-    """A field in numbers, for ``--json``."""
+    """Key figures of a field, for ``--json``."""
     if isinstance(field, GridField):
         note = field.diagnostics.note(SampledSource)
         where = {

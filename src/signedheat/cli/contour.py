@@ -1,4 +1,4 @@
-"""``signedheat contour``: a surface of equal distance from a field computed before."""
+"""``signedheat contour``: a level set of a saved field."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What curves do on a surface, for ``signedheat info MESH CURVES``."""
+"""Report on curves on a surface, for ``signedheat info MESH CURVES``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 
 
 def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
-    """One row per source: where its points lie, how its segments run, length, open ends."""
+    """One row per source: elements that its points lie on, kinds of segments, length, open ends."""
     mesh = surface.triangulation
     lengths = mesh.edge_lengths[mesh.edges.face_edges]
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
@@ -25,7 +25,7 @@ def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
 
 
 def report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
-    """One source in numbers."""
+    """The row of one source."""
     places = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     kinds = np.bincount(places.kinds, minlength=3)
     row: dict[str, Any] = {
@@ -60,7 +60,7 @@ def report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]
 
 
 def as_text(rows: Sequence[dict[str, Any]]) -> str:
-    """The reports, one line each."""
+    """The rows as text, one line each."""
     lines = []
     for number, row in enumerate(rows):
         points = f"{row['at_vertices']} at vertices, {row['on_edges']} on edges, {row['in_faces']} in faces"
@@ -79,5 +79,5 @@ def as_text(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def shortened(items: Sequence[Any], most: int = 6) -> str:
-    """The first few of a list."""
+    """The first few items of a list, as text."""
     return ", ".join(map(str, items[:most])) + (", …" if len(items) > most else "")

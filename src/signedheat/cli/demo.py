@@ -1,4 +1,4 @@
-"""``signedheat demo``: the whole way, on a broken duck that needs no file."""
+"""``signedheat demo``: distance and offset of a bundled broken duck."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..errors import FileFormatError
 from ..io import ensure_writable, save, save_field
 from ..io.files import PathLike, replacing
 from ..samples import broken_duck
-from ..visualization import draw_shape, draw_slices, new_figure
+from ..visualization import draw_shape, draw_slices, ensure_picture_writable, new_figure
 from .computing import compute, describe
 from .options import Summary, add_command, whole_number
 
@@ -36,7 +36,7 @@ def add_to(commands: Any) -> None:
 
 
 def run(arguments: Namespace) -> Summary:
-    """Make everything in one folder."""
+    """Write everything to one folder."""
     folder = Path(arguments.output)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -49,6 +49,7 @@ def run(arguments: Namespace) -> Summary:
     files = {name: folder / name for name in ("duck.stl", "distance.vti", "offset.stl", "picture.png")}
     for path in files.values():
         ensure_writable(path, {path.suffix}, "a file")
+    ensure_picture_writable(files["picture.png"])
     shape = broken_duck()
     save(shape, files["duck.stl"])
     grid = Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)
@@ -74,7 +75,7 @@ def run(arguments: Namespace) -> Summary:
 
 
 def draw_story(shape: Any, field: Any, surface: Any, path: PathLike) -> None:
-    """The broken shape, a slice of its distance, the closed offset surface."""
+    """Draw the broken shape, a slice of its distance, and the closed offset surface."""
     figure = new_figure(13.5, 4.6)
     before = figure.add_subplot(1, 3, 1)
     draw_shape(shape, before)

@@ -1,4 +1,4 @@
-"""``signedheat info``: what a file holds, what is wrong with it, and how much memory a grid around it takes."""
+"""``signedheat info``: contents and defects of a file, and the memory that a grid around it takes."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def run(arguments: Namespace) -> Summary:
 
 
 def lines_report(arguments: Namespace) -> Summary:
-    """Polylines in the plane."""
+    """Inspect polylines in the plane."""
     lines = read_polylines(arguments.file)
     bounds = bounds_around(lines)
     summary = {

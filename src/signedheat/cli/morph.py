@@ -1,4 +1,4 @@
-"""``signedheat morph``: grow, shrink, open, close, hollow or thicken a broken shape."""
+"""``signedheat morph``: morphological operations on a broken shape."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OPERATIONS = {
     "shell": (shell, 2, 2),
     "thicken": (thicken, 1, 2),
 }
-"""Operation, and how few and how many distances it takes."""
+"""Function of each operation, and the least and greatest number of distances that it takes."""
 
 
 def add_to(commands: Any) -> None:

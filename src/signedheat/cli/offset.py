@@ -1,4 +1,4 @@
-"""``signedheat offset``: closed surfaces at chosen distances from a broken shape."""
+"""``signedheat offset``: closed surfaces at given distances from a broken shape."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
-from ..visualization import PICTURE_FORMATS, save_slices
+from ..visualization import ensure_picture_writable, save_slices
 from .computing import check_grid_options, compute, describe, grid_for, hint, is_planar, prefix_errors, read_source
 from .options import Parser, Summary, add_command, add_grid_options, finite
 
@@ -49,7 +49,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     for output in outputs:
         ensure_offset_writable(output, planar)
     if arguments.preview:
-        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+        ensure_picture_writable(arguments.preview)
     shape = read_source(arguments.shape)
     reach = max(abs(distance) for distance in arguments.distances)
     with prefix_errors(arguments.shape):
@@ -72,7 +72,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
 
 
 def ensure_offset_writable(output: str, planar: bool) -> None:
-    """Find out before computing whether a surface, or lines in the plane, can be written."""
+    """Check before computing that a surface, or polylines in the plane, can be written."""
     if planar:
         ensure_writable(output, POLYLINE_FORMATS, "lines in the plane")
     else:
@@ -80,7 +80,7 @@ def ensure_offset_writable(output: str, planar: bool) -> None:
 
 
 def counts(what: Any) -> dict[str, Any]:
-    """A surface, or lines in the plane, in numbers."""
+    """Key figures of a surface, or of polylines in the plane."""
     if isinstance(what, list):
         closed = sum(line.closed for line in what)
         return {"lines": len(what), "closed": closed, "length": float(sum(line.length for line in what))}
@@ -88,7 +88,7 @@ def counts(what: Any) -> dict[str, Any]:
 
 
 def output_names(output: str, distances: list[float]) -> list[str]:
-    """The name itself for one distance, one name for each of several."""
+    """The given name for one distance; a name with the distance in it for each of several."""
     if len(distances) == 1:
         return [output]
     path = Path(output)

@@ -1,4 +1,4 @@
-"""Options that several commands share, and how they become grids and constraints."""
+"""Options that several commands share, and their conversion to numbers and constraints."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from typing import Any, NoReturn
 from ..constraints import Constraint, EachComponent, Free, Soft, ZeroSet
 
 Summary = tuple[dict[str, Any], str]
-"""What a command did: for ``--json``, and as text for people."""
+"""The result of a command: a dictionary for ``--json``, and text."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, and takes negative numbers, 1e-3 style included, for numbers."""
+    """An argument parser with one-line errors that accepts negative numbers, 1e-3 included, as arguments."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._negative_number_matcher = re.compile(r"^-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.IGNORECASE)
 
     def error(self, message: str) -> NoReturn:
-        """End with status 2."""
+        """Exit with status 2."""
         print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
         raise SystemExit(2)
 
 
 def add_command(commands: Any, name: str, run: Callable[..., Summary], help: str, description: str) -> Parser:
-    """A command with the options that all have."""
+    """Add a command with the options that all commands have."""
     parser = commands.add_parser(name, help=help, description=description)
     parser.set_defaults(run=run)
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
@@ -38,7 +38,7 @@ def add_command(commands: Any, name: str, run: Callable[..., Summary], help: str
 
 
 def add_grid_options(parser: Parser) -> None:
-    """Where the grid is, how fine, and how the distance is computed."""
+    """Add the options of the grid and of the computation."""
     grid = parser.add_argument_group("grid (by default around the shape)")
     grid.add_argument("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side (128)")
     grid.add_argument(
@@ -89,7 +89,7 @@ def constraint(word: str, with_numbers: str = "soft:WEIGHT") -> Constraint:
 
 
 def finite(word: str) -> float:
-    """A number."""
+    """A finite number."""
     try:
         value = float(word)
     except ValueError:
@@ -100,7 +100,7 @@ def finite(word: str) -> float:
 
 
 def positive(word: str) -> float:
-    """A number above zero."""
+    """A positive number."""
     value = finite(word)
     if value <= 0:
         raise argparse.ArgumentTypeError(f"{word} is not positive")
@@ -108,7 +108,7 @@ def positive(word: str) -> float:
 
 
 def not_negative(word: str) -> float:
-    """A number from zero on."""
+    """A nonnegative number."""
     value = finite(word)
     if value < 0:
         raise argparse.ArgumentTypeError(f"{word} is negative")
@@ -116,7 +116,7 @@ def not_negative(word: str) -> float:
 
 
 def whole_number(least: int) -> Callable[[str], int]:
-    """A whole number from `least` on."""
+    """A function that parses a whole number of at least `least`."""
 
     def parse(word: str) -> int:
         if not re.fullmatch(r"[-+]?\d+", word) or int(word) < least:

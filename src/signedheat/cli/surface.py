@@ -1,4 +1,4 @@
-"""``signedheat surface``: a mesh and curves on it in, signed distance at its vertices out."""
+"""``signedheat surface``: signed distance to curves on a surface, at its vertices."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..fields.vertex_field import VertexField
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..solver import SignedHeatSolver
-from ..visualization import PICTURE_FORMATS, save_surface
+from ..visualization import ensure_picture_writable, save_surface
 from .computing import prefix_errors
 from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
 from .progress import ProgressBar
@@ -39,7 +39,7 @@ def add_to(commands: Any) -> None:
 
 
 def add_curves_and_output(parser: Parser, output: str) -> None:
-    """What it takes to measure distance to curves on a surface, and where the result goes."""
+    """Add the arguments of a distance to curves on a surface, and of its output."""
     parser.add_argument(
         "mesh", metavar="MESH", help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti"
     )
@@ -82,7 +82,7 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
 
 
 def advice(field: VertexField) -> str:
-    """What would make the result more accurate."""
+    """Advice on options that would make the result more accurate, or nothing."""
     note = field.diagnostics.note(LargeAngles)
     return f"; {note}: --intrinsic is more accurate" if note else ""
 
@@ -91,7 +91,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute, write."""
     ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
     if arguments.preview:
-        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+        ensure_picture_writable(arguments.preview)
     surface, curves, field = measured(arguments)
     field.save(arguments.output)
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
@@ -119,7 +119,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
 
 
 def read_surface(path: str) -> Any:
-    """A file with something that curves can lie on."""
+    """Read a surface domain from a file."""
     surface = read(path)
     if not hasattr(surface, "triangulation"):
         raise SourceError(
@@ -130,7 +130,7 @@ def read_surface(path: str) -> Any:
 
 
 def surface_constraint(word: str) -> Any:
-    """A constraint from its name; on surfaces also given levels."""
+    """A constraint from its name on the command line; on surfaces also given levels."""
     name, _, values = word.partition(":")
     if name == "levels":
         return LevelValues([finite(value) for value in values.split(",")])

@@ -1,4 +1,4 @@
-"""``signedheat volume --tets``: the distance on tets instead of a grid."""
+"""``signedheat volume --tets``: signed distance on tets instead of a grid."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import ensure_writable, read
 from ..io.tets import TET_FIELD_FORMATS
+from ..packages import require
 from ..solver import SignedHeatSolver
-from ..visualization import PICTURE_FORMATS, save_slices
+from ..visualization import ensure_picture_writable, save_slices
 from .computing import describe, prefix_errors
 from .options import Parser, Summary
 from .progress import ProgressBar
@@ -32,8 +33,9 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     if given and (arguments.resolution is not None or arguments.padding is not None):
         parser.error("--resolution and --padding do not go with a mesh of your own")
     ensure_writable(arguments.output, TET_FIELD_FORMATS, "a field on tets")
+    require("meshio", "fields on tets")
     if arguments.preview:
-        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+        ensure_picture_writable(arguments.preview)
     shape = read(arguments.shape)
     mesh = read(given) if given else None
     if mesh is not None and not isinstance(mesh, TetMesh):
@@ -63,6 +65,6 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
 
 
 def on_grid(field: TetField) -> GridField:
-    """The field at the nodes of a coarse grid around its mesh, to draw slices of."""
+    """The field at the nodes of a coarse grid around its mesh, for previews."""
     grid = Grid.around(field.mesh.bounds, resolution=PREVIEW_NODES, padding=0.0)
     return GridField(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))

@@ -11,10 +11,10 @@ from ..errors import FileFormatError
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
-from ..io import FIELD_FORMATS, ensure_writable, load_field, read
+from ..io import FIELD_FORMATS, load_field, read
 from ..io.files import extension
 from ..io.tets import TET_FIELD_FORMATS
-from ..visualization import PICTURE_FORMATS, save_scene, save_slices, save_surface
+from ..visualization import ensure_picture_writable, save_scene, save_slices, save_surface
 from .computing import prefix_errors
 from .options import Summary, add_command
 from .tets import on_grid
@@ -36,7 +36,7 @@ def add_to(commands: Any) -> None:
 
 def run(arguments: Namespace) -> Summary:
     """Draw."""
-    ensure_writable(arguments.output, PICTURE_FORMATS, "a picture")
+    ensure_picture_writable(arguments.output)
     thing, up = shape_or_field(arguments.file), "xyz".index(arguments.up)
     with prefix_errors(arguments.file):
         if isinstance(thing, VertexField):

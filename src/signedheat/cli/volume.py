@@ -1,12 +1,12 @@
-"""``signedheat volume``: a broken shape in, its signed distance on a grid out."""
+"""``signedheat volume``: signed distance to a broken shape on a grid."""
 
 from __future__ import annotations
 
 from argparse import Namespace
 from typing import Any
 
-from ..io import ensure_field_writable, ensure_writable, save_field
-from ..visualization import PICTURE_FORMATS, save_slices
+from ..io import ensure_field_writable, save_field
+from ..visualization import ensure_picture_writable, save_slices
 from . import tets
 from .computing import check_grid_options, compute, describe, grid_for, hint, prefix_errors, read_source
 from .options import Parser, Summary, add_command, add_grid_options
@@ -46,7 +46,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     check_grid_options(parser, arguments)
     ensure_field_writable(arguments.output)
     if arguments.preview:
-        ensure_writable(arguments.preview, PICTURE_FORMATS, "a picture")
+        ensure_picture_writable(arguments.preview)
     shape = read_source(arguments.shape)
     with prefix_errors(arguments.shape):
         field = compute(shape, grid_for(shape, arguments), arguments)

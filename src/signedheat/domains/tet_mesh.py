@@ -16,6 +16,7 @@ from ..geometry.box_tree import BoxTree
 from ..geometry.components import element_components
 from ..geometry.tet_faces import FaceTable, face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
+from ..packages import lazy_module
 from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
 from .validation import element_ids, finite_rows, frozen
@@ -23,6 +24,9 @@ from .validation import element_ids, finite_rows, frozen
 if TYPE_CHECKING:
     import meshio
     import pyvista
+else:
+    meshio = lazy_module("meshio", "objects of meshio")
+    pyvista = lazy_module("pyvista", "objects of PyVista")
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,8 +156,6 @@ class TetMesh:
 
     def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
         """As a `meshio.Mesh`, with `point_data`, arrays at the vertices by name."""
-        import meshio
-
         return meshio.Mesh(self.vertices, [("tetra", self.tets)], point_data=point_data)
 
     @classmethod
@@ -169,8 +171,6 @@ class TetMesh:
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As a `pyvista.UnstructuredGrid`."""
-        import pyvista
-
         return pyvista.UnstructuredGrid({10: np.array(self.tets)}, np.array(self.vertices))
 
     def __repr__(self) -> str:

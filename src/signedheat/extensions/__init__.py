@@ -1,4 +1,4 @@
-"""What goes beyond the three steps; uses the core through its public face."""
+"""Extensions beyond the three steps: sharpening, piecewise distance, completion of curves, morphology, tet meshing."""
 
 from . import grid_sharpening, tet_sharpening, vertex_sharpening
 

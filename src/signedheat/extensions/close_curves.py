@@ -1,4 +1,4 @@
-"""Broken curves, completed."""
+"""Completion of broken curves on surfaces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..solver import SignedHeatSolver, as_list
 def close_curves(
     domain: SurfaceDomain, curves: CurvesAndPoints, *, diffusion: float = 1.0, constraint: Constraint | None = None
 ) -> list[Curve]:
-    """The zero set of the signed distance to broken curves: what they are a picture of, without gaps.
+    """Complete broken curves: the zero set of the signed distance to them, which has no gaps.
 
     Parameters
     ----------
@@ -25,17 +25,18 @@ def close_curves(
     diffusion : float
         τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18).
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-        What to impose on φ at the curves; `ZeroSet`, by default, makes the result pass through them.
+        Imposed on φ at the curves; with `ZeroSet`, the default, the result passes through them.
 
     Returns
     -------
     list of Curve
-        Oriented as the given curves, closed but for ends at the boundary of the surface; one per connected line.
+        Oriented as the given curves, one for each connected component; closed, or ending at the boundary of the
+        surface.
 
     Raises
     ------
     SourceError
-        If no curve has sides, or one does not fit the surface.
+        If no curve is oriented, or one does not fit the surface.
 
     Examples
     --------
@@ -58,7 +59,7 @@ def close_curves(
 
 
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:
-    """Distance to curves that are not oriented, and to points, has no zero set but these."""
+    """Raise `SourceError` if no curve is oriented: an unsigned distance has no zero set besides its sources."""
     if all(isinstance(curve, Curve | SurfacePoints) and not getattr(curve, "oriented", False) for curve in curves):
         raise SourceError(
             "curves without sides, and points, bound nothing that could be completed",

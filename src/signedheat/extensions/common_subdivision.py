@@ -1,7 +1,7 @@
 """The common subdivision of a mesh and an intrinsic triangulation of it: flat polygons on which both are linear.
 
-Along the surface the edges of both cut each other into convex polygons. Each lies in one face of the mesh, so it can be
-drawn, and in one intrinsic triangle, so that a field on the triangulation is linear on it.
+The edges of both divide the surface into convex polygons. Each lies in one face of the mesh, so that it is flat in
+space, and in one intrinsic triangle, so that a field on the triangulation is linear on it.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from ..geometry.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
 
 
 def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMesh, csr_matrix]:
-    """Cut the triangles of an intrinsic triangulation along the edges of its mesh.
+    """Subdivide the triangles of an intrinsic triangulation along the edges of its mesh.
 
     Parameters
     ----------
     triangulation : IntrinsicTriangulation
-        As `intrinsic_delaunay` makes it.
+        From `intrinsic_delaunay`.
 
     Returns
     -------
     PolygonMesh
-        Flat polygons, in space; the vertices of the triangulation go first.
+        Flat polygons in space; the vertices of the triangulation come first.
     (n_polygon_vertices, n_vertices) sparse
-        Takes values at the triangulation's vertices to values at the polygons' vertices.
+        Interpolation: maps values at the vertices of the triangulation to values at those of the polygons.
 
     Raises
     ------
     GeometryError
-        If it is no intrinsic triangulation.
+        If the argument is not an intrinsic triangulation.
 
     Examples
     --------
@@ -68,9 +68,9 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
 
 
 def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], NDArray[np.int64], LocatedPoints]:
-    """The polygons, the triangle that each lies in, and where on the triangulation's edges the mesh's edges cross them.
+    """The polygons, the triangle that each lies in, and the points at which edges of the mesh cross intrinsic edges.
 
-    Corners of polygons are vertices of the triangulation, or n_vertices and more for crossings, in order.
+    Corners of polygons are vertices of the triangulation, or, from n_vertices on, crossings in order.
     """
     triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
@@ -104,7 +104,7 @@ def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], 
 
 
 def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
-    """Cut a convex polygon along chords between its corners that do not cross each other."""
+    """Cut a convex polygon along chords between its corners, which must not cross each other."""
     parts = [outline]
     for a, b in chords:
         for k, part in enumerate(parts):
@@ -117,6 +117,6 @@ def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
 
 
 def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> NDArray[np.float64]:
-    """(p, 3) where points of the triangulation lie in space."""
+    """(p, 3) positions in space of points of the triangulation."""
     found = triangulation.history.backward(places.faces, places.barycentric)
     return triangulation.in_space(*triangulation.refinement.pull_back(*found[:2]))

@@ -1,4 +1,4 @@
-"""Sharpening on grids: distance to the zero set of the field, measured anew."""
+"""Sharpening on grids: distance to the zero set of the field, by closest points."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .sharpening import sharpen_field
 
 @sharpen_field.register
 def _(field: GridField, *, progress: Progress | None = None) -> GridField:
-    """Distance of every node to the zero set; signs stay as they are. Second order on smooth shapes."""
+    """Distance of every node to the zero set, with the signs of the field. Second order on smooth shapes."""
     if not np.isfinite(field.values).all():
         raise GeometryError(
             "a field around solid nodes, or with parts that no source reaches, cannot be sharpened: straight lines to "

@@ -1,4 +1,4 @@
-"""Distance that may jump across the edges of an intrinsic triangulation."""
+"""Piecewise linear distance on an intrinsic triangulation that may be discontinuous across edges."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from .common_subdivision import positions, subdivided
 
 
 class IntrinsicPiecewiseField(PiecewiseField):
-    """A `PiecewiseField` on the triangles of an `IntrinsicTriangulation`, given and drawn on its mesh.
+    """A `PiecewiseField` on the triangles of an `IntrinsicTriangulation`; points refer to the mesh of that.
 
-    `domain` and `surface` are the triangulation. Points are those of the mesh.
+    `domain` and `surface` are the triangulation.
     """
 
     domain: IntrinsicTriangulation
@@ -29,27 +29,24 @@ class IntrinsicPiecewiseField(PiecewiseField):
 
     @property
     def face_gradients(self) -> NDArray[np.float64]:
-        """Of length one along the surface; triangles that are bent over edges of the mesh have none in space."""
+        """Not defined in space, since intrinsic triangles bend over the edges of the mesh: raises `GeometryError`."""
         raise GeometryError(
             "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each",
             remedy="use split().face_gradients",
         )
 
     def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
-        """As `face_gradients`."""
+        """Not defined in space: raises the error of `face_gradients`."""
         return self.face_gradients
 
     def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
-        """φ at points of the mesh."""
+        """(n,) φ at points of the mesh."""
         faces, weights = self.domain.locate(points.faces, points.barycentric)
         result: NDArray[np.float64] = (self.values[faces] * weights).sum(axis=1)
         return result
 
     def split(self) -> VertexField[TriangleMesh | PolygonMesh]:
-        """The same field on flat polygons, which the edges of mesh and triangulation cut out of each other.
-
-        Their vertices are doubled along the cut.
-        """
+        """The same field on the common subdivision of mesh and triangulation, with vertices doubled along the cut."""
         triangles, n = self.triangles, self.domain.n_vertices
         polygons, owners, where = subdivided(self.domain)
         sizes = [len(polygon) for polygon in polygons]

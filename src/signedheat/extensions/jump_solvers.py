@@ -1,9 +1,10 @@
-"""Two ways to find the constants of piecewise-continuous integration: fast with a certificate, and exact.
+"""Two solvers for the constants of piecewise-continuous integration: a fast one with a certificate, and an exact one.
 
-Summed over the two ends of an edge, Eq. 16 charges a pair of faces ``w (b − a)`` whatever happens, and ``2w`` times the
-distance of x = c_f − c_g from the interval [a, b] between the values that close the gap at one end and at the other.
-The dual of ``min Σ 2w dist(K c, [a, b])`` is a flow y from face to face across the edges, conserved in every face and
-no larger than 2w; every such flow proves that no constants do better than ``−Σ max(a y, b y)``.
+Summed over the two ends of an edge, the cost of a pair of faces in Eq. 16 is ``w (b − a)``, whatever the constants are,
+plus ``2w`` times the distance of x = c_f − c_g from the interval [a, b], whose ends are the values of x that make φ
+continuous at one end of the edge and at the other. The dual of ``min Σ 2w dist(K c, [a, b])`` is a flow y from face to
+face across edges, conserved in every face, with capacities 2w; every such flow proves that no constants have a smaller
+cost than ``−Σ max(a y, b y)``.
 """
 
 from __future__ import annotations
@@ -12,17 +13,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
+from threadpoolctl import threadpool_limits
 
 from ..errors import SignedHeatError
 from ..geometry.components import connected_components
 from ..linear import factorize
 
-_LOOK = 25  # rounds between two looks at the gap
+_LOOK = 25  # rounds between two evaluations of the gap
 _RELAXATION = 1.6
-_THRESHOLD = 4.0  # of the proximal step at first, times a typical difference
-_GROWTH, _PATIENCE = 2.0, 250  # it may grow so much every so many rounds; measured over curves on tori and spheres
+_THRESHOLD = 4.0  # initial threshold of the proximal step, relative to a typical difference
+_GROWTH, _PATIENCE = 2.0, 250  # factor by which it may grow, at most every so many rounds; tuned on tori and spheres
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +37,13 @@ class JumpProblem:
     faces : (p, 2) int
         The faces f and g of each pair.
     low, high : (p,) float
-        a and b: the differences that close the gap at one end of the edge, and at the other.
+        a and b: the differences that make φ continuous at one end of the edge, and at the other, the smaller first.
     weights : (p,) float
         w, positive.
     n_faces : int
         Number of constants.
     floor : float
-        What is paid in any case.
+        The cost that does not depend on the constants.
     """
 
     faces: NDArray[np.int64]
@@ -51,22 +54,22 @@ class JumpProblem:
     floor: float = 0.0
 
     def differences(self, constants: NDArray[np.float64]) -> NDArray[np.float64]:
-        """x = K c: (p,) constants of the first faces less those of the second."""
+        """x = K c: (p,) constants of the first faces minus those of the second."""
         return constants[self.faces[:, 0]] - constants[self.faces[:, 1]]
 
     def objective(self, constants: NDArray[np.float64]) -> float:
-        """What is to be minimised."""
+        """The value to be minimised."""
         difference = self.differences(constants)
         return self.floor + 2.0 * float(self.weights @ np.abs(difference - np.clip(difference, self.low, self.high)))
 
     def bound(self, flow: NDArray[np.float64]) -> float:
-        """What a flow proves, if it is conserved in every face: no constants have a smaller objective."""
+        """Lower bound of the objective from a flow (p,) that is conserved in every face (weak duality)."""
         excess = np.abs(flow / (2.0 * self.weights)).max(initial=1.0)
         return self.floor - float(np.maximum(self.low * flow, self.high * flow).sum() / excess)
 
     @property
     def scale(self) -> float:
-        """A typical difference."""
+        """Typical size of a and b."""
         return 0.5 * float(np.mean(np.abs(self.low) + np.abs(self.high)))
 
     def incidence(self) -> sparse.csr_matrix:
@@ -78,18 +81,18 @@ class JumpProblem:
 
 @dataclass(frozen=True, eq=False)
 class JumpSolution:
-    """Constants, and how good they are.
+    """Constants, with a certificate of their quality.
 
     Attributes
     ----------
     constants : (n_faces,) float
-        c; on each connected part of the surface up to a constant.
+        c; on each connected component of the surface up to a constant.
     objective : float
-        What was to be minimised, at these constants.
+        The objective at these constants.
     bound : float
-        No constants have a smaller objective than this.
+        A lower bound of the objective.
     rounds : int
-        Rounds of the iteration.
+        Number of iterations.
     """
 
     constants: NDArray[np.float64]
@@ -99,7 +102,7 @@ class JumpSolution:
 
     @property
     def gap(self) -> float:
-        """(objective − bound) / objective: at most this much could be gained."""
+        """(objective − bound) / objective: the objective is at most this fraction above the optimum."""
         return max(self.objective - self.bound, 0.0) / self.objective if self.objective > 0 else 0.0
 
 
@@ -111,29 +114,32 @@ def minimize_fast(
 ) -> JumpSolution:
     """ADMM (Boyd et al. 2011) on ``min Σ 2w dist(z, [a, b])  s.t.  z = K c``, with one factorisation for all rounds.
 
-    Springs in proportion to w make the threshold of the proximal step one length for all edges, and one that may
-    change without a new factor. The multipliers, made conserved, certify the result.
+    Penalties proportional to w make the threshold of the proximal step the same length for all edges, which can change
+    without a new factorisation. The multipliers, projected on conserved flows, certify the result.
 
     Parameters
     ----------
     problem : JumpProblem
-        What to minimise.
+        The problem.
     tolerance : float
         Stop when the certified `JumpSolution.gap` is below this.
     max_rounds : int
-        Stop in any case.
+        Largest number of iterations.
     progress : callable, optional
         Called with the fraction of `max_rounds` done.
-    """
-    from threadpoolctl import threadpool_limits
 
+    Returns
+    -------
+    JumpSolution
+        The best constants found.
+    """
     if not len(problem.faces):
         return _nothing(problem)
     low, high = problem.low, problem.high
     spring = problem.weights / problem.weights.mean()
     incidence = problem.incidence()
     transposed = sparse.csr_matrix(incidence.T)
-    with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
+    with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they gain
         factor = factorize(_grounded_laplacian(incidence, spring))
         constants = factor.solve(transposed @ (spring * (0.5 * (low + high))))
         step = problem.differences(constants)
@@ -160,7 +166,7 @@ def minimize_fast(
             bound = max(bound, problem.bound(flow * (2.0 * problem.weights.mean() / threshold)))
             if rounds % _PATIENCE == 0 and _lags(spring, difference, low, high, z, before, scaled):
                 threshold *= _GROWTH
-                scaled *= _GROWTH  # the multipliers stay what they are
+                scaled *= _GROWTH  # so that the unscaled multipliers stay the same
             if progress is not None:
                 progress(rounds / max_rounds)
     moved = regions_moved(problem, best, problem.scale)
@@ -176,7 +182,7 @@ def _lags(
     before: NDArray[np.float64],
     scaled: NDArray[np.float64],
 ) -> bool:
-    """Whether the multipliers are slow to settle: the dual residual is more than twice the primal one, as parts."""
+    """Whether the multipliers converge slowly: the relative dual residual is more than twice the primal one."""
     primal = np.sqrt(spring @ (difference - z) ** 2)
     jumps = np.sqrt(spring @ (difference - np.clip(difference, low, high)) ** 2)
     dual = np.sqrt(spring @ (z - before) ** 2)
@@ -184,9 +190,9 @@ def _lags(
 
 
 def regions_moved(problem: JumpProblem, constants: NDArray[np.float64], jump: float) -> NDArray[np.float64]:
-    """Constants improved by moving whole regions, those that jumps larger than `jump` part from each other.
+    """Constants improved by shifting whole regions, which are separated by jumps larger than `jump`.
 
-    Cuts that cost nearly the same share the jump between them for many rounds; this puts all of it on the best.
+    For many rounds the jump is divided between cuts of nearly equal cost; this moves all of it to the cheapest one.
     """
     low, high = problem.low, problem.high
     difference = problem.differences(constants)
@@ -202,15 +208,13 @@ def regions_moved(problem: JumpProblem, constants: NDArray[np.float64], jump: fl
 
 
 def minimize_exactly(problem: JumpProblem) -> JumpSolution:
-    """The cheapest flow as a linear program (HiGHS through SciPy); the constants are its prices.
+    """Solve the dual, a minimum-cost flow, as a linear program (HiGHS in SciPy); the constants are its multipliers.
 
     Raises
     ------
     SignedHeatError
-        If HiGHS finds no optimum, or the prices do not attain what the flow proves.
+        If HiGHS finds no optimum, or there is a duality gap.
     """
-    from scipy.optimize import linprog
-
     if not len(problem.faces):
         return _nothing(problem)
     low, high = problem.low, problem.high
@@ -219,7 +223,7 @@ def minimize_exactly(problem: JumpProblem) -> JumpSolution:
     capacity = np.tile(2.0 * problem.weights / problem.weights.mean(), 2)
     bounds = np.stack([np.zeros_like(capacity), capacity], axis=1)
     for method in ("highs-ipm", "highs-ds"):
-        result = linprog(
+        result = scipy.optimize.linprog(
             np.concatenate([high, -low]) / scale,
             A_eq=sparse.hstack([conserve, -conserve], format="csr"),
             b_eq=np.zeros(problem.n_faces),
@@ -242,12 +246,12 @@ def minimize_exactly(problem: JumpProblem) -> JumpSolution:
 
 
 def _nothing(problem: JumpProblem) -> JumpSolution:
-    """No faces meet: any constants will do."""
+    """The solution if no two faces share an edge: all constants are optimal."""
     return JumpSolution(np.zeros(problem.n_faces), problem.floor, problem.floor, 0)
 
 
 def _grounded_laplacian(incidence: sparse.csr_matrix, spring: NDArray[np.float64]) -> sparse.csr_matrix:
-    """KᵀSK with one face of each connected part held."""
+    """``KᵀSK``, S the diagonal matrix `spring`, with one face of each connected component grounded."""
     laplacian = sparse.csr_matrix(incidence.T @ sparse.diags_array(spring) @ incidence)
     parts = sparse.csgraph.connected_components(laplacian, directed=False)[1]
     held = np.zeros(laplacian.shape[0])

@@ -1,6 +1,7 @@
-"""Morphology of broken shapes: offsets of their completed signed distance, one after another (Sec. 9.3.1).
+"""Morphological operations on broken shapes: successive offsets of their signed distance (Sec. 9.3.1).
 
-Every step recomputes the distance, since an offset of a distance function is a distance function on one side only.
+Every step recomputes the distance, since the distance to an offset equals that to the shape, up to a constant, on one
+side only.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints
@@ -24,19 +26,22 @@ from ..fields.grid_field import GridField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..lowering.area_elements import area_elements, bounds_around
+from ..packages import lazy_module
 from ..solver import as_list, signed_distance
 from .sharpening import sharpen
+
+remesh = lazy_module("trimesh.remesh", "walls around sheets")
 
 RESOLUTION = 128
 ROOM = 0.15
 """Share of its longest side by which a shape is padded, besides what its offsets take."""
 
 Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
-"""What bounds the result: of the same kind as the shape."""
+"""The boundary of a result, of the same kind as the shape."""
 
 
 class _Morphology(Protocol):
-    """The types of `dilate` and its like."""
+    """The signature of `dilate`, `erode`, `opening` and `closing`."""
 
     @overload
     def __call__(
@@ -58,18 +63,18 @@ def _by_kind_of_shape(function: Callable[..., Boundary]) -> _Morphology:
 
 @_by_kind_of_shape
 def dilate(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
-    """Grow a shape by a distance.
+    """Dilate a shape: offset it outward by a distance.
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh, PointCloud, in the plane Polyline, on a surface Curve; or a sequence of them
-        What is grown, broken or not. The inside is where φ < 0: behind the normals, or to the right of curves.
+    shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
+        The shape, which may be broken. Inside is where φ < 0: behind the normals, or to the right of curves.
     distance : float
-        How far, in the units of the shape; not negative.
+        The offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
-        What the distance is computed on; by default a grid around the shape with room for the result.
+        Where the distance is computed; by default on a grid around the shape with room for the result.
     resolution : int
-        Nodes along the longest side of that default grid.
+        Number of nodes along the longest side of that default grid.
 
     Returns
     -------
@@ -79,11 +84,11 @@ def dilate(shape: Sources, distance: float, domain: Domain | None = None, *, res
     Raises
     ------
     SignedHeatError
-        If the distance is no number, not finite, or negative.
+        If the distance is not a finite nonnegative number.
     SourceError
         If the shape does not fit the domain.
     OutsideError
-        If nothing is left, or the result leaves the domain.
+        If the result is empty, or leaves the domain.
 
     Examples
     --------
@@ -98,7 +103,7 @@ def dilate(shape: Sources, distance: float, domain: Domain | None = None, *, res
 
 @_by_kind_of_shape
 def erode(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
-    """Shrink a shape by a distance; see `dilate` for parameters, results and errors.
+    """Erode a shape: offset it inward by a distance. Parameters, result and errors are those of `dilate`.
 
     Examples
     --------
@@ -113,14 +118,14 @@ def erode(shape: Sources, distance: float, domain: Domain | None = None, *, reso
 
 @_by_kind_of_shape
 def opening(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
-    """Erode, then dilate: what is thinner than twice the distance goes, convex corners turn round; see `dilate`."""
+    """Erode, then dilate: removes parts thinner than twice the distance, rounds convex corners. See `dilate`."""
     distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (-distance, distance), domain, resolution)
 
 
 @_by_kind_of_shape
 def closing(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
-    """Dilate, then erode: gaps narrower than twice the distance fill, concave corners turn round; see `dilate`."""
+    """Dilate, then erode: fills gaps narrower than twice the distance, rounds concave corners. See `dilate`."""
     distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (distance, -distance), domain, resolution)
 
@@ -128,18 +133,18 @@ def closing(shape: Sources, distance: float, domain: Domain | None = None, *, re
 def shell(
     shape: Shapes, inner: float, outer: float, domain: Grid | None = None, *, resolution: int = RESOLUTION
 ) -> TriangleMesh:
-    """The wall between two offsets of a shape: ``inner ≤ φ ≤ outer``. Holes of the shape are closed.
+    """The solid between two offsets of a shape, ``inner ≤ φ ≤ outer``: a wall, in which holes of the shape are closed.
 
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh or PointCloud
-        What the wall follows. ``shell(shape, 0, d)`` is a wall on its outside, ``shell(shape, -d, 0)`` on its inside.
+        The shape. ``shell(shape, 0, d)`` is a wall on its outside, ``shell(shape, -d, 0)`` on its inside.
     inner, outer : float
-        Signed distances of its two sides, inner < outer.
+        Signed distances of the two sides of the wall, inner < outer.
     domain : Grid, optional
         By default a grid around the shape with room for the result.
     resolution : int
-        Nodes along the longest side of that default grid.
+        Number of nodes along the longest side of that default grid.
 
     Returns
     -------
@@ -149,7 +154,7 @@ def shell(
     Raises
     ------
     SignedHeatError
-        If inner is not less than outer, one of them is not finite, or the wall is thinner than a cell.
+        If inner is not less than outer, one of them is not finite, or the wall is thinner than a grid cell.
     UnsupportedTypeError
         If the domain is not a grid.
     """
@@ -172,19 +177,19 @@ def thicken(
     *,
     resolution: int = RESOLUTION,
 ) -> TriangleMesh:
-    """An open sheet made solid; it ends, rounded, where the sheet ends.
+    """A solid around an open surface, with rounded ends at its boundary. Nothing is completed.
 
     Parameters
     ----------
     sheet : TriangleMesh or PolygonMesh
-        A surface with a boundary; where `below` equals `above` its orientation plays no part.
+        A surface with boundary; if `below` equals `above` its orientation does not matter.
     above, below : float
-        Reach on the side that the normals point to, and on the other side; `below` is `above` by default, and 0 makes
-        a solid on one side only.
+        Thickness on the side that the normals point to, and on the other side; `below` is `above` by default, and 0
+        gives a solid on one side only.
     domain : Grid, optional
         By default a grid around the sheet with room for the result.
     resolution : int
-        Nodes along the longest side of that default grid. The wall should be two cells thick at least.
+        Number of nodes along the longest side of that default grid. The solid should be at least two cells thick.
 
     Returns
     -------
@@ -194,7 +199,7 @@ def thicken(
     Raises
     ------
     SignedHeatError
-        If a reach is negative or not finite, both are zero, or the wall is thinner than a cell.
+        If a thickness is negative or not finite, both are zero, or the solid is thinner than a grid cell.
     UnsupportedTypeError
         If the domain is not a grid.
     """
@@ -215,13 +220,13 @@ def thicken(
 
 
 def _field(domain: Domain, shape: Sources) -> Field:
-    """The field that offsets are taken of."""
+    """The signed distance to a shape, whose level sets are the offsets; on grids sharpened."""
     field = signed_distance(shape, domain)
     return sharpen(field) if isinstance(field, GridField) else field
 
 
 def _offsets(shape: Sources, distances: tuple[float, ...], domain: Domain | None, resolution: int) -> Boundary:
-    """One offset after another, each of the recomputed distance to the last."""
+    """Successive offsets, each of the distance to the previous one."""
     if domain is None:
         domain = _room(shape, max(0.0, *distances), resolution)
     for distance in distances:
@@ -263,13 +268,10 @@ def _wall(grid: Grid[Literal[3]], depth: NDArray[np.float64], thickness: float) 
 
 
 def _unsigned_distance(sheet: Shapes, grid: Grid, reach: float) -> NDArray[np.float64]:
-    """Distance to a surface that exists, completed nowhere, at the nodes up to two cells beyond `reach`.
+    """Unsigned distance to a surface itself, at the nodes up to two cells beyond `reach`.
 
-    Distance to samples half a cell apart, which errs by less than 1/16 of a squared cell over the distance.
+    It is the distance to samples half a cell apart, whose error is less than 1/16 of a squared cell over the distance.
     """
-    from scipy.spatial import cKDTree
-    from trimesh.remesh import subdivide_to_size
-
     for part in as_list(sheet):
         if area_elements(part).corners.shape[1:] != (3, grid.dimension):
             raise SourceError(
@@ -281,8 +283,9 @@ def _unsigned_distance(sheet: Shapes, grid: Grid, reach: float) -> NDArray[np.fl
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     cell = float(grid.spacing.max())
     size = 0.5 * float(grid.spacing.min())
-    samples, _ = subdivide_to_size(corners.reshape(-1, 3), faces, size, max_iter=64)  # type: ignore[no-untyped-call]
+    samples, _ = remesh.subdivide_to_size(corners.reshape(-1, 3), faces, size, max_iter=64)
     far = reach + 2 * cell
-    distance = cKDTree(samples).query(grid.points.reshape(-1, 3), distance_upper_bound=far, workers=-1)[0]
+    tree = scipy.spatial.cKDTree(samples)
+    distance = tree.query(grid.points.reshape(-1, 3), distance_upper_bound=far, workers=-1)[0]
     result: NDArray[np.float64] = np.minimum(distance, far).reshape(grid.shape)
     return result

@@ -1,8 +1,8 @@
 """Signed distance to curves that bound no region: piecewise-continuous integration (Sec. 7.2, Eq. 15, Eq. 16).
 
-In every face φ is linear with gradient exactly Y, so it is known up to one constant per face. Where Y is integrable
-the constants fit across edges; where it is not, φ jumps, and the jumps are gathered on a cut that is short and runs
-where Y is not integrable.
+In every face φ is linear with gradient exactly Y, so it is known up to one constant per face. Where Y is integrable,
+the constants make φ continuous across edges; elsewhere φ jumps, and the weighted L1 norm of Eq. 16 concentrates the
+jumps on a cut that is short and runs where Y is not integrable.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from .intrinsic_piecewise import IntrinsicPiecewiseField
 from .jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 
 SOURCE_WEIGHT = 100.0
-"""An edge at the source is so many times dearer to cut than elsewhere."""
+"""Factor by which a cut along or across the source is more expensive than elsewhere."""
 
 
 def piecewise_distance(
@@ -50,39 +50,39 @@ def piecewise_distance(
     smoothing: float | None = None,
     progress: Progress | None = None,
 ) -> PiecewiseField:
-    """Signed distance to curves that need not bound anything, with jumps where no continuous distance can exist.
+    """Signed distance to curves that need not bound a region, with jumps where no continuous distance exists.
 
     Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
-    triangle is the diffused, normalised source normal Y; κ_e is the difference between the slopes along e that the two
-    faces want (Eq. 15, Eq. 16). Edges at the source weigh 100 times as much, so that the cut keeps away from it unless
-    nothing else is possible. Curves that do bound a region have a field without a cut: it differs from that of
-    `SignedHeatSolver.distance` by no more than ``integration_error / √λ`` in the mean square, λ the least positive
-    eigenvalue of the Laplacian. Works on surfaces of any topology, orientable or not; curves whose parts are oriented
-    against each other get a cut that joins the places where their orientation changes.
+    triangle is the diffused, normalised source normal Y; κ_e is the difference between the components of Y along e in
+    the two faces at e (Eq. 15, Eq. 16). Edges at the source have 100 times the weight, so that the cut avoids the
+    source wherever possible. For curves that bound a region the field has no cut, and differs from that of
+    `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean square, λ the least positive
+    eigenvalue of the Laplacian. Surfaces may have any topology, orientable or not; curves whose parts have opposite
+    orientations get a cut that joins the points at which the orientation changes.
 
     Parameters
     ----------
     domain : TriangleMesh, PolygonMesh or IntrinsicTriangulation
         The surface.
     sources : Curve, SurfacePoints, or a sequence of them
-        Where unoriented curves do not run along edges, the surface is triangulated anew so that they do: the field is
-        then one on ``intrinsic_delaunay(surface, keep=sources)``, which can also be given in the first place.
+        If unoriented curves do not run along edges, the surface is retriangulated so that they do: the domain of the
+        field is then ``intrinsic_delaunay(surface, keep=sources)``, which can also be passed as the domain.
     diffusion : float
         τ in ``t = τ h²``.
     exact : bool
-        Solve the linear program to the end, in time that grows about quadratically (20 thousand faces: seconds); else
-        stop when the objective is certified to be within 0.2 % of the least (300 thousand faces: minutes).
+        Solve the linear program exactly, in roughly quadratic time (20 thousand faces: seconds); otherwise stop when
+        the objective is certified to be within 0.2 % of the optimum (300 thousand faces: minutes).
     smoothing : float, optional
-        Smooth jumps that are no part of the cut by heat flow of this width, in mean edge lengths (Fig. 12). The
-        gradient is then Y only up to what is smoothed away.
+        Smooth jumps that are not part of the cut by heat flow of this width, in mean edge lengths (Fig. 12). The
+        gradient is then only approximately Y.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; what it raises cancels.
+        Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
     Returns
     -------
     PiecewiseField
-        Its median over the source is zero. ``diagnostics.note(Jumps)`` tells the objective, how far it may be
-        from the least, and what the jumps are: see `diagnostics.Jumps`.
+        Its median over the source is zero. ``diagnostics.note(Jumps)`` has the objective with a lower bound of it, and
+        the size of the jumps: see `diagnostics.Jumps`.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def _lowered(domain: SurfaceDomain) -> SurfaceDiscretization:
 
 
 def holds(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> bool:
-    """Whether all sources have edges to run along, and vertices to lie at, where they need them."""
+    """Whether the triangles conform to all sources, so that `adapt` does not refine them."""
     adapted = discretization.adapt(sources)[0].triangles
     fits = adapted.corner_vertices is discretization.triangles.corner_vertices
     if not fits and isinstance(discretization.domain, IntrinsicTriangulation):
@@ -207,7 +207,7 @@ def jump_problem(
 
 
 def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.bool_]:
-    """(e,) edges that touch the source, or a face that it crosses."""
+    """(e,) edges with an end on the source, and edges of faces that it crosses."""
     touched = np.zeros(triangles.n_vertices, dtype=bool)
     for part in parts:
         touched[part.nodes.elements[part.nodes.kinds == VERTEX]] = True
@@ -221,9 +221,9 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> N
 def centered(
     triangles: IntrinsicMesh, values: NDArray[np.float64], parts: Sequence[CurveSegments]
 ) -> NDArray[np.float64]:
-    """Values shifted so that their median over the source is zero, on every connected part of the surface.
+    """Values shifted so that their median over the source is zero, on every connected component of the surface.
 
-    The median, weighted by length, does not mind a jump that reaches the source. Parts without a source are NaN.
+    The median is weighted by length, and is robust to jumps that reach the source. Components without a source are NaN.
     """
     label = triangles.face_components
     faces, heights, weights = [], [], []
@@ -247,7 +247,7 @@ def centered(
 
 
 def smoothed(phi: PiecewiseField, width: float) -> NDArray[np.float64]:
-    """(m, 3) corner values after heat flow on the surface opened along the cut: ``(M + ½ width² C) φ = M φ₀``."""
+    """(m, 3) corner values after heat flow on the surface split along the cut: ``(M + ½ width² C) φ = M φ₀``."""
     opened, first, mass = split_triangles(phi)
     matrix = sparse.csr_matrix(0.5 * width**2 * cotan_matrix(opened) + sparse.diags_array(mass))
     start = np.nan_to_num(first)
@@ -255,7 +255,7 @@ def smoothed(phi: PiecewiseField, width: float) -> NDArray[np.float64]:
 
 
 def integration_error(phi: PiecewiseField, directions: NDArray[np.complex128]) -> float:
-    """Root mean square of ∇φ̄ − Y, φ̄ the mean of φ over the corners that meet off the cut."""
+    """Root mean square of ∇φ̄ − Y, where φ̄ averages φ over the corners at each vertex of the split surface."""
     opened, mean, _ = split_triangles(phi)
     known = ~np.isnan(phi.values[:, 0])
     at_corners = mean[opened.corner_vertices]
@@ -266,7 +266,7 @@ def integration_error(phi: PiecewiseField, directions: NDArray[np.complex128]) -
 
 
 def split_triangles(phi: PiecewiseField) -> tuple[IntrinsicMesh, NDArray[np.float64], NDArray[np.float64]]:
-    """The triangles with vertices doubled along the cut; mean value and lumped mass of each of their vertices."""
+    """The triangles with vertices doubled along the cut, and the mean value and lumped mass at each vertex."""
     owner, vertices = phi.glued
     opened = replace(phi.triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=len(vertices))
     mean = np.bincount(owner, phi.values.ravel()) / np.bincount(owner)

@@ -1,4 +1,4 @@
-"""Sharpening: a field made closer to a true distance, afterwards."""
+"""Sharpening: post-processing that makes a field closer to an exact distance (Sec. 7.3)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .sharpening_methods import Geodesic
 
 @runtime_checkable
 class Method(Protocol):
-    """A way to sharpen."""
+    """A method of sharpening, for fields on surfaces and tets."""
 
     def sharpened(
         self,
@@ -35,7 +35,7 @@ class Method(Protocol):
         source: Any,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-        """New values at the unknowns from old ones, and notes for the diagnostics."""
+        """Sharpened values at the unknowns, from the old ones, and notes for the diagnostics."""
 
 
 AnyField = TypeVar("AnyField", bound=VertexField | TetField)
@@ -48,39 +48,41 @@ def sharpen(field: AnyField, method: Method | None = None, progress: Progress | 
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
 def sharpen(field: Field, *arguments: Any, **options: Any) -> Field:
-    """A field closer to the exact distance to its own zero set (Sec. 7.3).
+    """Replace a field by the distance to its own zero set, with the signs of the field (Sec. 7.3).
 
-    On grids: the distance of every node to the zero set of the field, second order, with the field's signs.
+    On grids: the distance of every node to the zero set, second order.
 
-    On surfaces: the same along straight lines across the faces (`Geodesic`, the default), exact on the polyhedron up to
-    ``tolerance``. Where the curve is smooth and the triangles are good, as for a circle at ``t = h²``, there is little
-    to gain but in the largest errors. On tets: along straight lines through space, which bend round walls.
+    On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
+    smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. On tets:
+    distance along straight lines in space, which bend around the boundary of the mesh.
 
-    On both ``method=Convex()`` is the method of the paper instead, which is less accurate but mends wrong signs. On
-    tets it does harm otherwise: slopes of at most one in every tet make the field too small by more than it erred.
+    On surfaces and tets ``method=Convex()`` is the method of the paper, which is less accurate but can correct wrong
+    signs. On tets it usually increases the error: gradients of length at most one in every tet make the field too
+    small.
 
     Parameters
     ----------
     field : GridField, VertexField or TetField
-        What `signed_distance` or `SignedHeatSolver.distance` returned.
+        From `signed_distance` or `SignedHeatSolver.distance`.
     method : Geodesic or Convex, optional
         On surfaces and tets only.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; what it raises cancels.
+        Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
     Returns
     -------
-    The same kind of field. On surfaces and tets ``diagnostics`` gains a note `diagnostics.SlopeErrors`,
-    the root mean squares of ``|∇φ| − 1`` over the domain, and notes of the method.
+    GridField, VertexField or TetField
+        The same kind of field. On surfaces and tets ``diagnostics`` has a note `diagnostics.SlopeErrors`, the root mean
+        squares of ``|∇φ| − 1`` over the domain before and after, and notes of the method.
 
     Raises
     ------
     UnsupportedTypeError
         If this kind of field cannot be sharpened, or not by this method.
     OutsideError
-        If a field has one sign everywhere, or no value anywhere.
+        If the field has the same sign everywhere, or is NaN everywhere.
     GeometryError
-        If a value is infinite, or there is not one for each vertex.
+        If a value is infinite, or there is not one value for each vertex.
 
     Examples
     --------
@@ -97,7 +99,7 @@ def sharpen(field: Field, *arguments: Any, **options: Any) -> Field:
 
 @singledispatch
 def sharpen_field(field: object, *arguments: object, **options: object) -> Field:
-    """Sharpening of each kind of field, registered where the kind is dealt with; `sharpen` is its public face."""
+    """Sharpen a field; every kind of field registers a function of its own. `sharpen` is the public function."""
     raise UnsupportedTypeError(
         f"a {type(field).__name__} cannot be sharpened",
         remedy="pass a field that signed_distance returned",
@@ -112,7 +114,7 @@ def sharpened(
     method: Method | None,
     progress: Progress | None,
 ) -> tuple[NDArray[np.float64], Diagnostics]:
-    """What fields on surfaces and on tets have in common: new values, and diagnostics that compare the slopes."""
+    """Sharpened values of a field on a surface or on tets, and diagnostics with the slope errors before and after."""
     method = Geodesic() if method is None else method
     if isinstance(method, type) or not isinstance(method, Method):
         raise UnsupportedTypeError(

@@ -1,6 +1,6 @@
-"""The ways to sharpen distance on surfaces and tets (Sec. 7.3).
+"""Methods of sharpening on surfaces and tets (Sec. 7.3).
 
-The heat method errs by a smooth amount that shrinks slowly with the mesh. Two ways to take most of it away.
+The error of the heat method is smooth and decreases slowly under refinement. Both methods here remove most of it.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ..diagnostics import ConvexRounds, Note
 from ..discretization import Discretization
@@ -24,21 +25,21 @@ from ..progress import Progress
 
 @dataclass(frozen=True)
 class Geodesic:
-    """Distance along straight lines from the zero set of φ, with the signs of φ. The default.
+    """Geodesic distance from the zero set of φ, with the signs of φ: the solution of Eq. 17. The default.
 
-    On surfaces the lines run across the faces, as on the polyhedral surface itself, whatever the shape of its
-    triangles; sources without sides (unoriented curves, points) are measured from where they are, whether φ vanishes
-    there or not, and where no source has sides, distance is positive everywhere. In tets the lines run through space,
-    and bend where walls are in the way.
+    On surfaces this is exact polyhedral distance, whatever the shape of the triangles. Distance to unoriented sources
+    (unoriented curves, points) is measured from these themselves, whether φ vanishes there or not; if no source is
+    oriented, distance is positive everywhere. In tet meshes it is distance along straight lines, which bend around the
+    boundary of the mesh.
 
-    Keeps the zero set of φ and its signs, and so its faults: where a long diffusion left a wrong sign, it stays. (In
-    tets the zero set of φ is not that of its linear interpolant, but closer to that of a smooth one.)
+    The zero set of φ and its signs are kept, including signs that a long diffusion has made wrong. (In tets, the zero
+    set is that of a quadratic correction of the linear interpolant, which is closer to a smooth one.)
 
     Parameters
     ----------
     tolerance : float
-        On surfaces, neighbouring waves on an edge are made one where that changes distances by less than this fraction
-        of the edge. 0 is exact, and takes time that grows like the number of faces to the power of 1.5.
+        On surfaces, neighbouring windows on an edge are merged if that changes distances by less than this fraction of
+        the edge. 0 is exact, and takes time proportional to the number of faces to the power of 1.5.
 
     Examples
     --------
@@ -60,7 +61,7 @@ class Geodesic:
         source: Any,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-        """|φ| measured anew; parts without a zero set keep what they have."""
+        """Distances with the signs of φ; connected components without a zero set keep their values."""
         distance, notes = run_cancellable(
             lambda: straight_distance(discretization, values, source, self.tolerance),
             None if progress is None else lambda: progress(0.0, "sharpen"),
@@ -80,7 +81,7 @@ class Geodesic:
 def straight_distance(
     discretization: Any, values: NDArray[np.float64], source: Any, tolerance: float
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-    """Distance of every unknown from where values vanish, inf where that is not connected; and notes."""
+    """Distance of every unknown from the zero set of `values`, inf where there is none in its component; and notes."""
     raise UnsupportedTypeError(f"there are no straight lines on a {type(discretization).__name__}")
 
 
@@ -88,16 +89,17 @@ def straight_distance(
 class Convex:
     """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 17, Eq. 18).
 
-    Repairs wrong signs that a long diffusion left. Biased low, since a slope of at most one in every triangle or tet is
-    a lower bound on distance: on fine meshes `Geodesic` is far more accurate, and on tets the bias is greater than the
-    error of the unsharpened field. The factor serves every round (Belyaev & Fayolle 2020).
+    Corrects signs that a long diffusion has made wrong. The result is too small, since a function with gradients of
+    length at most one in every triangle or tet is a lower bound of distance: on fine meshes `Geodesic` is far more
+    accurate, and on tets the bias is larger than the error of the unsharpened field. One factorisation serves all
+    rounds (Belyaev & Fayolle 2020).
 
     Parameters
     ----------
     tolerance : float
-        Stop when the root mean squares of both residuals, which are slopes, are below this.
+        Stop when the root mean squares of primal and dual residual, which are slopes, are below this.
     max_rounds : int
-        Stop in any case; the diagnostics tell the residuals.
+        Largest number of iterations; the residuals are in the diagnostics.
     relaxation : float
         Over-relaxation, from 1 to below 2.
 
@@ -126,9 +128,7 @@ class Convex:
         source: Any,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-        """The maximiser, from φ⁰ on."""
-        from threadpoolctl import threadpool_limits
-
+        """The maximiser of Eq. 18, starting from φ⁰ = `values`."""
         if source is None or source.interpolation.shape[1] != len(values):
             raise SourceError(
                 "the convex method holds φ at the source, and this field comes without one, or from one "
@@ -139,7 +139,7 @@ class Convex:
         integration = discretization.integration
         assert isinstance(integration, DirectIntegration)  # of surfaces and tets, whose elements these are
         sizes, total = elements.sizes, elements.sizes.sum()
-        with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they bring
+        with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they gain
             factor = integration.anchored(source)
             phi = np.nan_to_num(values)
             pull = elements.masses * np.sign(phi) / (np.ptp(phi) or 1.0)
@@ -162,6 +162,6 @@ class Convex:
 
 
 def at_most_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows longer than one cut to length one."""
+    """Projection of rows on the unit ball: rows longer than one are scaled to length one."""
     result: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
     return result

@@ -1,9 +1,9 @@
-"""Tets from other programs, none of which the default installation brings.
+"""Tet meshes from TetGen and fTetWild, which are optional dependencies.
 
-Unstructured tets have no preferred directions, which lattices have: at the same size their error is half as large, or
-less (``benchmarks/tets.py``).
+Unlike lattices, unstructured tets have no preferred directions: at the same size the unsharpened error is half as
+large, or less (``benchmarks/tets.py``).
 
-* TetGen (``pip install signedheat[tetgen]``) is under the AGPL-3, or a commercial licence, whatever its wheel says.
+* TetGen (``pip install signedheat[tetgen]``) is under the AGPL-3 or a commercial licence, whatever its wheel says.
 * fTetWild (``pip install signedheat[tetwild]``) is under the MPL-2.0.
 """
 
@@ -20,12 +20,16 @@ from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
 from ..lowering.area_elements import area_elements, bounds_around
+from ..packages import lazy_module
+
+pytetwild = lazy_module("pytetwild", "tets of fTetWild")
+tetgen = lazy_module("tetgen", "tets of TetGen")
 
 
 def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
-    """Fill a box around a shape with tets of TetGen's, all of about the same size.
+    """Fill a box around a shape with tets of about the same size, by TetGen.
 
-    The shape itself is not given to TetGen, which fails on faces that cross each other: tets need not follow it.
+    Only the box is given to TetGen, which fails on intersecting faces: tets need not conform to the shape.
 
     Parameters
     ----------
@@ -34,26 +38,29 @@ def tetrahedralize_with_tetgen(shape: Any, *, resolution: int = 32, padding: flo
     resolution : int
         Number of tet edges along the longest side of the shape's box.
     padding : float, optional
-        Room on every side, in the units of the shape; by default a fifth of its longest side.
+        Distance between shape and box on every side, in the units of the shape; by default a fifth of its longest side.
+
+    Returns
+    -------
+    TetMesh
+        The tets.
 
     Raises
     ------
-    ImportError
+    MissingPackageError
         If the package `tetgen` is not installed.
     GeometryError
         If the shape has no extent.
     """
-    import tetgen
-
     lower, upper, spacing = _box_around(shape, resolution, padding)
-    volume = 1.64 * spacing**3 / (6 * np.sqrt(2))  # TetGen stays below it: tets of this edge length in the mean
+    volume = 1.64 * spacing**3 / (6 * np.sqrt(2))  # an upper bound for TetGen that gives this mean edge length
     mesher = tetgen.TetGen(*box_walls(lower, upper, np.ceil((upper - lower) / (1.4 * spacing)).astype(np.int64)))
     options = {"mindihedral": 10, "minratio": 1.4, "nobisect": True, "maxvolume": volume, "fixedvolume": True}
     return TetMesh(*mesher.tetrahedralize(order=1, **options)[:2])
 
 
 def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: float | None = None) -> TetMesh:
-    """Fill a box around a shape with tets of fTetWild's, which follow the shape's faces nearly.
+    """Fill a box around a shape with tets that approximately conform to its faces, by fTetWild.
 
     Parameters
     ----------
@@ -62,17 +69,20 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
     resolution : int
         Number of tet edges along the longest side of the shape's box.
     padding : float, optional
-        Room on every side, in the units of the shape; by default a fifth of its longest side.
+        Distance between shape and box on every side, in the units of the shape; by default a fifth of its longest side.
+
+    Returns
+    -------
+    TetMesh
+        The tets.
 
     Raises
     ------
-    ImportError
+    MissingPackageError
         If the package `pytetwild` is not installed.
     GeometryError
         If the shape has no faces, or no extent.
     """
-    import pytetwild
-
     if isinstance(shape, PointCloud):
         raise GeometryError(
             "fTetWild follows faces, and a point cloud has none",
@@ -97,7 +107,7 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
 def _box_around(
     shape: Any, resolution: int, padding: float | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """Corners of the padded box of a shape, and the edge length wanted."""
+    """Lower and upper corner of the padded bounding box of a shape, and the target edge length."""
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
@@ -109,7 +119,7 @@ def _box_around(
 def box_walls(
     lower: NDArray[np.float64], upper: NDArray[np.float64], counts: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """A box in triangles: its sides cut into counts of rectangles along x, y and z, and each of these in two."""
+    """Triangulated box: vertices, and faces from `counts` rectangles along x, y and z, each cut into two triangles."""
     stride = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
     faces = []
     for axis in range(3):

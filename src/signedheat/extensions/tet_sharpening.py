@@ -24,10 +24,10 @@ from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
 
 GRAZING = 1e-6
-"""A line may lie so far outside the mesh, over the size of its tets."""
+"""Distance, relative to the size of the tets, by which a line may lie outside the mesh."""
 
 LARGEST_BEND = 1.0
-"""The zero set is moved by at most this, over h, for the curvature of φ; creases know no curvature."""
+"""Limit on the quadratic correction of the zero set, relative to h; at creases of φ the correction has no meaning."""
 
 
 @sharpen_field.register
@@ -43,10 +43,10 @@ def _(field: TetField, method: Method | None = None, progress: Progress | None =
 def _(
     lowered: TetDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-    """Through space, from the surface on which values vanish; round the walls of the mesh.
+    """Any-angle distance from the zero set in space, around the boundary of the mesh.
 
-    Where the linear interpolant vanishes, φ itself does not if it is curved. By how much it differs there, its
-    gradients at the corners of the tet tell to second order: ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)``.
+    A curved φ does not vanish where its linear interpolant does. The difference is known to second order from the
+    gradients at the corners of the tet: ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k)``.
     """
     mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
     points = mesh.vertices[lowered.vertices] - planes.center
@@ -83,6 +83,6 @@ def _(
 
 
 def by_element(ids: NDArray[np.int64], n: int, width: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Where each of n ids begins, in the list of the rows that name it."""
+    """Inverse index: where the rows that contain each of n ids begin, and these rows, `width` ids to a row."""
     starts = np.concatenate([[0], np.cumsum(np.bincount(ids.ravel(), minlength=n))])
     return starts, np.argsort(ids.ravel(), kind="stable") // width

@@ -1,9 +1,9 @@
-"""Tets around a broken shape: a lattice, fine near the shape and coarse away from it.
+"""Graded tet lattices around broken shapes: fine near the shape, coarse away from it.
 
-The mesh need not follow the shape, since sources are clipped against the tets, so nothing in the shape can make the
-lattice fail. Leaves of an octree are joined, through every face that two of them share, by one tet on each edge of
-the face (split where a smaller leaf has split it) and the two centres; equal leaves give the body-centred cubic
-lattice, whose dihedral angles are 60° and 90°; where sizes change they stay between 30° and 135°.
+The mesh need not conform to the shape, since sources are clipped against the tets; so it can be made for every shape.
+Across every face that two leaves of an octree share, their centres are joined by one tet for each edge of the face
+(edges are split where a smaller leaf splits them). Equal leaves give the body-centred cubic lattice, with dihedral
+angles of 60° and 90°; where sizes change angles stay between 30° and 135°.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import itertools
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..domains.grid import room_around
@@ -22,7 +23,7 @@ from ..errors import GeometryError, MemoryLimitError
 from ..lowering.area_elements import area_elements, bounds_around
 
 LEAST_GRADING = 2.7
-"""Below this, neighbouring leaves could differ by more than a factor of two: g/2 must exceed √3·¾."""
+"""Below this, neighbouring leaves could differ by more than a factor of two in size: g/2 must exceed √3·¾."""
 
 MOST_TETS = 50_000_000
 """More would need over 20 GB to build."""
@@ -31,7 +32,7 @@ MOST_TETS = 50_000_000
 def tetrahedralize(
     shape: Shape, *, resolution: int = 32, padding: float | None = None, grading: float = 3.0
 ) -> TetMesh:
-    """Fill a box around a shape with tets of good angles, graded from the shape outward.
+    """Fill a box around a shape with tets of good angles, whose size grows with the distance from the shape.
 
     Parameters
     ----------
@@ -40,9 +41,9 @@ def tetrahedralize(
     resolution : int
         Number of lattice cells along the longest side of the shape's box, at the shape.
     padding : float, optional
-        Room on every side, or a little more, in the units of the shape; by default a fifth of its longest side.
+        Least distance between shape and box, in the units of the shape; by default a fifth of its longest side.
     grading : float
-        A cell is no larger than its distance from the shape divided by `grading`; 2.7 or more. ``inf`` gives a
+        A cell is no larger than its distance from the shape divided by `grading`; at least 2.7. ``inf`` gives a
         uniform lattice.
 
     Returns
@@ -55,15 +56,15 @@ def tetrahedralize(
     GeometryError
         If the shape has no extent, or a parameter is out of range.
     SourceError
-        If it is not a shape in space.
+        If the argument is not a shape in space.
     MemoryLimitError
         If the lattice would have more than 50 million tets.
 
     Notes
     -----
-    On lattices, waves of heat are a little faster along some directions than others. `sharpen` mends the error that
-    this makes; diffusing four times as long (``diffusion=4``) halves it on smooth shapes. Unstructured tets have less
-    of it: see `signedheat.extensions.tet_meshers` for those of TetGen and fTetWild.
+    On lattices, heat decays slightly faster along some directions than others. `sharpen` removes the resulting error; a
+    four times larger diffusion time (``diffusion=4``) halves it on smooth shapes. On unstructured tets it is smaller:
+    see `signedheat.extensions.tet_meshers` for TetGen and fTetWild.
 
     Examples
     --------
@@ -73,8 +74,6 @@ def tetrahedralize(
     >>> float(mesh.tet_volumes.min()) > 0
     True
     """
-    from scipy.spatial import cKDTree
-
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
@@ -95,14 +94,14 @@ def tetrahedralize(
     area = 0.0 if isinstance(shape, PointCloud) else float(area_elements(shape).weights.sum())
     _refuse_too_many(12 * max(float(counts.prod()), (2 * grading * area / spacing**2) if depth else 0.0))
     origin = lower - (counts * coarse - sides) / 2
-    samples = cKDTree(sample_points(shape, spacing))
+    samples = scipy.spatial.cKDTree(sample_points(shape, spacing))
     corners, sizes = _octree(samples, origin, spacing, counts, depth, grading)
     points, tets = _join_leaves(corners, sizes, counts * 2 ** (depth + 1))
     return TetMesh(origin + points * (spacing / 2), tets)
 
 
 def sample_points(shape: Shape, spacing: float) -> NDArray[np.float64]:
-    """Points on a shape, so dense that no point of it is farther than `spacing` from one of them."""
+    """Points on a shape such that no point of it is farther than `spacing` from one of them."""
     if isinstance(shape, PointCloud):
         return shape.points
     triangles = area_elements(shape).corners
@@ -128,10 +127,10 @@ def _refuse_too_many(tets: float) -> None:
 def _octree(
     samples: Any, origin: NDArray[np.float64], spacing: float, counts: NDArray[np.int64], depth: int, grading: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Lower corners and sizes of the leaves, in half cells of the finest level; neighbours differ by at most two.
+    """Lower corners and sizes of the leaves, in half cells of the finest level.
 
-    The distance to fixed samples changes no faster than the place, so a leaf that was left whole has no neighbour
-    that was split twice: the tree needs no balancing.
+    The distance to the samples is Lipschitz with constant one, so no leaf has a neighbour that was split twice more:
+    the tree needs no balancing.
     """
     size = 2 ** (depth + 1)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) * size
@@ -153,7 +152,7 @@ def _octree(
 def _join_leaves(
     corners: NDArray[np.int64], sizes: NDArray[np.int64], upper: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Points, in half cells of the finest level, and tets between the centres of leaves that share a face."""
+    """Points, in half cells of the finest level, and tets that join the centres of leaves that share a face."""
     stride = np.array([(upper[1] + 1) * (upper[2] + 1), upper[2] + 1, 1])
     leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
@@ -175,7 +174,7 @@ def _join_leaves(
         center = corners + half
         opposite = np.where(larger[:, None], parent + 2 * half, beyond + half)
         opposite = np.where(outside[:, None], center + step * half, opposite)
-        chosen = np.flatnonzero(outside | larger | (equal if side else False))  # equal leaves meet once, not twice
+        chosen = np.flatnonzero(outside | larger | (equal if side else False))  # count pairs of equal leaves once
         u, v = np.roll(np.eye(3, dtype=np.int64), -axis, axis=0)[1:]
         square = np.array([0 * u, u, u + v, v])
         face = corners[chosen, None] + (square + side * np.eye(3, dtype=np.int64)[axis]) * sizes[chosen, None, None]

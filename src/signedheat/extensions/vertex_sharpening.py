@@ -25,7 +25,7 @@ from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
 
 HALO = 4.0
-"""Distance from a source without sides, over h, within which zeros of φ may come of that source alone."""
+"""Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
 
 
 @sharpen_field.register
@@ -42,7 +42,7 @@ def _(field: VertexField, method: Method | None = None, progress: Progress | Non
 
 
 def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[np.float64]:
-    """Values at the vertices of the surface's triangles; averages at those that the domain does not have."""
+    """Values at the vertices of the surface's triangles; averages of neighbours at those that the domain lacks."""
     n = surface.triangles.n_vertices
     values = np.asarray(field.values)
     wanted = n if surface.restriction is None else len(surface.restriction)
@@ -65,13 +65,13 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
 def _(
     surface: SurfaceDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-    """Along the faces, from the line on which values vanish and from sources without sides."""
+    """Polyhedral distance from the zero set of the values and from unoriented sources."""
     parts = getattr(source, "parts", ())
     unsided = [part for part in parts if not part.oriented]
     if not unsided:
         distance, windows = distance_to_zero_line(surface.triangles, values, tolerance)
         return distance, (GeodesicWindows(int(windows)),)
-    # They run along edges of triangles of their own, whose first vertices are those of the surface.
+    # Unoriented curves run along edges of refined triangles, whose first vertices are those of the surface.
     near, windows = distance_to_segments(source.triangles, unsided, tolerance)
     near = near[: len(values)]
     if source.oriented:
@@ -87,10 +87,10 @@ def _(
 def without_halos(
     triangles: IntrinsicMesh, values: NDArray[np.float64], beside: NDArray[np.bool_], sided: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """Values without the zero lines that belong to sources without sides: NaN along those.
+    """Values with NaN along those parts of the zero set that are due to unoriented sources.
 
-    φ is zero at such a source only on average. A line on which it vanishes, all of it beside the source, at no vertex
-    that an oriented curve passes, comes of that alone.
+    φ is zero at such a source only on average, so it may change sign around it. A connected part of the zero set that
+    lies entirely beside the source, and at no vertex of an oriented curve, is due to the source alone.
     """
     signs = np.sign(values)[triangles.corner_vertices]
     crossed = np.flatnonzero((signs.min(axis=1) < 0) & (signs.max(axis=1) > 0))
@@ -112,7 +112,7 @@ def without_halos(
 def distance_to_segments(
     triangles: IntrinsicMesh, parts: list[CurveSegments], tolerance: float
 ) -> tuple[NDArray[np.float64], int]:
-    """Distance of every vertex to curves along edges and to points anywhere; and the windows that it took."""
+    """Distance of every vertex to curves along edges and to points anywhere; and the number of windows."""
     nodes = concatenated([part.nodes for part in parts])
     at_vertex = nodes.kinds == VERTEX
     inside = nodes[~at_vertex]

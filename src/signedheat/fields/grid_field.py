@@ -8,6 +8,7 @@ from os import PathLike
 from typing import Any, Generic, Literal, overload
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
@@ -202,14 +203,12 @@ class GridField(Generic[Dimension]):
         return points, np.clip(np.atleast_2d(points), self.grid.origin, self.grid.upper)
 
     def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        from scipy.ndimage import map_coordinates
-
         index = ((points - self.grid.origin) / self.grid.spacing).T
         if self._known is None:
-            result: NDArray[np.float64] = map_coordinates(self.values, index, order=1, mode="nearest")
+            result: NDArray[np.float64] = scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
             return result
-        sums = map_coordinates(np.where(self._known, self.values, 0.0), index, order=1, mode="nearest")
-        weights = map_coordinates(self._known.astype(np.float64), index, order=1, mode="nearest")
+        sums = scipy.ndimage.map_coordinates(np.where(self._known, self.values, 0.0), index, order=1, mode="nearest")
+        weights = scipy.ndimage.map_coordinates(self._known.astype(np.float64), index, order=1, mode="nearest")
         return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
 
     @cached_property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..compiled import compiled
 
@@ -34,11 +35,9 @@ def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.int
     >>> connected_components(4, np.array([0, 3]), np.array([2, 3])).tolist()
     [0, 1, 0, 2]
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components as label
-
-    graph = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(n, n))
-    return label(graph.tocsr(), directed=False)[1].astype(np.int64)
+    graph = sparse.coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(n, n))
+    labels: NDArray[np.int64] = sparse.csgraph.connected_components(graph.tocsr(), directed=False)[1].astype(np.int64)
+    return labels
 
 
 def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -82,10 +83,8 @@ def tangent_planes(
 
     Planes are fitted to the neighbours: normals that come with scans often belong to another mesh, and fit worse.
     """
-    from scipy.spatial import cKDTree
-
     k = min(n_neighbors, len(points) - 1)
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     axes = np.empty((len(points), 3, 3))
     neighbors = np.empty((len(points), k), dtype=np.int64)
     reach = np.empty(len(points))

@@ -6,6 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import GeometryError, OutsideError
+from ..packages import lazy_module
+
+measure = lazy_module("skimage.measure", "contours")
 
 CLEARANCE = 1e-3
 """Crossings stay this fraction of a cell away from the nodes, so that no two vertices of a surface coincide."""
@@ -34,8 +37,6 @@ def closed_surface(
     faces : (m, 3) int
         Vertex ids, counter-clockwise as seen from the side of greater values.
     """
-    from skimage.measure import marching_cubes
-
     if values.ndim != 3:
         raise GeometryError(f"fields are contoured in 2 and 3 dimensions, and this grid has {values.ndim}")
     if np.isinf(values).any():
@@ -44,7 +45,7 @@ def closed_surface(
     shift = 0
     if wall_signs(height) == {True, False}:
         height, shift = capped(height), 1
-    vertices, faces, _, _ = marching_cubes(height, 0.0, gradient_direction="descent")
+    vertices, faces, _, _ = measure.marching_cubes(height, 0.0, gradient_direction="descent")
     return origin + (vertices.astype(np.float64) - shift) * spacing, faces
 
 
@@ -61,9 +62,7 @@ def level_lines(
     >>> points.tolist(), closed
     ([[0.5, 2.0], [0.5, 1.0], [0.5, 0.0]], False)
     """
-    from skimage.measure import find_contours
-
-    lines = find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
+    lines = measure.find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
     closed = [len(line) > 3 and bool((line[0] == line[-1]).all()) for line in lines]
     return [(origin + at * spacing, end) for at, end in zip(lines, closed, strict=True)]
 

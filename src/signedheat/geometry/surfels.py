@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from .edges import EdgeTable
@@ -95,8 +96,6 @@ def corrected_normals(
     >>> corrected_normals(solid, found, np.ones(3), 2.0)[top].round(6) + 0.0
     array([[0., 0., 1.]])
     """
-    from scipy.ndimage import gaussian_filter
-
     own = np.zeros((len(surfels.axes), 3))
     own[np.arange(len(own)), surfels.axes] = surfels.signs
     if radius == 0:
@@ -109,7 +108,7 @@ def corrected_normals(
     gradient = np.empty_like(own)
     for axis in range(3):
         order = [int(a == axis) for a in range(3)]
-        slope = gaussian_filter(padded, width, order=order)
+        slope = scipy.ndimage.gaussian_filter(padded, width, order=order)
         gradient[:, axis] = (slope[inside].astype(np.float64) + slope[outside]) / spacing[axis]
     length = np.linalg.norm(gradient, axis=1, keepdims=True)
     normals = np.divide(-gradient, length, out=own.copy(), where=length > 0)

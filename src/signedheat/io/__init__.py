@@ -1,4 +1,4 @@
-"""Reading and writing: shapes, and the fields computed from them."""
+"""Reading and writing of shapes, curves and fields."""
 
 from . import interop as _interop  # noqa: F401  provides the exchange with other packages
 from .curves import CURVE_FORMATS, read_curves, write_curves

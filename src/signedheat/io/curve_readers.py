@@ -1,4 +1,4 @@
-"""What files of curves say: groups of nodes, in each of the formats."""
+"""Readers of curves on surfaces, one for each format: groups of nodes, or curves."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
 
 
 class Node(NamedTuple):
-    """A point of a file: up to three vertices and their weights."""
+    """A point in a file: up to three vertices and their weights."""
 
     vertices: tuple[int, ...]
     weights: tuple[float, ...]
 
 
 class Group(NamedTuple):
-    """A curve of a file, or several points."""
+    """A curve in a file, or several points."""
 
     kind: str
     nodes: list[Node]
@@ -47,7 +47,7 @@ def edge_vertices(domain: EmbeddedSurface) -> NDArray[np.int64]:
 
 
 def read_text(path: PathLike, domain: EmbeddedSurface) -> list[Group]:
-    """Both text formats."""
+    """Curves in either of the two text formats."""
     lines = [line.split() for line in text(path).splitlines()]
     if any(words and words[0] in (SIGNED, UNSIGNED, POINTS) for words in lines):
         return read_groups(path, lines, domain)
@@ -55,7 +55,7 @@ def read_text(path: PathLike, domain: EmbeddedSurface) -> list[Group]:
 
 
 def read_groups(path: PathLike, lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
-    """The published demo's format."""
+    """The format of the published demo."""
     groups: list[tuple[Group, bool]] = []
     edges = None
     for number, words in enumerate(lines, start=1):
@@ -122,7 +122,7 @@ def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: EmbeddedSu
 def polylines_of_segments(
     path: PathLike, kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]
 ) -> list[Group]:
-    """Segments between nodes, joined to curves; nodes at the same place count as one."""
+    """Segments between nodes, joined to curves; nodes at the same position count as one."""
     bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
     if bad:
         raise FileFormatError(
@@ -183,7 +183,7 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
 
 
 def read_csv(path: PathLike, domain: EmbeddedSurface) -> list[Curve]:
-    """Polylines in space, as tables of points."""
+    """Polylines in space from tables of points, projected on the domain."""
     return [domain.polyline(points, closed=closed) for points, closed in read_point_lists(path, 3)]
 
 
@@ -226,22 +226,18 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
 
 
 def projected_nodes(domain: EmbeddedSurface, points: NDArray[np.float64]) -> list[Node]:
-    """Closest points of a surface, as nodes."""
+    """Closest points on a surface, as nodes."""
     faces, weights, _ = closest_points(domain.triangulation, points)
     return nodes_of(faces, weights, domain)
 
 
 def damaged(path: PathLike, number: int, words: list[str], reason: str) -> FileFormatError:
-    """The error for a line that makes no sense."""
-    return FileFormatError(
-        f"line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})",
-        element=f"line {number}",
-        path=path,
-    )
+    """The error for a line that cannot be parsed."""
+    return FileFormatError(f"{path}: line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})")
 
 
 def nodes_of(faces: NDArray[np.int64], weights: NDArray[np.float64], domain: EmbeddedSurface) -> list[Node]:
-    """Points on faces, as vertices and weights."""
+    """Points on faces, as nodes."""
     corners = domain.triangulation.faces[faces]
     return [
         Node(tuple(v for v, w in zip(c, b, strict=True) if w > 0), tuple(w for w in b if w > 0))

@@ -1,8 +1,8 @@
-"""Curves on surfaces from files and back.
+"""Reading and writing of curves on surfaces.
 
-The published demo's text format, its sibling with oriented segments, OBJ line elements, and portable JSON, in which
-points are vertex ids with weights. Edges are numbered by first appearance in the faces: corners 0–1, 1–2, 2–0, face
-after face; an edge runs the way its first face has it, and a fraction s along it leads from tail to head.
+The text format of the published demo, a similar one with oriented segments, OBJ line elements, and JSON, in which
+points are vertex ids with weights. Edges are numbered by first appearance in the faces (corners 0–1, 1–2, 2–0, face
+after face) and have the direction in which their first face runs along them; a fraction s is from tail to head.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def read_curves(path: PathLike, domain: EmbeddedSurface, strict: bool = False) -
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface that the ids refer to.
     strict : bool
-        Refuse curves with consecutive points that share no face, which are otherwise joined by shortest lines.
+        Refuse curves with consecutive points that share no face, which are otherwise joined by geodesic paths.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def read_curves(path: PathLike, domain: EmbeddedSurface, strict: bool = False) -
     Raises
     ------
     FileFormatError
-        If the file is missing, of unknown kind, or holds what the format does not have.
+        If the file is missing, of unknown format, or damaged.
     SourceError
         If the curves do not fit the surface, or have gaps that `strict` forbids.
 
@@ -111,17 +111,17 @@ def refuse_gaps(sources: Sequence[CurveOrPoints], mesh: TriangleMesh) -> None:
 
 
 def write_curves(path: PathLike, curves: CurveOrPoints | Sequence[CurveOrPoints], domain: EmbeddedSurface) -> None:
-    """Write curves and points on a surface; the extension says the format.
+    """Write curves and points on a surface, in the format given by the extension.
 
-    ``.txt`` (published demo) and ``.json`` (portable) keep everything but given normals, and read back the same;
-    ``.obj`` holds polylines in space.
+    ``.txt`` (the published demo's format) and ``.json`` keep everything except given normals, exactly; ``.obj`` has
+    polylines in space.
 
     Parameters
     ----------
     path : str or path
-        Where to. Written under a temporary name and then renamed: a file that was there before survives a failure.
+        The file. It is written under a temporary name and renamed, so that an existing file survives a failure.
     curves : Curve, SurfacePoints or a sequence of them
-        What to write.
+        The curves and points.
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface they lie on.
 
@@ -139,7 +139,7 @@ def write_curves(path: PathLike, curves: CurveOrPoints | Sequence[CurveOrPoints]
 
 
 def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
-    """A group of a file on its surface."""
+    """The curve or the points of a group."""
     faces, weights = on_faces(group.nodes, domain)
     if group.kind == POINTS:
         return SurfacePoints(faces, weights)
@@ -181,7 +181,7 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[NDArray[np
 
 
 def groups_of(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> list[Group]:
-    """Curves and points, as a file has them; closed curves end with their first point."""
+    """Curves and points as groups of a file; closed curves end with their first point."""
     groups = []
     for number, curve in enumerate(curves):
         if not isinstance(curve, (Curve, SurfacePoints)):
@@ -199,7 +199,7 @@ def groups_of(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> list[
 
 
 def write_text(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
-    """The published demo's format."""
+    """The format of the published demo."""
     table = edge_vertices(domain)
     number = {tuple(sorted(e)): (k, e[0]) for k, e in enumerate(table.tolist())}
     lines = []
@@ -219,7 +219,7 @@ def write_text(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
 
 
 def write_json(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
-    """Portable JSON."""
+    """JSON with vertex ids and weights."""
     groups = []
     for group in groups_of(curves, domain):
         nodes = [{"v": list(node.vertices), "w": list(node.weights)} for node in group.nodes]

@@ -1,13 +1,11 @@
-"""Grid fields from files and back, exact to the last bit: values, origin, spacing, order of axes."""
+"""Reading and writing of fields on grids, exact to the last bit: values, origin, spacing, order of axes."""
 
 from __future__ import annotations
 
-import importlib
 import io
 import json
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -19,10 +17,15 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
+from ..packages import lazy_module, require
 from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
 from .tets import TET_FIELD_FORMATS, load_tet_field, save_tet_field
 from .vtk_xml import read_vti, write_vti
+
+_NEEDED = {".nrrd": ("nrrd", "NRRD files"), ".vdb": ("openvdb", ".vdb files")}
+nrrd = lazy_module(*_NEEDED[".nrrd"])
+openvdb = lazy_module(*_NEEDED[".vdb"])
 
 CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
@@ -31,7 +34,7 @@ CONVENTION = (
 NAME = "signed_distance"
 
 Parts = tuple[Any, ...]
-"""Values, origin, spacing; and the mask, where there is one."""
+"""Values, origin, spacing; and the mask, if there is one."""
 
 
 @save_any_field.provide
@@ -51,7 +54,7 @@ def _(field: object, path: PathLike) -> None:
 
 
 def save_field(field: GridField, path: PathLike) -> None:
-    """Write a field on a grid; the extension says the format.
+    """Write a field on a grid, in the format given by the extension.
 
     ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
     same name beside it, ``.vdb`` (OpenVDB; single precision, and only where a module for it is installed).
@@ -59,14 +62,14 @@ def save_field(field: GridField, path: PathLike) -> None:
     Parameters
     ----------
     field : GridField
-        What to write.
+        The field.
     path : str or path
-        Where to. Written under a temporary name and then renamed: a file that was there before survives a failure.
+        The file. It is written under a temporary name and renamed, so that an existing file survives a failure.
 
     Raises
     ------
     FileFormatError
-        If the format is unknown, has no room for the field's dimension, or the file cannot be written.
+        If the format is unknown, does not support the dimension of the field, or the file cannot be written.
     """
     if not isinstance(field, GridField):
         raise FileFormatError(
@@ -91,27 +94,29 @@ def save_field(field: GridField, path: PathLike) -> None:
 
 
 def ensure_field_writable(path: PathLike) -> None:
-    """Find out before a long computation whether a field can be written.
+    """Check before a long computation that a field can be written.
 
     Raises
     ------
     FileFormatError
-        If the format is unknown or needs a module that is not installed, or no file can be made there.
+        If the format is unknown, or no file can be made there.
+    MissingPackageError
+        If the format needs a package that is not installed.
     """
     ensure_writable(path, _FORMATS, "a field")
-    if extension(path) == ".vdb":
-        _openvdb(path)
+    if extension(path) in _NEEDED:
+        require(*_NEEDED[extension(path)])
 
 
 def load_field(path: PathLike) -> Field:
-    """Read a field that `save_field` wrote, exactly as it was: values and transform.
+    """Read a field, exactly as it was written: values and transform.
 
     Parameters
     ----------
     path : str or path
-        A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file. Images of other programs will
-        do if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file holds a field on tets; a
-        ``.npz`` file with vertices a field on a surface.
+        A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file; images of other programs can be
+        read if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets, a ``.npz`` file with
+        vertices a field on a surface.
 
     Returns
     -------
@@ -121,7 +126,7 @@ def load_field(path: PathLike) -> Field:
     Raises
     ------
     FileFormatError
-        If the file is missing, of unknown kind, truncated, damaged, or holds no scalar image along x, y, z.
+        If the file is missing, of unknown format, truncated, damaged, or has no scalar image along x, y, z.
 
     Examples
     --------
@@ -221,8 +226,6 @@ def _write_vti(field: GridField, path: Path) -> None:
 
 
 def _write_nrrd(field: GridField, path: Path) -> None:
-    import nrrd
-
     dimension = field.grid.dimension
     header = {
         "space dimension": dimension,
@@ -238,10 +241,9 @@ def _write_nrrd(field: GridField, path: Path) -> None:
 
 def _read_nrrd(path: PathLike) -> Parts:
     contents(path)
-    import nrrd
-
+    read = nrrd.read
     try:
-        values, header = nrrd.read(str(path), index_order="F")
+        values, header = read(str(path), index_order="F")
     except Exception as error:
         raise FileFormatError(
             f"it is no NRRD file, or is truncated ({error})",
@@ -259,22 +261,8 @@ def _read_nrrd(path: PathLike) -> Parts:
     return values, np.asarray(header.get("space origin", np.zeros(values.ndim))), spacing
 
 
-def _openvdb(path: PathLike) -> ModuleType:
-    for name in ("openvdb", "pyopenvdb"):
-        try:
-            return importlib.import_module(name)
-        except ImportError:
-            continue
-    raise FileFormatError(
-        ".vdb needs OpenVDB's Python module, which is not installed",
-        remedy="conda install -c conda-forge openvdb, or save as .vti",
-        path=path,
-    )
-
-
 def _write_vdb(field: GridField, path: Path) -> None:
-    openvdb = _openvdb(path)
-    # Nodes that equal the background are left out of a VDB tree: no node may.
+    # A VDB tree omits nodes that equal the background value, so it must differ from all values.
     volume = openvdb.FloatGrid(float(np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))))
     volume.copyFromArray(field.values.astype(np.float32))
     matrix = np.diag([*field.grid.spacing, 1.0])
@@ -282,16 +270,16 @@ def _write_vdb(field: GridField, path: Path) -> None:
     volume.transform = openvdb.createLinearTransform(matrix.tolist())
     volume.name = NAME
     volume["convention"] = CONVENTION
-    volume["spacing"] = " ".join(map(repr, field.grid.spacing.tolist()))  # the transform rounds it
+    volume["spacing"] = " ".join(map(repr, field.grid.spacing.tolist()))  # the transform has it rounded
     openvdb.write(str(path), grids=[volume])
 
 
 def _read_vdb(path: PathLike) -> Parts:
-    openvdb = _openvdb(path)
     contents(path)
+    read = openvdb.read
     try:
         volume = openvdb.readAllGridMetadata(str(path))[0]
-        volume = openvdb.read(str(path), volume.name)
+        volume = read(str(path), volume.name)
         lower, upper = (np.array(corner) for corner in volume.evalActiveVoxelBoundingBox())
         values = np.empty(tuple(upper - lower + 1), dtype=np.float32)
         volume.copyToArray(values, ijk=tuple(int(i) for i in lower))
@@ -317,6 +305,6 @@ _FORMATS: dict[str, tuple[Callable[[GridField, Path], None], Callable[[PathLike]
 }
 
 _DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
-"""Numbers of axes that a format has room for; the others have room for any."""
+"""Numbers of axes that a format supports; the others support any number."""
 
 FIELD_FORMATS = frozenset(_FORMATS)

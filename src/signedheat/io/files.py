@@ -1,4 +1,4 @@
-"""Files as such: names, contents, and writing so that nothing is lost when it fails."""
+"""File names, contents, and atomic replacement of files."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ PathLike = str | os.PathLike[str]
 
 
 def extension(path: PathLike) -> str:
-    """The end of a file's name that says its format, in lower case: ``".stl"``."""
+    """The extension of a file name in lower case, with the dot: ``".stl"``."""
     return Path(path).suffix.lower()
 
 
 def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> FileFormatError:
-    """The error for a name that tells no format we know."""
+    """The error for an extension that is not supported."""
     ending = extension(path)
     cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
     return FileFormatError(
@@ -34,12 +34,12 @@ def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> F
 
 
 def contents(path: PathLike) -> bytes:
-    """All bytes of a file.
+    """The bytes of a file.
 
     Raises
     ------
     FileFormatError
-        If it is missing, is no file, may not be read, or is empty.
+        If it is missing, is not a regular file, cannot be read, or is empty.
     """
     try:
         data = Path(path).read_bytes()
@@ -71,26 +71,26 @@ def contents(path: PathLike) -> bytes:
 
 
 def text(path: PathLike) -> str:
-    """A file as text; bytes that are no UTF-8, as in names of materials, become marks."""
+    """A file as text; bytes that are not UTF-8, for instance in material names, become replacement characters."""
     return contents(path).decode("utf-8", errors="replace")
 
 
 def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> None:
-    """Find out before a long computation whether its result can be written.
+    """Check before a long computation that its result can be written.
 
     Parameters
     ----------
     path : path
-        Where the result is to go.
+        The file.
     known : collection of str
-        Extensions that will do, with the dot.
+        Supported extensions, with the dot.
     purpose : str
         What is to be written, for the message.
 
     Raises
     ------
     FileFormatError
-        If the extension is not among the known, or no file can be made there.
+        If the extension is not supported, or the file cannot be created.
     """
     if extension(path) not in known:
         raise unknown_extension(path, known, purpose)
@@ -108,12 +108,12 @@ def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> Non
 
 @contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """A temporary name to write to, renamed to `path` if all goes well and removed if not.
+    """A temporary file to write to, which is renamed to `path` on success and removed otherwise.
 
     Raises
     ------
     FileFormatError
-        If the file cannot be written; one that was there before is then still there, unchanged.
+        If the file cannot be written; an existing file is then left unchanged.
     """
     temporary = _unused_name(path)
     with _writing(path):
@@ -144,7 +144,7 @@ def _writing(path: PathLike) -> Iterator[None]:
 
 
 def numbers(tokens: list[Any], path: PathLike, what: str, kind: type = float) -> NDArray[Any]:
-    """Words of a text file as numbers."""
+    """Words of a text file as an array of numbers."""
     try:
         return np.array(tokens, dtype=np.float64 if kind is float else np.int64)
     except (ValueError, OverflowError) as error:

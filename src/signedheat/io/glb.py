@@ -1,4 +1,4 @@
-"""GLB and glTF, by trimesh."""
+"""GLB and glTF, read by trimesh."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ import numpy as np
 
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
+from ..packages import lazy_module
 from .files import PathLike, contents, extension
+
+trimesh = lazy_module("trimesh", ".glb and .gltf files")
 
 
 def read_glb(path: PathLike) -> TriangleMesh:
-    """All triangles of a scene, each where its node puts it, one body after another."""
+    """All triangles of a scene, transformed by their nodes, one body after another."""
     contents(path)
-    import trimesh
-
+    load_scene = trimesh.load_scene
     try:
-        scene = trimesh.load_scene(str(Path(path)), file_type=extension(path)[1:], process=False)
+        scene = load_scene(str(Path(path)), file_type=extension(path)[1:], process=False)
         bodies = [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
     except Exception as error:
         raise FileFormatError(

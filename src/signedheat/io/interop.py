@@ -1,6 +1,6 @@
-"""Shapes from and to the objects of other packages, each of which is imported only where it is used.
+"""Conversion of shapes from and to the objects of other packages, each imported only where it is used.
 
-Vertices and faces keep their number and order, both ways.
+Vertices and faces keep their number and order in both directions.
 """
 
 from __future__ import annotations
@@ -15,7 +15,12 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
+from ..packages import lazy_module
 from .elements import SurfaceShape, faces_of, points_of
+
+meshio = lazy_module("meshio", "objects of meshio")
+pyvista = lazy_module("pyvista", "objects of PyVista")
+trimesh = lazy_module("trimesh", "objects of trimesh")
 
 _SIDES = {"triangle": 3, "quad": 4}
 
@@ -29,8 +34,6 @@ def from_trimesh(kind: type, thing: Any) -> Any:
 
 def to_trimesh(shape: SurfaceShape) -> Any:
     """As a `trimesh.Trimesh` (not processed: nothing is merged) or `trimesh.PointCloud`."""
-    import trimesh
-
     if isinstance(shape, PointCloud):
         return trimesh.PointCloud(np.array(shape.points))  # type: ignore[no-untyped-call]
     if isinstance(shape, PolygonMesh):
@@ -60,8 +63,6 @@ def from_pyvista(kind: type, thing: Any) -> Any:
 
 def to_pyvista(shape: SurfaceShape) -> Any:
     """As a `pyvista.PolyData`; normals of points are point data ``Normals``."""
-    import pyvista
-
     points, (corners, counts) = np.array(points_of(shape)), faces_of(shape)
     if isinstance(shape, PointCloud):
         cloud = pyvista.PolyData(points)
@@ -84,14 +85,12 @@ def from_meshio(kind: type, thing: Any) -> Any:
 
 def to_meshio(shape: SurfaceShape) -> Any:
     """As a `meshio.Mesh`; normals of points are point data ``nx``, ``ny``, ``nz``."""
-    import meshio
-
     if isinstance(shape, PointCloud):
         normals = {} if shape.normals is None else dict(zip(("nx", "ny", "nz"), shape.normals.T.copy(), strict=True))
         return meshio.Mesh(np.array(shape.points), [("vertex", np.arange(shape.n_points)[:, None])], point_data=normals)
     corners, counts = faces_of(shape)
     starts = np.cumsum(counts) - counts
-    change = np.flatnonzero(np.diff(counts, prepend=-1))  # blocks hold faces of one kind, and keep the order
+    change = np.flatnonzero(np.diff(counts, prepend=-1))  # a block has faces of one kind; the order is kept
     cells = []
     for first, last in zip(change, [*change[1:], len(counts)], strict=True):
         sides = int(counts[first])

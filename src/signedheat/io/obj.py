@@ -14,7 +14,7 @@ from .files import PathLike, numbers, text
 
 
 def read_obj(path: PathLike) -> SurfaceShape:
-    """The faces of an OBJ file, or its points where it has none; texture and faces' normals play no part."""
+    """The faces of an OBJ file, or its points if it has none; texture coordinates and normals of faces are ignored."""
     lines = _lines_by_keyword(path)
     vertices = _coordinates(lines.get("v", []), path, "vertices")
     if "f" in lines:
@@ -39,7 +39,7 @@ def read_obj_lines(path: PathLike) -> tuple[NDArray[np.float64], list[NDArray[np
 
 
 def write_obj(shape: SurfaceShape, path: PathLike) -> bytes:
-    """OBJ text; points become ``v`` lines, and ``vn`` lines where they have normals."""
+    """OBJ text; points become ``v`` lines, with ``vn`` lines if they have normals."""
     rows = ["v {!r} {!r} {!r}".format(*p) for p in points_of(shape).tolist()]
     if isinstance(shape, PointCloud) and shape.normals is not None:
         rows += ["vn {!r} {!r} {!r}".format(*n) for n in shape.normals.tolist()]
@@ -69,7 +69,7 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[str]]]:
 
 
 def _coordinates(rows: list[list[str]], path: PathLike, what: str) -> NDArray[np.float64]:
-    """Three numbers a line; more (weights, colours) are ignored."""
+    """(n, 3) numbers, three from each line; further ones (weights, colours) are ignored."""
     short = next((k for k, row in enumerate(rows) if len(row) < 3), None)
     if short is not None:
         raise FileFormatError(
@@ -82,7 +82,7 @@ def _coordinates(rows: list[list[str]], path: PathLike, what: str) -> NDArray[np
 
 
 def _elements(words: list[list[str]], n_vertices: int, path: PathLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Vertex ids from 0, one element after another, and how many each has; ``v/vt/vn`` gives v, and −1 the last."""
+    """Vertex ids from 0 of all elements, and their number in each; ``v/vt/vn`` means v, and −1 the last vertex."""
     counts = np.array([len(element) for element in words], dtype=np.int64)
     flat = [word for element in words for word in element]
     if any("/" in word for word in flat):

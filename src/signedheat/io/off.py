@@ -1,4 +1,4 @@
-"""OFF: a count, the vertices, the faces."""
+"""OFF: counts, then vertices, then faces."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .files import PathLike, numbers, text
 
 
 def read_off(path: PathLike) -> SurfaceShape:
-    """The faces of an OFF file (also COFF, NOFF, STOFF and their like), or its points where it has none."""
+    """The faces of an OFF file (also COFF, NOFF, STOFF, …), or its points if it has none."""
     rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].split())]
     kind = rows[0][0].upper() if rows else ""
     if not kind.endswith("OFF") or "BINARY" in [word.upper() for word in rows[0]]:

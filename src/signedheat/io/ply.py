@@ -1,4 +1,4 @@
-"""PLY, binary and as text: meshes, triangle strips, oriented points."""
+"""PLY, binary and text: meshes, triangle strips, oriented points."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _TYPES = {
 
 @dataclass
 class _Element:
-    """An element as the header announces it; a property's type is a code, or two for a list: count, entry."""
+    """An element of the header; the type of a property is a code, or for a list the codes of its count and entries."""
 
     name: str
     count: int
@@ -39,7 +39,7 @@ class _Element:
 
 
 def read_ply(path: PathLike) -> SurfaceShape:
-    """The faces of a PLY file, strips unrolled; or its points, with ``nx ny nz`` and ``area`` where they are given."""
+    """The faces of a PLY file, including triangle strips; or its points, with ``nx ny nz`` and ``area`` if present."""
     data = contents(path)
     form, elements, body = _header(data, path)
     read_element = _text_reader(body, path) if form == "ascii" else _binary_reader(body, form, path)
@@ -85,7 +85,7 @@ def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float64]:
 
 
 def _unrolled(strip: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles of strips divided by −1; every second one runs the other way round."""
+    """The triangles of strips separated by −1; every second one has the opposite orientation."""
     windows = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
     index = np.arange(len(strip))
     begin = np.maximum.accumulate(np.where(np.concatenate([[True], strip[:-1] < 0]), index, 0))
@@ -162,7 +162,7 @@ def _binary_reader(body: bytes, form: str, path: PathLike) -> Any:
                 )
             ]
         )
-        if len(body) - at >= row.itemsize * element.count:  # as if all lists were as long as the first
+        if len(body) - at >= row.itemsize * element.count:  # try: all lists have the length of the first
             rows = np.frombuffer(body, row, element.count, at)
             if all((rows[f"{name} count"] == length).all() for name, length in lengths.items()):
                 at += row.itemsize * element.count

@@ -1,4 +1,4 @@
-"""Tables of points: one point a line, an empty line between one polyline and the next."""
+"""Tables of points: one point per line, an empty line between polylines."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from .files import PathLike, text
 
 
 def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.float64], bool]]:
-    """Points (n, dimension) of each polyline, and whether it is closed, its first point being repeated at the end.
+    """Points (n, dimension) of each polyline, and whether it is closed (its last point equals its first).
 
-    Numbers are separated by commas, semicolons, tabs or spaces. Lines that begin with ``#`` and a first line of names
-    are passed over.
+    Numbers are separated by commas, semicolons, tabs or spaces. Lines that begin with ``#`` and a header line are
+    skipped.
 
     Raises
     ------
     FileFormatError
-        If a line does not hold `dimension` numbers, or there is none.
+        If a line does not have `dimension` numbers, or there is no such line.
     """
     blocks: list[list[list[float]]] = [[]]
     for number, line in enumerate(text(path).removeprefix("\ufeff").splitlines(), start=1):
@@ -54,7 +54,7 @@ def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.fl
 
 
 def write_point_lists(lists: Sequence[tuple[NDArray[np.float64], bool]]) -> str:
-    """The opposite."""
+    """The text that `read_point_lists` reads."""
     blocks = []
     for points, closed in lists:
         rows = [*points.tolist(), *([points[0].tolist()] if closed else [])]

@@ -1,4 +1,4 @@
-"""Polylines in the plane from files and back: drawings (SVG) and tables of points (CSV)."""
+"""Reading and writing of polylines in the plane: drawings (SVG) and tables of points (CSV)."""
 
 from __future__ import annotations
 
@@ -10,30 +10,38 @@ from numpy.typing import NDArray
 
 from ..domains.polyline import Polyline
 from ..errors import FileFormatError, GeometryError
+from ..packages import lazy_module
 from .files import PathLike, contents, extension, replacing, unknown_extension
 from .point_lists import read_point_lists, write_point_lists
 
+svgpathtools = lazy_module("svgpathtools", "SVG drawings")
+
 CURVE_PIECES = 64
-"""Segments into which a Bézier curve or an arc is cut."""
+"""Number of segments that approximate a Bézier curve or an arc."""
 
 
 def read_polylines(path: PathLike) -> list[Polyline]:
-    """Read polylines in the plane; the extension says the format.
+    """Read polylines in the plane, in the format given by the extension.
 
     Parameters
     ----------
     path : str or path
         ``.svg``: all paths, lines, polylines, polygons, rectangles, circles and ellipses, with their transforms, in
-        user units. The y axis, which runs downwards in such files, is turned upwards, so that left is what you see on
-        the left of a path. ``.csv``: x and y on each line, an empty line between polylines; a polyline is closed where
-        its last point is its first.
+        user units. The y axis, which points down in such files, is turned up, so that the left of a path is its left in
+        the drawing. ``.csv``: x and y on each line, an empty line between polylines; a polyline is closed if its last
+        point equals its first.
+
+    Returns
+    -------
+    list of Polyline
+        In the order of the file.
 
     Raises
     ------
     FileFormatError
-        If the file is missing, of unknown kind, damaged, or holds no line.
+        If the file is missing, of unknown format, damaged, or has no polyline.
     GeometryError
-        If what it holds is no polyline.
+        If a polyline is invalid.
 
     Examples
     --------
@@ -59,15 +67,15 @@ def read_polylines(path: PathLike) -> list[Polyline]:
 
 
 def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> None:
-    """Write polylines in the plane; the extension says the format.
+    """Write polylines in the plane, in the format given by the extension.
 
     Parameters
     ----------
     path : str or path
-        ``.svg`` or ``.csv``, as `read_polylines` reads them, to the last bit. Written under a temporary name and then
-        renamed: a file that was there before survives a failure.
+        ``.svg`` or ``.csv``, which `read_polylines` reads back exactly. It is written under a temporary name and
+        renamed, so that an existing file survives a failure.
     lines : Polyline or sequence of Polyline
-        What to write.
+        The polylines.
 
     Raises
     ------
@@ -88,20 +96,19 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
 def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
     """Points of each subpath, and whether it is closed."""
     contents(path)
-    from svgpathtools import Document, Line
-    from svgpathtools.document import CONVERSIONS
-
-    conversions = {**CONVERSIONS, "circle": clockwise_ellipse, "ellipse": clockwise_ellipse}
+    conversions = {**svgpathtools.document.CONVERSIONS, "circle": clockwise_ellipse, "ellipse": clockwise_ellipse}
     try:
-        whole_paths = Document(str(path)).paths(path_conversions=conversions)
+        whole_paths = svgpathtools.Document(str(path)).paths(path_conversions=conversions)
         subpaths = [part for whole in whole_paths for part in whole.continuous_subpaths()]
         found = []
         for subpath in subpaths:
-            pieces = [[0.0] if isinstance(s, Line) else np.arange(CURVE_PIECES) / CURVE_PIECES for s in subpath]
+            pieces = [
+                [0.0] if isinstance(s, svgpathtools.Line) else np.arange(CURVE_PIECES) / CURVE_PIECES for s in subpath
+            ]
             places = [s.point(t) for s, ts in zip(subpath, pieces, strict=True) for t in ts]
             closed = abs(subpath.end - subpath.start) <= 1e-9 * max(map(abs, places), default=0.0)
             found.append((np.array(places if closed else [*places, subpath.end]), closed))
-    except Exception as error:  # the parser lets through whatever it stumbles on
+    except Exception as error:  # the parser raises exceptions of any type
         raise FileFormatError(
             f"it is no SVG drawing, or is damaged ({error})",
             remedy="write it again",
@@ -117,14 +124,14 @@ def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
 
 
 def clockwise_ellipse(element: Any) -> str:
-    """A circle or ellipse as a path that runs the way the SVG standard says, clockwise as one sees it."""
+    """A circle or ellipse as a path in the direction of the SVG standard, clockwise in the drawing."""
     x, y, r, rx, ry = (float(element.get(name, 0)) for name in ("cx", "cy", "r", "rx", "ry"))
     rx, ry = rx or r, ry or r
     return f"M{x + rx},{y} A{rx},{ry} 0 1 1 {x - rx},{y} A{rx},{ry} 0 1 1 {x + rx},{y} Z"
 
 
 def svg(lines: Sequence[Polyline]) -> str:
-    """A drawing of all lines, y downwards."""
+    """An SVG drawing of polylines, with the y axis pointing down."""
     points = np.concatenate([line.points for line in lines])
     lower, upper = points.min(axis=0), points.max(axis=0)
     margin = 0.05 * float((upper - lower).max())

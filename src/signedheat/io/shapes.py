@@ -1,4 +1,4 @@
-"""Shapes from files and back: one table of formats for each direction."""
+"""Reading and writing of shapes, with one table of formats for each direction."""
 
 from __future__ import annotations
 
@@ -52,12 +52,13 @@ SHAPE_FORMATS = frozenset(WRITERS)
 
 
 def read(path: PathLike) -> Shape:
-    """Read a shape; the extension says the format.
+    """Read a shape, in the format given by the extension.
 
-    STL, OBJ, PLY, OFF, VTP and GLB hold surfaces; PLY, XYZ, PC, OBJ, OFF and VTP without faces hold points. Vertices
-    and faces keep their number and order, whatever is wrong with them: nothing is merged, dropped, split or turned.
-    In STL, which knows no vertices, corners with the same coordinates to the last bit are one vertex. NPY, NRRD and VTI
-    hold volumes of voxels, boolean or of zeros and ones. MESH, MSH, VTU, VTK and TetGen's NODE with ELE hold tets.
+    STL, OBJ, PLY, OFF, VTP and GLB files have surfaces; XYZ and PC files have points, and so have PLY, OBJ, OFF and VTP
+    files without faces. Vertices and faces keep their number and order, whatever their defects: nothing is merged,
+    dropped, split or turned. STL has no vertices; corners with exactly the same coordinates become one. NPY, NRRD and
+    VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH, VTU, VTK and TetGen's NODE with ELE have
+    tets.
 
     Parameters
     ----------
@@ -67,15 +68,15 @@ def read(path: PathLike) -> Shape:
     Returns
     -------
     TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
-        A triangle mesh if every face is a triangle, a polygon mesh if not, a point cloud if there is no face; of a
-        volume, the boundary of its voxels.
+        A triangle mesh if all faces are triangles, otherwise a polygon mesh; a point cloud if there is no face; the
+        boundary of a volume of voxels; or a tet mesh.
 
     Raises
     ------
     FileFormatError
-        If the file is missing, of unknown kind, truncated or damaged.
+        If the file is missing, of unknown format, truncated or damaged.
     GeometryError
-        If what it holds is no shape: no element, NaN or infinite coordinates, a vertex id that does not exist.
+        If the shape is invalid: no element, NaN or infinite coordinates, a vertex id that does not exist.
 
     Examples
     --------
@@ -95,22 +96,22 @@ def read(path: PathLike) -> Shape:
 
 
 def save(shape: Shape, path: PathLike) -> None:
-    """Write a shape; the extension says the format.
+    """Write a shape, in the format given by the extension.
 
-    OBJ, OFF, PLY, VTP, XYZ and PC keep every bit of the coordinates; STL holds single precision. The file is written
-    under a temporary name and then renamed: one that was there before survives a failure.
+    OBJ, OFF, PLY, VTP, XYZ and PC keep every bit of the coordinates; STL has single precision. The file is written
+    under a temporary name and renamed, so that an existing file survives a failure.
 
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh
-        What to write.
+        The shape.
     path : str or path
-        Where to.
+        The file.
 
     Raises
     ------
     FileFormatError
-        If the format is unknown, cannot hold this kind of shape, or the file cannot be written.
+        If the format is unknown, does not support this kind of shape, or the file cannot be written.
     """
     if isinstance(shape, TetMesh):
         return write_tets(shape, path)

@@ -1,4 +1,4 @@
-"""STL, binary and as text."""
+"""STL, binary and text."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _HEADER = 84  # bytes: 80 of comment, 4 that count the facets
 
 
 def read_stl(path: PathLike) -> TriangleMesh:
-    """All facets of an STL file, of all its solids; stored normals play no part.
+    """All facets of an STL file, of all its solids; stored normals are ignored.
 
-    Corners at the same coordinates, to the last bit, are one vertex: STL has no other way to say that facets meet.
+    Corners with exactly the same coordinates become one vertex: STL has no other way to express that facets meet.
     """
     data = contents(path)
     announced = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else 0
@@ -76,7 +76,7 @@ def _text_corners(data: bytes, path: PathLike) -> NDArray[np.float64]:
 def _indexed(corners: NDArray[np.float64]) -> TriangleMesh:
     if not len(corners):
         return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
-    bits = (corners + 0.0).view(np.dtype((np.void, 24))).ravel()  # adding zero makes −0 and 0 the same bits
+    bits = (corners + 0.0).view(np.dtype((np.void, 24))).ravel()  # adding zero turns −0 into 0
     _, first, vertex = np.unique(bits, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))

@@ -1,6 +1,6 @@
-"""Surfaces with φ at their vertices, to files that other programs show.
+"""Reading and writing of surfaces with φ at their vertices.
 
-PLY is written here because trimesh writes single precision, VTP because VTK is too large for one format.
+PLY is written here because trimesh writes single precision, VTP because VTK is a large dependency for one format.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def save_vertex_field(field: VertexField, path: PathLike) -> None:
 
 
 def _on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
-    """The field on what files hold: voxels as triangles."""
+    """The field on a surface that files support: voxel faces become triangles."""
     domain = field.domain
     if isinstance(domain, TriangleMesh | PolygonMesh | PointCloud):
         return VertexField(domain, field.values)
@@ -80,7 +80,7 @@ def load_vertex_field(path: PathLike) -> VertexField:
 
 
 def is_vertex_field(path: PathLike) -> bool:
-    """Whether a file holds what `load_vertex_field` reads."""
+    """Whether `load_vertex_field` can read a file."""
     if extension(path) != ".npz" or not is_zipfile(path):
         return False
     with ZipFile(path) as file:
@@ -88,7 +88,7 @@ def is_vertex_field(path: PathLike) -> bool:
 
 
 def write_npz(field: VertexField[SurfaceShape]) -> bytes:
-    """Arrays, exact to the last bit."""
+    """NumPy arrays, exact to the last bit."""
     domain, buffer = field.domain, io.BytesIO()
     arrays: dict[str, Any] = {"values": field.values, "vertices": points_of(domain)}
     if isinstance(domain, TriangleMesh):
@@ -102,7 +102,7 @@ def write_npz(field: VertexField[SurfaceShape]) -> bytes:
 
 
 def write_ply(field: VertexField[SurfaceShape]) -> bytes:
-    """Binary, in double precision."""
+    """Binary PLY in double precision."""
     corners, counts = faces_of(field.domain)
     table = np.column_stack([points_of(field.domain), field.values]).astype("<f8")
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
@@ -113,7 +113,7 @@ def write_ply(field: VertexField[SurfaceShape]) -> bytes:
 
 
 def write_vtp(field: VertexField[SurfaceShape]) -> bytes:
-    """For ParaView."""
+    """VTK polygonal data, for ParaView."""
     points, (corners, counts) = points_of(field.domain), faces_of(field.domain)
     group = "Polys" if len(counts) else "Verts"
     if not len(counts):
@@ -128,7 +128,7 @@ def write_vtp(field: VertexField[SurfaceShape]) -> bytes:
 
 
 def write_obj(field: VertexField[SurfaceShape]) -> bytes:
-    """φ as the first texture coordinate, in the units of the surface."""
+    """OBJ with φ as the first texture coordinate, in the units of the surface."""
     corners, counts = faces_of(field.domain)
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points_of(field.domain).tolist()]
     lines += [f"vt {value!r} 0" for value in field.values.tolist()]

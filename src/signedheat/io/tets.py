@@ -1,8 +1,7 @@
-"""Tet meshes, and fields on them, from files and back, through meshio."""
+"""Reading and writing of tet meshes, and of fields on them, by meshio."""
 
 from __future__ import annotations
 
-import importlib
 import warnings
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
 from ..fields.tet_field import TetField
+from ..packages import require
 from .files import PathLike, contents, extension, replacing, unknown_extension
 
 NAME = "signed_distance"
@@ -33,14 +33,14 @@ TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 
 
 def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
-    """Read a `TetMesh`; or, from a file without tets, the surface that it holds.
+    """Read a `TetMesh`; or, from a file without tets, its surface.
 
     Raises
     ------
     FileFormatError
         If the file is missing, truncated or damaged.
     GeometryError
-        If it holds neither tets nor faces.
+        If it has neither tets nor faces.
     """
     mesh = _load(path)
     kinds = {block.type for block in mesh.cells}
@@ -56,7 +56,7 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
 
 
 def write_tets(mesh: TetMesh, path: PathLike) -> None:
-    """Write a tet mesh; the extension says the format."""
+    """Write a tet mesh, in the format given by the extension."""
     _store(mesh.to_meshio(), path)
 
 
@@ -73,7 +73,7 @@ def load_tet_field(path: PathLike) -> TetField:
     Raises
     ------
     FileFormatError
-        If the file is missing or damaged, or holds no tets with such values.
+        If the file is missing or damaged, or has no tets with such values.
     """
     mesh = _load(path)
     if NAME not in mesh.point_data:
@@ -93,9 +93,9 @@ def _load(path: PathLike) -> Any:
         contents(part)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # unclosed files
+            warnings.simplefilter("ignore")  # about unclosed files
             return module.read(str(path))
-    except Exception as error:  # meshio lets through whatever its parsers stumble on
+    except Exception as error:  # meshio raises exceptions of any type
         reason = str(error) or type(error).__name__
         raise FileFormatError(
             f"the file is damaged, or is of another kind ({reason})",
@@ -123,7 +123,7 @@ def _write(module: Any, path: Path, mesh: Any) -> None:
 
 
 def _parts(path: PathLike) -> list[Path]:
-    """The files that a name stands for."""
+    """The files that belong to a path: two for TetGen's formats."""
     if MODULES[extension(path)] == "tetgen":
         return [Path(path).with_suffix(".node"), Path(path).with_suffix(".ele")]
     return [Path(path)]
@@ -133,4 +133,4 @@ def _module(path: PathLike) -> Any:
     name = MODULES.get(extension(path))
     if name is None:
         raise unknown_extension(path, MODULES, "a tet mesh")
-    return importlib.import_module(f"meshio.{name}")
+    return require(f"meshio.{name}", "tet meshes")

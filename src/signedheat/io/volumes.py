@@ -1,4 +1,4 @@
-"""Volumes of voxels, and walls, from images."""
+"""Reading of voxel volumes, and of grids with solid nodes, from images."""
 
 from __future__ import annotations
 
@@ -12,29 +12,37 @@ from numpy.typing import ArrayLike, NDArray
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid
 from ..errors import FileFormatError
+from ..packages import lazy_module
 from .fields import _read_npy, _read_nrrd
 from .files import PathLike, contents, extension, unknown_extension
 from .vtk_xml import read_vti
 
+Image = lazy_module("PIL.Image", "pictures as masks")
+
 
 def read_volume(path: PathLike, level: float | None = None, radius: float | None = None) -> DigitalSurface:
-    """Read the boundary of a set of voxels from an image.
+    """Read a set of voxels from an image, as a digital surface.
 
     Parameters
     ----------
     path : str or path
         ``.npy`` (voxels of size 1, or with origin and spacing in a ``.json`` of the same name), ``.nrrd`` or ``.vti``.
     level : float, optional
-        Voxels with larger values are inside. Without it the image must be boolean, or of zeros and ones.
+        Voxels with larger values are inside. Without it the image must have booleans, or zeros and ones.
     radius : float, optional
         Passed to `DigitalSurface`.
+
+    Returns
+    -------
+    DigitalSurface
+        The boundary of the voxels.
 
     Raises
     ------
     FileFormatError
-        If the file is missing, of unknown kind, truncated or damaged.
+        If the file is missing, of unknown format, truncated or damaged.
     GeometryError
-        If what it holds is no set of voxels.
+        If the image is not a set of voxels.
 
     Examples
     --------
@@ -56,25 +64,30 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
 def read_mask(
     path: PathLike, level: float = 0.5, origin: ArrayLike | None = None, spacing: ArrayLike | None = None
 ) -> Grid:
-    """Read a grid with walls: every voxel or pixel is a node, solid or free.
+    """Read a grid with walls from an image: every voxel or pixel becomes a node, solid or free.
 
     Parameters
     ----------
     path : str or path
         ``.npy``, ``.nrrd`` or ``.vti`` in the plane or in space, as for `read_volume`; pictures (``.png``, ``.bmp``,
-        ``.tif``), the lower left pixel first, on which y runs upwards.
+        ``.tif``), whose first node is the lower left pixel, with y pointing up.
     level : float
-        Voxels with larger values are solid. In pictures those are that are darker than this, 0 being black, 1 white.
+        Voxels with larger values are solid. In pictures, pixels darker than this are, with 0 black and 1 white.
     origin, spacing : (d,) float, optional
-        Position of the first node, and distance between nodes, instead of those of the file; pixels are of size 1 from
-        0 on.
+        Position of the first node, and distance between nodes, instead of those in the file; for pictures by default 0
+        and 1.
+
+    Returns
+    -------
+    Grid
+        With solid nodes.
 
     Raises
     ------
     FileFormatError
-        If the file is missing, of unknown kind, truncated or damaged.
+        If the file is missing, of unknown format, truncated or damaged.
     GeometryError
-        If all nodes are solid, or origin or spacing make no sense.
+        If all nodes are solid, or origin or spacing are invalid.
 
     Examples
     --------
@@ -105,7 +118,7 @@ def _read(
 
 
 def _read_plain_npy(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
-    """An array, with origin and spacing where they are given beside it."""
+    """An array, with origin and spacing from the ``.json`` of the same name, if there is one."""
     if Path(path).with_suffix(".json").exists():
         return _read_npy(path)
     try:
@@ -120,9 +133,7 @@ def _read_plain_npy(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], 
 
 
 def _read_picture(path: PathLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Brightness from 0 to 1 along x and y; what is transparent is white."""
-    from PIL import Image
-
+    """Brightness from 0 to 1, indexed [x, y]; transparent pixels count as white."""
     try:
         picture = Image.open(io.BytesIO(contents(path))).convert("RGBA")
         white = Image.new("RGBA", picture.size, "white")

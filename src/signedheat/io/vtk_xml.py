@@ -1,7 +1,7 @@
 """VTK's XML files: image data (``.vti``) and polygonal data (``.vtp``).
 
-Written with appended raw data, as VTK itself prefers; read in every encoding that VTK writes. The one library that
-does all this, VTK, takes more than half a gigabyte installed: too much for two formats.
+Written with appended raw data, as VTK does by default; read in every encoding that VTK writes. The only library that
+reads all of these, VTK itself, takes more than half a gigabyte installed.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray
 
 
 def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:
-    """Polygons, or points with their normals as point data."""
+    """Polygons, or points with normals as point data."""
     points, (corners, counts) = points_of(shape), faces_of(shape)
     writer = _Writer()
     xyz = writer.array("Points", points)
@@ -126,7 +126,7 @@ def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:
 
 
 def read_vtp(path: PathLike) -> SurfaceShape:
-    """The polygons of all pieces, or the points where there is no polygon."""
+    """The polygons of all pieces, or the points if there is no polygon."""
     root, arrays = _parse(path, "PolyData")
     points, corners, counts, normals, areas, n_points = [], [], [], [], [], 0
     for piece in root.iterfind("PolyData/Piece"):
@@ -173,7 +173,7 @@ class _Writer:
         self._offset = 0
 
     def array(self, name: str, values: NDArray[Any]) -> str:
-        """The element that refers to an array, which goes to the end of the file."""
+        """The XML element of an array, whose data are appended to the file."""
         values = np.ascontiguousarray(values)
         code = values.dtype.str[1:]
         data = values.astype("<" + code, copy=False).tobytes()
@@ -230,7 +230,7 @@ class _Arrays:
             ) from error
 
     def _block(self, data: bytes, is_base64: bool) -> bytes:
-        """One block: sizes, then bytes, each part coded on its own if in base 64."""
+        """The bytes of one block: sizes, then data; in base 64 each of the two is encoded separately."""
         width = self.header.itemsize
 
         def take(start: int, size: int) -> tuple[bytes, int]:

@@ -1,4 +1,4 @@
-"""XYZ: a point a line, with or without its normal."""
+"""XYZ: one point per line, with or without its normal."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .files import PathLike, numbers, text
 
 
 def read_xyz(path: PathLike) -> PointCloud:
-    """Lines of 3 numbers (positions) or 6 (positions and normals), divided by blanks or commas."""
+    """Lines of 3 numbers (positions) or 6 (positions and normals), separated by spaces or commas."""
     rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].replace(",", " ").split())]
     if not rows:
         raise FileFormatError(
@@ -38,7 +38,7 @@ def read_xyz(path: PathLike) -> PointCloud:
 
 
 def write_xyz(shape: SurfaceShape, path: PathLike) -> bytes:
-    """A line for each point."""
+    """One line per point."""
     if not isinstance(shape, PointCloud):
         raise refuse(shape, path, "points", ".obj or .ply")
     table = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..errors import FactorizationError
+from ..packages import lazy_module
+
+cholmod = lazy_module("sksparse.cholmod", "factors of CHOLMOD")
 
 
 class CholmodFactor:
@@ -26,8 +29,6 @@ class CholmodFactor:
     backend = "cholmod"
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
-        from sksparse import cholmod
-
         self.n, self.dtype, self._order = upper.shape[0], upper.dtype, order
         lower = sparse.csc_matrix((upper.data.conj(), upper.indices, upper.indptr), shape=upper.shape)
         if order is not None:
@@ -59,6 +60,4 @@ def is_available() -> bool:
     """Whether scikit-sparse is installed, with the interface that its wheels and distributions have had until 0.4."""
     if find_spec("sksparse") is None:
         return False
-    from sksparse import cholmod
-
     return hasattr(cholmod, "cholesky")

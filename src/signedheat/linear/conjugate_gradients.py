@@ -76,5 +76,5 @@ def conjugate_gradients(
 
 
 def _products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k,) inner products of columns; that of two vectors has no axis. BLAS would keep all cores busy for these."""
-    return np.asarray(np.einsum("i,i->" if a.ndim == 1 else "ij,ij->j", a, b))
+    """(k,) inner products of columns; that of two vectors has no axis."""
+    return np.asarray(np.vdot(a, b) if a.ndim == 1 else np.einsum("ij,ij->j", a, b))

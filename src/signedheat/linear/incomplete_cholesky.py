@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from threadpoolctl import threadpool_limits
 
 from ..compiled import compiled
 from .conjugate_gradients import conjugate_gradients
@@ -97,9 +98,10 @@ class IncompleteCholesky:
             small = np.einsum("i,i->", r, r) <= goal
             return bool(small or _settled(self.diagonal, x.reshape(shape), r.reshape(shape), componentwise))
 
-        solution = conjugate_gradients(
-            multiply, load.ravel(), precondition, tolerance=0.0, limit=MOST_ITERATIONS, converged=converged
-        )
+        with threadpool_limits(1, "blas"):  # threads only wait between the inner products
+            solution = conjugate_gradients(
+                multiply, load.ravel(), precondition, tolerance=0.0, limit=MOST_ITERATIONS, converged=converged
+            )
         return solution.reshape(shape)
 
 

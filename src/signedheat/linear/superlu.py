@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
+from threadpoolctl import threadpool_limits
 
 from ..errors import FactorizationError
 from .matrices import whole
@@ -32,9 +34,6 @@ class SuperLUFactor:
     backend = "superlu"
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
-        from scipy.sparse.linalg import splu
-        from threadpoolctl import threadpool_limits
-
         self.n, self.dtype = upper.shape[0], upper.dtype
         self._order = elimination_order(upper) if order is None else order
         matrix = whole(upper)[self._order][:, self._order]

@@ -14,6 +14,7 @@ from math import gamma, pi
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..domains.grid import Grid
@@ -169,14 +170,12 @@ def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> ND
 
     Points that coincide share the area of one. In d dimensions the disk is a ball of dimension d − 1.
     """
-    from scipy.spatial import cKDTree
-
     places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     dimension = points.shape[1] - 1
     k = min(neighbours, len(places) - 1)
     if dimension == 0 or k == 0:
         return np.ones(len(points)) / counts[which.ravel()]
-    reach = cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
+    reach = scipy.spatial.cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
     unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
     return (unit_ball * reach**dimension / k / counts)[which.ravel()]
 

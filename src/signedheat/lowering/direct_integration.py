@@ -99,7 +99,7 @@ class DirectIntegration:
             lifted = loads[:, batch].toarray()
             _, multipliers = self._interpolate(rows, np.zeros((len(divergence), lifted.shape[1])), lifted)
             capacitance[:, batch] = loads.T @ multipliers
-        constants = np.linalg.lstsq(capacitance, -(loads.T @ pull[:, 0]))[0]
+        constants = np.linalg.lstsq(capacitance, -(loads.T @ pull[:, 0]), rcond=None)[0]
         fitted, _ = self._interpolate(rows, divergence[:, None], (values + loads @ constants)[:, None])
         return self._centered(fitted[:, 0], source)
 

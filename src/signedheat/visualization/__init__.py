@@ -1,6 +1,6 @@
-"""Pictures of fields and shapes, without a screen."""
+"""Pictures of fields and shapes; no display is needed."""
 
-from .figures import PICTURE_FORMATS, new_figure
+from .figures import PICTURE_FORMATS, ensure_picture_writable, new_figure
 from .scenes import draw_shape, save_scene
 from .slices import draw_plane, draw_slices, save_slices
 from .surfaces import draw_surface, save_surface
@@ -11,6 +11,7 @@ __all__ = [
     "draw_shape",
     "draw_slices",
     "draw_surface",
+    "ensure_picture_writable",
     "new_figure",
     "save_scene",
     "save_slices",

@@ -8,29 +8,33 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..packages import lazy_module
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
+mpl_cm = lazy_module("matplotlib.cm", "pictures")
+mpl_colors = lazy_module("matplotlib.colors", "pictures")
+
 INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]
-"""Deep to far: blue inside, light at the surface, orange outside."""
+"""From far inside to far outside: blue inside, light at the surface, orange outside."""
 TICKS = 7
-"""About how many numbers stand at a colour bar."""
+"""Approximate number of labels of a colour bar."""
 
 
 def distance_colors(low: float, high: float) -> ScalarMappable:
-    """Colours for distances between two values, light at zero.
+    """A colour scale for distances between two values, light at zero.
 
-    Equal distances inside and outside are equally deep in colour. Colours go with the root of distance, so that a thin
-    inside still shows beside a wide outside.
+    Equal distances inside and outside have equally saturated colours. The scale is in the square root of distance, so
+    that a thin inside is visible next to a wide outside.
     """
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import FuncNorm, LinearSegmentedColormap
-
     reach = max(abs(low), abs(high), 1e-300)
-    norm = FuncNorm((signed_root, signed_square), -reach, reach)
-    return ScalarMappable(norm, LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE))
+    norm = mpl_colors.FuncNorm((signed_root, signed_square), -reach, reach)
+    return mpl_cm.ScalarMappable(
+        norm, mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
+    )
 
 
 def signed_root(values: Any) -> Any:
@@ -44,7 +48,7 @@ def signed_square(values: Any) -> Any:
 
 
 def isolines_between(low: float, high: float, most: int = 16) -> tuple[NDArray[np.float64], float]:
-    """Levels between two values, zero left out, about `most` of them; and the round step from one to the next.
+    """Levels between two values, without zero, about `most` of them; and the step between them, a round number.
 
     Examples
     --------
@@ -58,7 +62,7 @@ def isolines_between(low: float, high: float, most: int = 16) -> tuple[NDArray[n
 
 
 def round_step(width: float) -> float:
-    """1, 2 or 5 times a power of ten, about as large as `width`."""
+    """1, 2 or 5 times a power of ten, close to `width`."""
     if not width > 0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(width))

@@ -1,4 +1,4 @@
-"""A small rasteriser that needs no screen: triangles, with depth, face and value at each pixel."""
+"""A small software rasteriser for triangles: depth, face and value at each pixel."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ..compiled import compiled
 SIZE = 900
 """Pixels along the longer side."""
 MARGIN = 10
-"""Empty pixels at each side."""
+"""Width of the empty margin in pixels."""
 LIGHT = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
-"""From where light comes: right, up and towards the eye."""
+"""Direction to the light: right, up and towards the eye."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +26,11 @@ class Camera:
     frame : (3, 3) float
         Right, up and towards the eye.
     lower : (2,) float
-        Lower left corner of what is seen.
+        Lower left corner of the picture, in units of length.
     scale : float
         Pixels per unit of length.
     width, height : int
-        Pixels.
+        Size of the picture in pixels.
     """
 
     frame: NDArray[np.float64]
@@ -41,7 +41,7 @@ class Camera:
 
     @classmethod
     def around(cls, points: NDArray[np.float64], direction: NDArray[np.float64], up: int = 2) -> Camera:
-        """Look at points from a direction, axis `up` upwards, so that they fill the picture."""
+        """Camera that views points from a direction, with axis `up` pointing up, so that they fill the picture."""
         frame = looking(direction, up)
         seen = points @ frame[:2].T
         lower, upper = seen.min(axis=0), seen.max(axis=0)
@@ -55,14 +55,14 @@ class Camera:
         return np.column_stack([(seen[:, :2] - self.lower) * self.scale + MARGIN, seen[:, 2] * self.scale])
 
     def shades(self, area_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m,) brightness of faces, from 0.45 to 1; their sides look alike."""
+        """(m,) brightness of faces, from 0.45 to 1, the same for both sides of a face."""
         normals = area_vectors @ self.frame.T
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         return 0.45 + 0.55 * np.abs(normals @ LIGHT)
 
 
 def looking(direction: NDArray[np.float64], up: int = 2) -> NDArray[np.float64]:
-    """(3, 3) right, up and towards the eye, for a direction to the eye.
+    """(3, 3) axes right, up and towards the eye, for a direction towards the eye.
 
     Examples
     --------
@@ -77,7 +77,7 @@ def looking(direction: NDArray[np.float64], up: int = 2) -> NDArray[np.float64]:
 
 
 def oblique(elevation: float, azimuth: float, up: int = 2) -> NDArray[np.float64]:
-    """Direction to an eye at angles in degrees, above the plane across axis `up` and around that axis."""
+    """Direction to the eye from elevation and azimuth in degrees: above the plane across axis `up`, and around it."""
     e, a = np.radians([elevation, azimuth])
     return np.roll([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], up - 2)
 
@@ -89,8 +89,8 @@ def rasterize(
 
     Returns
     -------
-    depth, face, value : (height, width)
-        Of the nearest triangle at each pixel; face −1 and value NaN where there is none.
+    depth, face, value : (height, width) arrays
+        Those of the nearest triangle at each pixel; face −1 and value NaN where there is none.
     """
     depth = np.full((height, width), -np.inf)
     face = np.full((height, width), -1, dtype=np.int64)

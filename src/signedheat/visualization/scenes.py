@@ -1,4 +1,4 @@
-"""Pictures of shapes: outsides light, insides red, so that holes and flipped faces show."""
+"""Pictures of shapes: outer sides light, inner sides red, so that holes and flipped faces are visible."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..io.files import PathLike, ensure_writable
-from .figures import PICTURE_FORMATS, new_figure, write_figure
+from ..io.files import PathLike
+from .figures import ensure_picture_writable, new_figure, write_figure
 from .rasterizer import Camera, oblique, rasterize
 
 if TYPE_CHECKING:
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 
 OUTSIDE, INSIDE = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
 MOST_POINTS = 200_000
-"""Of larger clouds an even selection is drawn."""
+"""Of larger clouds an even subset is drawn."""
 
 
 def save_scene(shape: TriangleMesh | PolygonMesh | PointCloud, path: PathLike, up: int = 2) -> None:
-    """A shape seen obliquely from above, axis `up` upwards.
+    """Write a picture of a shape seen obliquely from above, with axis `up` pointing up.
 
     Raises
     ------
     FileFormatError
         If the picture cannot be written.
     """
-    ensure_writable(path, PICTURE_FORMATS, "a picture")
+    ensure_picture_writable(path)
     figure = new_figure(7, 6)
     draw_shape(shape, figure.add_subplot(), up=up)
     write_figure(figure, path)

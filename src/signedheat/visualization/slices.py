@@ -12,23 +12,26 @@ from ..domains.point_cloud import PointCloud
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
-from ..io.files import PathLike, ensure_writable
+from ..io.files import PathLike
+from ..packages import lazy_module
 from .colors import add_color_bar, distance_colors, isolines_between
-from .figures import PICTURE_FORMATS, new_figure, write_figure
+from .figures import ensure_picture_writable, new_figure, write_figure
 from .scenes import triangulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
 
+mpl_collections = lazy_module("matplotlib.collections", "pictures")
+
 AXES = "xyz"
 
 
 def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Sequence[float] = ()) -> None:
-    """Three orthogonal slices through a field, each where it cuts most of the inside, and the shape it came from.
+    """Write three orthogonal slices through a field, each where it cuts most of the inside, with the shape.
 
-    Blue is inside, orange outside; the black line is φ = 0; red is the shape. Of a field in the plane, one picture;
-    solid nodes are grey.
+    Blue is inside, orange outside; the black line is φ = 0; the shape is red; solid nodes are grey. A field in the
+    plane is drawn whole.
 
     Parameters
     ----------
@@ -37,9 +40,9 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
     shape : TriangleMesh, PolygonMesh or PointCloud, optional
-        What the field is a distance to. In the plane, a `Polyline` or a sequence of them.
+        The source of the field. In the plane, a `Polyline` or a sequence of them.
     levels : sequence of float
-        Further levels to draw, heavier than the isolines.
+        Further levels to draw, with heavier lines than the isolines.
 
     Raises
     ------
@@ -48,7 +51,7 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
     GeometryError
         If the field has one dimension, or more than three.
     """
-    ensure_writable(path, PICTURE_FORMATS, "a picture")
+    ensure_picture_writable(path)
     if field.grid.dimension not in (2, 3):
         raise GeometryError(f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}")
     if field.grid.dimension == 2:
@@ -69,7 +72,7 @@ def draw_slices(
     levels: Sequence[float] = (),
     across: Sequence[int] = (2, 1, 0),
 ) -> None:
-    """Draw one slice into each of some axes of a figure; `across` says which coordinate is constant on it."""
+    """Draw one slice into each of some axes of a figure; `across` has the coordinate that is constant on each."""
     colors, isolines, step = _look(field)
     for panel, normal in zip(axes, across, strict=True):
         horizontal, vertical = (axis for axis in range(3) if axis != normal)
@@ -84,9 +87,9 @@ def draw_slices(
 
 
 def telling_layer(field: GridField, axis: int) -> int:
-    """The layer of nodes across an axis with most of the inside; without inside, with most of what is near zero.
+    """The layer of nodes across an axis with most inside nodes; if there are none, with most nodes near the zero set.
 
-    Of layers that tell as much, the one nearest to the middle.
+    Among equal layers, the one closest to the middle.
     """
     inside = field.values < 0
     if not inside.any():
@@ -98,7 +101,7 @@ def telling_layer(field: GridField, axis: int) -> int:
 
 
 def rounded(position: float, spacing: float) -> str:
-    """A position, as exact as the grid is fine.
+    """A position as text, rounded to the resolution of the grid.
 
     Examples
     --------
@@ -110,7 +113,7 @@ def rounded(position: float, spacing: float) -> str:
 
 
 def draw_plane(field: GridField, axes: Axes, shape: Any = None, levels: Sequence[float] = ()) -> None:
-    """Draw a field in the plane into axes; polylines, or points, in red."""
+    """Draw a field in the plane into axes, with polylines or points in red."""
     colors, isolines, step = _look(field)
     _draw_panel(axes, *field.grid.axes, field.values, colors, isolines, levels)
     for line in shape if isinstance(shape, Sequence) else [] if shape is None else [shape]:
@@ -124,7 +127,7 @@ def draw_plane(field: GridField, axes: Axes, shape: Any = None, levels: Sequence
 
 
 def _look(field: GridField) -> tuple[ScalarMappable, NDArray[np.float64], float]:
-    """Colours, isolines and the step between them, the same in all panels of a picture."""
+    """Colours, isolines and the step between them, shared by all panels of a picture."""
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
     return distance_colors(low, high), *isolines_between(low, high)
 
@@ -138,7 +141,7 @@ def _draw_panel(
     isolines: NDArray[np.float64],
     levels: Sequence[float],
 ) -> None:
-    """Values on a plane, indexed [u, v], as colours and isolines."""
+    """Draw values on a plane, indexed [u, v], as colours and isolines."""
     shown = np.ma.masked_invalid(values.T)
     shading = "nearest" if shown.mask.any() else "gouraud"
     panel.pcolormesh(u, v, shown, cmap=colors.cmap, norm=colors.norm, shading=shading, rasterized=True)
@@ -159,12 +162,12 @@ def _draw_panel(
 
 
 def cross_section(mesh: TriangleMesh, axis: int, position: float) -> NDArray[np.float64]:
-    """Where a plane across an axis cuts the faces.
+    """Intersection of a mesh with a plane across an axis.
 
     Returns
     -------
     (s, 2, 2) float
-        Ends of the segments, in the two other coordinates.
+        Ends of the segments, in the other two coordinates.
     """
     corners = mesh.vertices[mesh.faces]
     height = corners[:, :, axis] - position
@@ -182,11 +185,9 @@ def cross_section(mesh: TriangleMesh, axis: int, position: float) -> NDArray[np.
 
 
 def _draw_section(panel: Axes, shape: Any, axis: int, position: float, spacing: float) -> None:
-    from matplotlib.collections import LineCollection
-
     if isinstance(shape, PointCloud):
         near = shape.points[np.abs(shape.points[:, axis] - position) < spacing]
         panel.scatter(*np.delete(near, axis, axis=1).T, s=3, c="#d4145a", linewidths=0, zorder=3)
     elif shape is not None:
         segments = cross_section(triangulated(shape), axis, position)
-        panel.add_collection(LineCollection(list(segments), colors="#d4145a", linewidths=1.1, zorder=3))
+        panel.add_collection(mpl_collections.LineCollection(list(segments), colors="#d4145a", linewidths=1.1, zorder=3))

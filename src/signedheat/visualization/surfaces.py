@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..domains.curves import Curve
 from ..fields.vertex_field import VertexField
-from ..io.files import PathLike, ensure_writable
+from ..io.files import PathLike
 from .colors import add_color_bar, distance_colors, isolines_between
-from .figures import PICTURE_FORMATS, new_figure, write_figure
+from .figures import ensure_picture_writable, new_figure, write_figure
 from .rasterizer import Camera, oblique, rasterize
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 def save_surface(
     field: VertexField, path: PathLike, sources: Sequence[Any] = (), n_contours: int = 20, up: int = 2
 ) -> None:
-    """A surface coloured by φ, with isolines and sources, seen from where most of the sources show.
+    """Write a picture of a surface coloured by φ, with isolines, from a direction from which the sources are visible.
 
-    Blue is φ < 0, orange φ > 0; the heavy line is φ = 0; yellow are the sources.
+    Blue is φ < 0, orange φ > 0; the heavy line is φ = 0; sources are yellow.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ def save_surface(
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
     sources : sequence of Curve and SurfacePoints
-        What to draw in yellow.
+        The sources to draw.
     n_contours : int
-        About how many isolines.
+        Approximate number of isolines.
     up : int
         Axis that points upwards: 0, 1 or 2.
 
@@ -44,7 +44,7 @@ def save_surface(
     FileFormatError
         If the picture cannot be written.
     """
-    ensure_writable(path, PICTURE_FORMATS, "a picture")
+    ensure_picture_writable(path)
     figure = new_figure(8.0, 7.0)
     axes = figure.add_subplot(1, 1, 1)
     draw_surface(field, axes, sources, n_contours, up=up)
@@ -85,7 +85,7 @@ def draw_surface(
 
 
 def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[np.bool_], step: float) -> None:
-    """Isolines at multiples of a step, one pixel wide, and a heavier one at zero."""
+    """Darken the pixels of isolines at multiples of a step, one pixel wide, and of a heavier one at zero."""
     for spacing, width, strength in ((step, 0.6, 0.55), (np.inf, 1.4, 0.9)):
         level = phi / spacing if np.isfinite(spacing) else phi
         rise = np.hypot(*np.gradient(level))
@@ -97,7 +97,7 @@ def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[
 
 
 def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: NDArray[np.float64]) -> None:
-    """Those parts of a source that nothing hides."""
+    """Draw the visible parts of a source."""
     points = np.einsum("ik,ikj->ij", item.barycentric, mesh.vertices[mesh.faces[item.faces]])
     if isinstance(item, Curve) and item.closed:
         points = np.concatenate([points, points[:1]])
@@ -113,7 +113,7 @@ def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: NDArray
 
 
 def toward_sources(mesh: Any, sources: Sequence[Any], up: int = 2) -> NDArray[np.float64]:
-    """A direction from which most of the sources show; of flat surfaces, the side that they face."""
+    """A direction from which most of the sources are visible; for flat surfaces, along their normals."""
     normals = [mesh.face_area_vectors[s.faces] for s in sources]
     mean = np.zeros(3)
     if normals:

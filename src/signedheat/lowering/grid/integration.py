@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.linalg import lsqr
 
 from ...discretization import Levels, SolvesEach
 from ...domains.grid import Grid
@@ -134,8 +135,6 @@ def diffused_mean(source: GridSource, values: NDArray[np.float64]) -> NDArray[np
 
 def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
     """(n_nodes,) grid function of least norm that interpolates these values at the samples, in least squares."""
-    from scipy.sparse.linalg import lsqr
-
     touched = np.unique(source.interpolation.indices)
     change = np.zeros(source.grid.n_nodes)
     change[touched] = lsqr(source.interpolation[:, touched], values, atol=1e-10, btol=1e-10, iter_lim=20000)[0]

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -102,10 +103,8 @@ class MaskedGridDiscretization(DiffusesEach):
 
     def _straight(self, source: MaskedSource) -> NDArray[np.bool_]:
         """(n,) nodes that the source reaches along a straight line."""
-        from scipy.spatial import cKDTree
-
         nodes, spacing = self.nodes, self.grid.spacing
-        nearest = cKDTree(source.positions * spacing).query(nodes.indices * spacing, workers=-1)[1]
+        nearest = scipy.spatial.cKDTree(source.positions * spacing).query(nodes.indices * spacing, workers=-1)[1]
         away = nodes.indices - source.positions[nearest]
         normals = unit(source.normals * spacing)[nearest]
         along = away - np.einsum("ij,ij->i", away, normals)[:, None] * normals

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -44,8 +45,6 @@ class MaskedSource:
         SourceError
             If a source lies within solid nodes.
         """
-        from scipy.ndimage import binary_dilation
-
         ids, weights = whole.stencil
         numbers = nodes.numbers[ids]
         weights = np.where(numbers >= 0, weights, 0.0)
@@ -62,7 +61,7 @@ class MaskedSource:
         row, corner = np.nonzero(weights)
         shape = (len(kept), len(nodes.ids))
         rows = sparse.csr_matrix((weights[row, corner], (row, numbers[row, corner])), shape=shape)
-        near_solid = binary_dilation(nodes.grid.mask).ravel()
+        near_solid = scipy.ndimage.binary_dilation(nodes.grid.mask).ravel()
         return cls(whole, rows, kept, near_solid[ids[kept]].any(axis=1))
 
     @property

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from ...domains.grid import Grid
 from ...operators.grid.node_sources import NodeSources
 from ...operators.grid.stencil import interpolation_stencil
 from ..area_elements import AreaSamples
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +73,6 @@ class GridSource:
 
     @cached_property
     def interpolation(self) -> csr_matrix:
-        from scipy.sparse import csr_matrix
-
         nodes, weights = self.stencil
         starts = np.arange(len(nodes) + 1) * nodes.shape[1]
         size = (len(nodes), self.grid.n_nodes)

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -137,10 +138,8 @@ class TetDiscretization(DiffusesEach):
 
     def _straight(self, source: TetSource, neighbors: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(m,) tets that the source reaches along a straight line."""
-        from scipy.spatial import cKDTree
-
         planes, centers = self.planes, self.mesh.tet_barycenters
-        nearest = source.centers[cKDTree(source.centers).query(centers)[1]]
+        nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
         ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
         return visible(*ends, neighbors, self.mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs)
 
@@ -155,9 +154,7 @@ class TetDiscretization(DiffusesEach):
     @cached_property
     def _is_convex(self) -> bool:
         """Whether the mesh fills its convex hull."""
-        from scipy.spatial import ConvexHull
-
-        hull = ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
+        hull = scipy.spatial.ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ...compiled import compiled
@@ -60,10 +61,8 @@ def solve_poisson(
     >>> np.allclose(solve_poisson(laplacian(phi, h), h), phi)
     True
     """
-    from scipy.fft import dctn, idctn
-
     workers = n_threads()
-    transformed = dctn(right_hand_side, type=2, overwrite_x=overwrite, workers=workers)
+    transformed = scipy.fft.dctn(right_hand_side, type=2, overwrite_x=overwrite, workers=workers)
     eigenvalues = [
         (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) / h**2
         for n, h in zip(right_hand_side.shape, spacing, strict=True)
@@ -71,7 +70,7 @@ def solve_poisson(
     padded = padded_shape(transformed.shape)
     eigenvalues = [np.zeros(1)] * (4 - len(eigenvalues)) + eigenvalues
     by_slabs(padded, _divide, *eigenvalues, transformed.reshape(padded))
-    return idctn(transformed, type=2, overwrite_x=True, workers=workers)
+    return scipy.fft.idctn(transformed, type=2, overwrite_x=True, workers=workers)
 
 
 def interpolation_stencil(

@@ -1,0 +1,67 @@
+"""Draws `architecture.png`: the floors of the package, and the way of the data through them."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
+from PIL import Image
+
+FLOORS = [
+    ("cli   visualization   samples   io", "commands, pictures, files, conversions", "#f3d9c1"),
+    ("extensions", "sharpening, jumps, completion, morphology, tet meshing", "#f7e6d0"),
+    ("solver   fields", "SignedHeatSolver, signed_distance; values that know their domain", "#fbf1de"),
+    ("method   constraints", "diffuse → normalize → integrate, once, on discretisations", "#fff6c9"),
+    ("lowering", "every domain and every source to its discretisation: surface, grid, tets", "#e3efd3"),
+    ("discretization", "the protocols: Discretization, SourceTerm, Integration", "#e3efd3"),
+    ("domains", "frozen data: meshes, polygons, points, voxels, tets, grids, curves", "#d3e8ea"),
+    ("operators   linear", "sparse matrices, matrix-free stencils, factorisations, Krylov", "#c9dcee"),
+    ("geometry", "arrays in, arrays out: intrinsic meshes, geodesics, flips, clipping", "#bccfe8"),
+    ("compiled  diagnostics  errors  memory  parallel  progress  slots", "used by all", "#d9d9e3"),
+]
+FLOW = [
+    (6, "shapes, curves, grids"),
+    (4, "X₀, t;  M + tL, C;  A"),
+    (3, "X  →  Y  →  φ"),
+    (2, "Field"),
+    (0, "files, pictures, numbers"),
+]
+"""Floor at which each thing is, from the top, in the order in which data pass through."""
+
+
+def draw(path: Path) -> None:
+    """Floors on the left, from the bottom up; data on the right."""
+    figure = Figure(figsize=(11, 6.2), dpi=100)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, 11), ylim=(-0.35, len(FLOORS) + 0.55))
+    axes.axis("off")
+    level = [len(FLOORS) - 1 - k for k in range(len(FLOORS))]
+    for (names, what, color), y in zip(FLOORS, level, strict=True):
+        axes.add_patch(_box(0.75, y + 0.06, 7.1, 0.86, color))
+        axes.text(0.95, y + 0.62, names, family="monospace", size=11.5, weight="bold", va="center")
+        axes.text(0.95, y + 0.28, what, size=9.5, va="center", color="#333333")
+    axes.annotate("", (0.4, 0.1), (0.4, len(FLOORS) - 0.1), arrowprops={"arrowstyle": "-|>", "lw": 1.8})
+    axes.text(0.16, len(FLOORS) / 2, "imports point down", rotation=90, va="center", ha="center", size=10)
+    axes.text(9.4, len(FLOORS) + 0.2, "the way of the data", ha="center", size=10)
+    axes.text(4.3, len(FLOORS) + 0.2, "the floors", ha="center", size=10)
+    for k, (floor, what) in enumerate(FLOW):
+        y = level[floor] + 0.5
+        axes.text(9.4, y, what, ha="center", va="center", size=10.5, bbox={"fc": "white", "ec": "#555555", "pad": 5})
+        axes.plot([7.9, 8.15], [y, y], color="#999999", lw=1)
+        if k + 1 < len(FLOW):
+            above = level[FLOW[k + 1][0]] + 0.5
+            axes.annotate("", (9.4, above - 0.3), (9.4, y + 0.3), arrowprops={"arrowstyle": "-|>", "lw": 1.4})
+    pixels = BytesIO()
+    figure.savefig(pixels)
+    Image.open(pixels).convert("RGB").quantize(48).save(path, optimize=True)  # a third of the size
+
+
+def _box(x: float, y: float, width: float, height: float, color: str) -> FancyBboxPatch:
+    style = "round,pad=0,rounding_size=0.08"
+    return FancyBboxPatch((x, y), width, height, boxstyle=style, fc=color, ec="#777777", lw=0.8)
+
+
+if __name__ == "__main__":
+    draw(Path(__file__).with_name("architecture.png"))

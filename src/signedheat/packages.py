@@ -1,0 +1,94 @@
+"""Other packages, imported when they are first used: at the start they would only cost time, and some may be missing.
+
+NumPy and SciPy, which imports its own parts late, are imported as usual. All others are `lazy_module` handles at the
+top of the modules that use them.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from .errors import MissingPackageError
+
+REMEDIES = {
+    "PIL": "pip install pillow",
+    "mpl_toolkits": "pip install matplotlib",
+    "nrrd": "pip install pynrrd",
+    "openvdb": "conda install -c conda-forge openvdb, or use .vti files",
+    "pytetwild": "pip install signedheat[tetwild]",
+    "skimage": "pip install scikit-image",
+    "sksparse": "conda install -c conda-forge scikit-sparse",
+    "tetgen": "pip install signedheat[tetgen]",
+}
+"""How to get the packages that are not installed by the name by which they are imported."""
+
+
+class LazyModule:
+    """A module that is imported when something in it is first asked for: see `lazy_module`."""
+
+    def __init__(self, name: str, purpose: str) -> None:
+        self._name = name
+        self._purpose = purpose
+
+    def __getattr__(self, attribute: str) -> Any:
+        if attribute.startswith("__"):  # asked for by doctest, copy and their like, which do not use the module
+            raise AttributeError(attribute)
+        return getattr(require(self._name, self._purpose), attribute)
+
+    def __repr__(self) -> str:
+        return f"lazy_module({self._name!r}, {self._purpose!r})"
+
+
+def lazy_module(name: str, purpose: str) -> Any:
+    """A handle that is used like a module, which is imported when something in it is first asked for.
+
+    Parameters
+    ----------
+    name : str
+        As in ``import name``.
+    purpose : str
+        What needs the module, in the plural: "NRRD files". Asked for anything, the handle raises
+        `MissingPackageError` with these words where the package is not installed.
+
+    Examples
+    --------
+    >>> statistics = lazy_module("statistics", "examples")
+    >>> statistics.median([3, 1, 2])
+    2
+    """
+    return LazyModule(name, purpose)
+
+
+def require(name: str, purpose: str) -> ModuleType:
+    """Import a module now, as before a long computation whose result it has to write.
+
+    Parameters
+    ----------
+    name : str
+        As in ``import name``.
+    purpose : str
+        What needs the module, in the plural.
+
+    Raises
+    ------
+    MissingPackageError
+        If its package is not installed, or cannot be imported. The message says what needs it and how to get it.
+
+    Examples
+    --------
+    >>> require("json", "examples").__name__
+    'json'
+    >>> require("no_such_package", "examples")
+    Traceback (most recent call last):
+    signedheat.errors.MissingPackageError: examples need the package no_such_package, which is not installed: ...
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        package = name.partition(".")[0]
+        missing = isinstance(error, ModuleNotFoundError) and error.name == package
+        cause = "is not installed" if missing else f"cannot be imported ({error})"
+        remedy = REMEDIES.get(package, f"pip install {package}")
+        raise MissingPackageError(f"{purpose} need the package {package}, which {cause}: {remedy}") from error

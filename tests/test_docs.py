@@ -1,0 +1,71 @@
+"""The documents: links lead somewhere, code blocks run, and the picture of the floors shows those that there are."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+import signedheat
+from signedheat.io import shapes
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
+EXTENDING = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+SECTIONS = re.findall(r"^## (.+?)$(.*?)(?=^## |\Z)", EXTENDING, re.M | re.S)
+BLOCKS = [(title, block) for title, text in SECTIONS for block in re.findall(r"```python\n(.*?)```", text, re.S)]
+
+
+def anchors(page: Path) -> set[str]:
+    """Names under which the headings of a page can be linked."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        linked = (page.parent / path).resolve() if path else page
+        assert linked.exists(), f"{page.name} links to {target}, which does not exist"
+        assert not anchor or anchor in anchors(linked), f"{page.name} links to {target}, which is no heading there"
+
+
+def test_every_page_is_linked_from_another():
+    text = {page: page.read_text(encoding="utf-8") for page in PAGES}
+    for page in PAGES:
+        if page.parent.name == "docs":
+            assert any(page.name in other for who, other in text.items() if who != page), (
+                f"nothing links to {page.name}"
+            )
+
+
+def test_extending_has_an_example_of_each_kind():
+    assert {title for title, _ in BLOCKS} == {
+        "A domain",
+        "A source",
+        "A constraint",
+        "A file format",
+        "A linear solver",
+    }
+
+
+@pytest.mark.parametrize("block", [block for _, block in BLOCKS], ids=[title for title, _ in BLOCKS])
+def test_examples_of_extending_run(block, monkeypatch):
+    monkeypatch.setattr(shapes, "READERS", dict(shapes.READERS))
+    monkeypatch.setattr(shapes, "WRITERS", dict(shapes.WRITERS))
+    exec(compile(block, "docs/extending.md", "exec", dont_inherit=True), {"__name__": "__main__"})
+
+
+def test_picture_of_the_floors_shows_all_of_them():
+    spec = importlib.util.spec_from_file_location("draw_architecture", ROOT / "docs" / "draw_architecture.py")
+    drawing = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(drawing)
+    drawn = [name for names, _, _ in drawing.FLOORS for name in names.split()]
+    package = Path(signedheat.__file__).parent
+    floors = {path.stem for path in package.glob("*.py")} | {path.parent.name for path in package.glob("*/__init__.py")}
+    assert sorted(drawn) == sorted(floors - {"__init__"})

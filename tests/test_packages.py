@@ -1,0 +1,132 @@
+"""Packages that are imported late, and what happens where they are missing."""
+
+import ast
+import copy
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat.cli import main
+from signedheat.extensions.tet_meshers import tetrahedralize_with_tetgen, tetrahedralize_with_tetwild
+from signedheat.packages import REMEDIES, lazy_module, require
+from signedheat.visualization import save_scene
+
+SOURCES = sorted(Path(sh.__file__).parent.rglob("*.py"))
+CUBE = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+SVG = '<svg xmlns="http://www.w3.org/2000/svg"><path d="M 0,0 L 1,0 L 1,1 Z"/></svg>'
+
+USES = {
+    "trimesh": lambda folder: CUBE.to_trimesh(),
+    "meshio": lambda folder: CUBE.to_meshio(),
+    "pyvista": lambda folder: CUBE.to_pyvista(),
+    "tetgen": lambda folder: tetrahedralize_with_tetgen(CUBE, resolution=4),
+    "pytetwild": lambda folder: tetrahedralize_with_tetwild(CUBE, resolution=4),
+    "matplotlib": lambda folder: save_scene(CUBE, folder / "scene.png"),
+    "svgpathtools": lambda folder: sh.read_polylines(folder / "line.svg"),
+    "nrrd": lambda folder: sh.load_field(folder / "phi.nrrd"),
+    "PIL": lambda folder: sh.read_mask(folder / "walls.png"),
+    "skimage": lambda folder: sh.GridField(sh.Grid([0, 0], 1, [3, 3]), np.eye(3) - 0.5).contour(0.0),
+}
+"""What needs each package that may be missing."""
+
+FILES = {
+    "ball.glb": "trimesh",
+    "ball.gltf": "trimesh",
+    "ball.msh": "meshio",
+    "ball.mesh": "meshio",
+    "ball.vtk": "meshio",
+}
+"""Files of shapes, and the package that reads them."""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "line.svg").write_text(SVG)
+    for name in ("phi.nrrd", "walls.png", *FILES):
+        (tmp_path / name).write_bytes(b"anything but empty")
+    return tmp_path
+
+
+def block(monkeypatch, package):
+    """Let a package be missing, whether it is installed or not."""
+    for name in [name for name in sys.modules if name == package or name.startswith(f"{package}.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+
+
+@pytest.mark.parametrize("package", USES)
+def test_a_missing_package_is_named_with_its_remedy(monkeypatch, folder, package):
+    block(monkeypatch, package)
+    with pytest.raises(sh.MissingPackageError) as caught:
+        USES[package](folder)
+    message = str(caught.value)
+    assert f" {package}," in message
+    assert message.endswith(REMEDIES.get(package, f"pip install {package}"))
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(("name", "package"), FILES.items())
+def test_a_file_whose_reader_is_missing_is_not_called_damaged(monkeypatch, folder, name, package, capsys):
+    block(monkeypatch, package)
+    with pytest.raises(sh.MissingPackageError):
+        sh.read(folder / name)
+    assert main(["info", str(folder / name)]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_pictures_are_refused_before_anything_is_computed(monkeypatch, folder, capsys):
+    block(monkeypatch, "matplotlib")
+    sh.save(CUBE, folder / "cube.stl")
+    arguments = ["volume", str(folder / "cube.stl"), "-o", str(folder / "phi.npz"), "--preview", str(folder / "p.png")]
+    assert main(arguments) == 1
+    assert "pip install matplotlib" in capsys.readouterr().err
+    assert not (folder / "phi.npz").exists()
+
+
+def test_a_missing_package_is_bad_input_and_an_import_error():
+    with pytest.raises(ImportError) as caught:
+        require("no_such_package", "tests")
+    assert isinstance(caught.value, sh.SignedHeatError)
+    assert isinstance(caught.value.__cause__, ModuleNotFoundError)
+
+
+def test_a_package_that_is_there_and_broken_says_why(monkeypatch, tmp_path):
+    (tmp_path / "broken_package.py").write_text("import its_own_requirement\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(sh.MissingPackageError, match="its_own_requirement"):
+        require("broken_package", "tests")
+
+
+def test_a_handle_imports_nothing_until_something_is_asked_of_it(monkeypatch):
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+    handle = lazy_module("colorsys", "tests")
+    copy.copy(handle), repr(handle), hasattr(handle, "__wrapped__")
+    assert "colorsys" not in sys.modules
+    assert handle.rgb_to_hsv is sys.modules["colorsys"].rgb_to_hsv
+    with pytest.raises(AttributeError):
+        handle.no_such_function  # noqa: B018
+
+
+def test_importing_the_package_leaves_out_what_only_some_use():
+    late = ("matplotlib", "meshio", "nrrd", "numba", "pyvista", "scipy.fft", "scipy.ndimage", "scipy.optimize",
+            "scipy.spatial", "skimage", "svgpathtools", "trimesh")  # fmt: skip
+    code = f"import signedheat, signedheat.cli, sys; print([name for name in {late} if name in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
+def test_other_packages_are_imported_at_the_top_or_through_handles(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    top = {id(node) for node in tree.body}
+    for node in tree.body:
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            top |= {id(inner) for inner in node.body}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in top:
+            named = getattr(node, "module", None) or node.names[0].name
+            inside = isinstance(node, ast.ImportFrom) and node.level > 0
+            assert inside or named.partition(".")[0] in sys.stdlib_module_names, f"{path}:{node.lineno}: {named}"
