@@ -24,9 +24,6 @@ from .errors import (
     UnreachedWarning,
     UnsupportedTypeError,
 )
-from .extensions import grid_sharpening as _grid_sharpening  # noqa: F401  registers it
-from .extensions import tet_sharpening as _tet_sharpening  # noqa: F401  registers it
-from .extensions import vertex_sharpening as _vertex_sharpening  # noqa: F401  registers it
 from .extensions.close_curves import close_curves
 from .extensions.common_subdivision import common_subdivision
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
@@ -49,13 +46,6 @@ from .io import (
     write_curves,
     write_polylines,
 )
-from .lowering import polylines as _polylines  # noqa: F401  registers the source
-from .lowering.grid import discretization as _grid  # noqa: F401  registers the lowering
-from .lowering.surface import digital_surfaces as _digital_surfaces  # noqa: F401  registers the lowering
-from .lowering.surface import discretization as _surface  # noqa: F401  registers the lowering
-from .lowering.surface import point_clouds as _point_clouds  # noqa: F401  registers the lowering
-from .lowering.surface import polygons as _polygons  # noqa: F401  registers the lowering
-from .lowering.tets import discretization as _tets  # noqa: F401  registers the lowering
 from .solver import SignedHeatSolver, signed_distance
 
 __version__ = "0.1.0"

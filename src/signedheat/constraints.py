@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from .discretization import Integration, Levels, SourceTerm
 from .errors import ConstraintError
 
 
+@runtime_checkable
 class Constraint(Protocol):
     """The protocol of constraints: they finish step 3."""
 

@@ -6,7 +6,7 @@ method (`method.py`) is written once, for discretisations, and does not depend o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any, Protocol
@@ -55,6 +55,9 @@ class Integration(Protocol):
     def solve(self, divergence: Any, source: Any) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² (Eq. 2) with nothing imposed: ``C φ = b`` (Eq. 13)."""
 
+    def solve_many(self, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[NDArray[np.float64]]:
+        """The same for several sources (see `SolvesEach`)."""
+
     def fit(self, divergence: Any, source: Any, levels: Levels) -> NDArray[np.float64]:
         """Impose levels at the samples (Eq. 14), in the way that suits the domain best."""
 
@@ -91,11 +94,32 @@ class Discretization(Adaptable, Protocol):
     def diffuse(self, source: Any) -> Any:
         """Solve ``(M + tL) X = X₀`` (Eq. 12); directions stay right however small X becomes."""
 
+    def diffuse_many(self, sources: Sequence[SourceTerm]) -> Iterable[Any]:
+        """The same for several sources of one τ (see `DiffusesEach`)."""
+
     def to_cells(self, vectors: Any) -> NDArray[Any]:
         """X at the cells on which ∇φ lives: complex numbers on surfaces, rows of components in space."""
 
     def divergence(self, directions: NDArray[Any]) -> Any:
-        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
+        """b, the right-hand side of ``C φ = b``."""
+
+
+class DiffusesEach:
+    """For discretisations that have nothing to gain by diffusing several sources at once."""
+
+    def diffuse_many(self: Discretization, sources: Sequence[Any]) -> Iterable[Any]:
+        """One after the other, each when it is asked for."""
+        return (self.diffuse(source) for source in sources)
+
+
+class SolvesEach:
+    """For step 3 that has nothing to gain by solving for several sources at once."""
+
+    def solve_many(
+        self: Integration, divergences: Iterable[Any], sources: Sequence[Any]
+    ) -> Iterable[NDArray[np.float64]]:
+        """One after the other, each when it is asked for."""
+        return (self.solve(divergence, source) for divergence, source in zip(divergences, sources, strict=True))
 
 
 @dataclass(frozen=True)

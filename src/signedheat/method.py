@@ -22,11 +22,8 @@ def diffuse(discretization: Discretization, source: SourceTerm) -> Any:
 
 
 def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) -> Iterable[Any]:
-    """Step 1 for each of several sources; at once, where the discretisation can."""
-    if hasattr(discretization, "diffuse_many"):
-        together: Iterable[Any] = discretization.diffuse_many(sources)
-        return together
-    return (diffuse(discretization, source) for source in sources)
+    """Step 1 for each of several sources of the same τ; at once, where the discretisation can."""
+    return discretization.diffuse_many(sources)
 
 
 def normalize(discretization: Discretization, vectors: Any) -> NDArray[Any]:
@@ -48,9 +45,8 @@ def integrate_many(
     constraint: Constraint,
 ) -> Iterable[NDArray[np.float64]]:
     """Step 3 for each of several sources; at once, where nothing is imposed and the discretisation can."""
-    if isinstance(constraint, Free) and hasattr(discretization.integration, "solve_many"):
-        divergences = [discretization.divergence(each) for each in directions]
-        together: Iterable[NDArray[np.float64]] = discretization.integration.solve_many(divergences, sources)
-        return together
+    if isinstance(constraint, Free):
+        divergences = (discretization.divergence(each) for each in directions)
+        return discretization.integration.solve_many(divergences, sources)
     each = zip(directions, sources, strict=True)
     return (integrate(discretization, direction, source, constraint) for direction, source in each)

@@ -204,7 +204,7 @@ def checked(constraint: Constraint | None) -> Constraint:
     """The constraint, or the default for None."""
     if constraint is None:
         return ZeroSet()
-    if isinstance(constraint, type) or not hasattr(constraint, "integrate"):
+    if isinstance(constraint, type) or not isinstance(constraint, Constraint):
         raise UnsupportedTypeError(
             f"{constraint!r} is not a constraint",
             remedy="pass Free(), ZeroSet(), EachComponent(), LevelValues(values) or Soft(weight)",

@@ -10,7 +10,7 @@ import signedheat as sh
 from shapes.tet_cases import boxes, rectangle, sphere
 from signedheat.geometry.tet_clipping import Planes, barycentric, clip_triangles, containing_tets
 from signedheat.linear import factorize
-from signedheat.linear.krylov import IncompleteCholesky, outward_order
+from signedheat.linear.incomplete_cholesky import IncompleteCholesky, outward_order
 
 
 def dihedral_cotangents(corners: np.ndarray) -> dict[tuple[int, int], float]:

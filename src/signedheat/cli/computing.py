@@ -11,12 +11,13 @@ import numpy as np
 
 from .. import sharpen
 from ..diagnostics import SampledSource
-from ..domains.grid import Grid
+from ..domains.grid import Grid, room_around
 from ..errors import SignedHeatError
 from ..fields.grid_field import GridField
 from ..io import POLYLINE_FORMATS, read, read_mask, read_polylines
 from ..io.files import extension
-from ..solver import SignedHeatSolver
+from ..lowering.area_elements import bounds_around
+from ..solver import SignedHeatSolver, as_list
 from .options import Parser
 from .progress import ProgressBar
 
@@ -79,19 +80,9 @@ def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
     if arguments.origin is not None:
         return Grid(arguments.origin, spacing, arguments.grid_shape)
     options = {"resolution": arguments.resolution or RESOLUTION, "spacing": spacing}
-    bounds = bounds_of(shape)
-    if arguments.padding is not None or reach == 0:
-        return Grid.around(bounds, padding=arguments.padding, **options)
-    longest = float(np.ptp(bounds, axis=0).max())
-    return Grid.around(bounds, padding=0.2 * longest + 1.05 * reach, **options)
-
-
-def bounds_of(shape: Any) -> Any:
-    """(2, d) of a shape or a list of polylines."""
-    if not isinstance(shape, list):
-        return shape.bounds
-    corners = np.concatenate([line.bounds for line in shape])
-    return np.stack([corners.min(axis=0), corners.max(axis=0)])
+    bounds = bounds_around(as_list(shape))
+    padding = room_around(bounds, reach) if arguments.padding is None else arguments.padding
+    return Grid.around(bounds, padding=padding, **options)
 
 
 def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:

@@ -12,8 +12,9 @@ from ..errors import SourceError
 from ..io import FIELD_FORMATS, load_field, read, read_curves, read_polylines
 from ..io.files import extension
 from ..io.obj import read_obj_lines
+from ..lowering.area_elements import bounds_around
 from ..lowering.grid.discretization import memory_estimate
-from .computing import bounds_of, describe, is_planar
+from .computing import describe, is_planar
 from .curve_report import as_text, curve_reports
 from .options import Summary, add_command, whole_number
 
@@ -69,7 +70,7 @@ def run(arguments: Namespace) -> Summary:
 def lines_report(arguments: Namespace) -> Summary:
     """Inspect polylines in the plane."""
     lines = read_polylines(arguments.file)
-    bounds = bounds_of(lines)
+    bounds = bounds_around(lines)
     summary = {
         "file": arguments.file,
         "kind": "Polyline",

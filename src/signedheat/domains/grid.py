@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from .validation import frozen
 
+ROOM = 0.2
+"""Share of its longest side by which a shape is padded on every side."""
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
 
@@ -134,7 +136,7 @@ class Grid(Generic[Dimension]):
         longest = float((upper - lower).max())
         if padding is not None and not (np.isfinite(padding) and padding >= 0):
             raise GeometryError(f"the padding must be a length, zero or more, not {padding}")
-        room = 0.2 * longest if padding is None else float(padding)
+        room = room_around(bounds) if padding is None else float(padding)
         if not longest + 2 * room > 0:
             raise GeometryError(
                 "the shape is a single point",
@@ -187,6 +189,18 @@ class Grid(Generic[Dimension]):
     def __repr__(self) -> str:
         solid = "" if self.mask is None else f", {int(self.mask.sum())} solid nodes"
         return f"Grid(origin={self.origin.tolist()}, spacing={self.spacing.tolist()}, shape={self.shape}{solid})"
+
+
+def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = ROOM) -> float:
+    """Padding that leaves room around a box for what has to be completed, and for offsets up to `reach`.
+
+    Examples
+    --------
+    >>> room_around([[0, 0, 0], [1, 2, 4]], reach=1.0, share=0.5)
+    3.05
+    """
+    lower, upper = np.asarray(bounds, dtype=np.float64)
+    return share * float((upper - lower).max()) + 1.05 * reach
 
 
 def _solid_nodes(mask: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from ..geometry.components import connected_components
 from ..operators.tetrahedral import FLAT
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
@@ -247,7 +246,7 @@ def _n_nonmanifold_vertices(
     ends[flipped] = ends[flipped, ::-1]
     same = edge[1:] == edge[:-1]
     one, other = ends[:-1][same].ravel(), ends[1:][same].ravel()
-    fans = _components(len(tail), one, other)
+    fans = connected_components(len(tail), one, other)
     pairs = np.unique(np.stack([tail, fans], axis=1), axis=0)
     crowded = faces_of_edge[edge] > 2
     bad = np.bincount(pairs[:, 0], minlength=polygons.n_vertices) > 1
@@ -271,15 +270,9 @@ def _n_repeated(rows: NDArray[Any]) -> int:
     return int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
 
 
-def _components(n_nodes: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
-    graph = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(n_nodes, n_nodes))
-    result: NDArray[np.int64] = connected_components(graph.tocsr(), directed=False)[1]
-    return result
-
-
 def _n_components(n_nodes: int, one: NDArray[Any], other: NDArray[Any], nodes: NDArray[Any] | None = None) -> int:
-    """Number of connected components of a graph that contain some of the nodes; by default those of its edges."""
-    return len(np.unique(_components(n_nodes, one, other)[one if nodes is None else nodes]))
+    """Components of a graph, counted over some nodes: those of its edges by default."""
+    return len(np.unique(connected_components(n_nodes, one, other)[one if nodes is None else nodes]))
 
 
 def _tuple(values: NDArray[np.float64]) -> tuple[float, ...]:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from ..errors import GeometryError
 from ..geometry.box_tree import BoxTree
+from ..geometry.components import element_components
 from ..geometry.tet_faces import FaceTable, face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
 from ..packages import lazy_module
@@ -118,12 +118,7 @@ class TetMesh:
     @cached_property
     def parts(self) -> NDArray[np.int64]:
         """(m,) connected component of each tet, through shared faces."""
-        m, tet_faces = self.n_tets, self.faces.tet_faces.ravel()
-        size = m + len(self.faces.vertices)
-        ends = np.repeat(np.arange(m), 4), tet_faces + m
-        graph = sparse.coo_matrix((np.ones(4 * m, dtype=np.int8), ends), shape=(size, size))
-        result: NDArray[np.int64] = sparse.csgraph.connected_components(graph, directed=False)[1][:m].astype(np.int64)
-        return result
+        return element_components(self.faces.tet_faces)
 
     @cached_property
     def search_tree(self) -> BoxTree:

@@ -19,6 +19,7 @@ from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from ..errors import SignedHeatError
+from ..geometry.components import connected_components
 from ..linear import factorize
 
 _LOOK = 25  # rounds between two evaluations of the gap
@@ -196,10 +197,8 @@ def regions_moved(problem: JumpProblem, constants: NDArray[np.float64], jump: fl
     low, high = problem.low, problem.high
     difference = problem.differences(constants)
     joined = np.abs(difference - np.clip(difference, low, high)) <= jump
-    n = problem.n_faces
-    graph = sparse.csr_matrix((joined.astype(np.int8), tuple(problem.faces.T)), shape=(n, n))
-    graph.eliminate_zeros()
-    n_regions, region = sparse.csgraph.connected_components(graph, directed=False)
+    region = connected_components(problem.n_faces, *problem.faces[joined].T)
+    n_regions = int(region.max(initial=-1)) + 1
     faces = region[problem.faces]
     between = faces[:, 0] != faces[:, 1]
     low, high = (low - difference)[between], (high - difference)[between]

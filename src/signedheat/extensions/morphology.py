@@ -14,7 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints
-from ..domains.grid import Grid
+from ..domains.grid import Grid, room_around
 from ..domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.polyline import Polyline
@@ -25,7 +25,7 @@ from ..errors import SignedHeatError, SourceError, UnsupportedTypeError
 from ..fields.grid_field import GridField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
-from ..lowering.area_elements import area_elements, extent, grid_around
+from ..lowering.area_elements import area_elements, bounds_around
 from ..packages import lazy_module
 from ..solver import as_list, signed_distance
 from .sharpening import sharpen
@@ -33,6 +33,8 @@ from .sharpening import sharpen
 remesh = lazy_module("trimesh.remesh", "walls around sheets")
 
 RESOLUTION = 128
+ROOM = 0.15
+"""Share of its longest side by which a shape is padded, besides what its offsets take."""
 
 Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
 """The boundary of a result, of the same kind as the shape."""
@@ -242,9 +244,8 @@ def _room(shape: Sources, reach: float, resolution: int) -> Grid:
             "a Curve lies on a surface",
             remedy="pass that surface as the domain",
         )
-    bounds = np.stack([extent(part) for part in shapes])
-    longest = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
-    return grid_around(shapes, resolution, padding=0.15 * longest + 1.05 * reach)
+    bounds = bounds_around(shapes)
+    return Grid.around(bounds, resolution, room_around(bounds, reach, ROOM))
 
 
 def _grid(domain: object) -> Grid[Literal[3]]:

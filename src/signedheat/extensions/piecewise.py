@@ -132,7 +132,7 @@ def piecewise_distance(
         problem = jump_problem(triangles, pairs, slopes, guarded_edges(triangles, parts))
         inner = None if progress is None else lambda share: progress(0.5 + 0.25 * share, "integrate")
         solution = minimize_exactly(problem) if exact else minimize_fast(problem, progress=inner)
-        values = centered(triangles, pairs, slopes + solution.constants[:, None], parts)
+        values = centered(triangles, slopes + solution.constants[:, None], parts)
     with stopwatch("finish"):
         if isinstance(domain, IntrinsicTriangulation):
             phi: PiecewiseField = IntrinsicPiecewiseField(domain, domain, values, triangles)
@@ -219,15 +219,13 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> N
 
 
 def centered(
-    triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.float64], parts: Sequence[CurveSegments]
+    triangles: IntrinsicMesh, values: NDArray[np.float64], parts: Sequence[CurveSegments]
 ) -> NDArray[np.float64]:
     """Values shifted so that their median over the source is zero, on every connected component of the surface.
 
     The median is weighted by length, and is robust to jumps that reach the source. Components without a source are NaN.
     """
-    m = triangles.n_faces
-    graph = sparse.csr_matrix((np.ones(len(pairs.faces)), tuple(pairs.faces.T)), shape=(m, m))
-    label = sparse.csgraph.connected_components(graph, directed=False)[1]
+    label = triangles.face_components
     faces, heights, weights = [], [], []
     for part in parts:
         if len(part.ends) == 0:
@@ -240,11 +238,10 @@ def centered(
             weights.append(weight)
     face, height, weight = (np.concatenate(a) for a in (faces, heights, weights))
     shift = np.full(label.max() + 1, np.nan)
-    for k in np.unique(label[face]):
-        here = np.flatnonzero(label[face] == k)
-        here = here[np.argsort(height[here], kind="stable")]
+    order = np.lexsort([height, label[face]])
+    for here in np.split(order, 1 + np.flatnonzero(np.diff(label[face[order]]))):
         total = np.cumsum(weight[here])
-        shift[k] = height[here[np.searchsorted(total, 0.5 * total[-1])]]
+        shift[label[face[here[0]]]] = height[here[np.searchsorted(total, 0.5 * total[-1])]]
     result: NDArray[np.float64] = values - shift[label][:, None]
     return result
 

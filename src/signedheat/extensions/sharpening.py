@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import singledispatch
-from typing import Any, Protocol, TypeVar, overload
+from typing import Any, Protocol, TypeVar, overload, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from ..progress import Progress
 from .sharpening_methods import Geodesic
 
 
+@runtime_checkable
 class Method(Protocol):
     """A method of sharpening, for fields on surfaces and tets."""
 
@@ -115,7 +116,7 @@ def sharpened(
 ) -> tuple[NDArray[np.float64], Diagnostics]:
     """Sharpened values of a field on a surface or on tets, and diagnostics with the slope errors before and after."""
     method = Geodesic() if method is None else method
-    if isinstance(method, type) or not hasattr(method, "sharpened"):
+    if isinstance(method, type) or not isinstance(method, Method):
         raise UnsupportedTypeError(
             f"{method!r} is no method of sharpening",
             remedy="pass Geodesic() or Convex()",

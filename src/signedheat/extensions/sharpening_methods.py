@@ -129,8 +129,7 @@ class Convex:
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """The maximiser of Eq. 18, starting from φ⁰ = `values`."""
-        rows = getattr(source, "interpolation", None)
-        if rows is None or rows.shape[1] != len(values):
+        if source is None or source.interpolation.shape[1] != len(values):
             raise SourceError(
                 "the convex method holds φ at the source, and this field comes without one, or from one "
                 "that lies on other triangles",

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.grid import room_around
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
-from ..lowering.area_elements import area_elements, extent
+from ..lowering.area_elements import area_elements, bounds_around
 from ..packages import lazy_module
 
 pytetwild = lazy_module("pytetwild", "tets of fTetWild")
@@ -93,7 +94,7 @@ def tetrahedralize_with_tetwild(shape: Any, *, resolution: int = 32, padding: fl
     vertices, ids = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     leftover = Path("__tracked_surface.stl")  # fTetWild leaves it in the working directory
     keep = leftover.exists()
-    vertices, tets = pytetwild.tetrahedralize(  # type: ignore[attr-defined]
+    vertices, tets = pytetwild.tetrahedralize(
         np.concatenate([corners, vertices]),
         np.concatenate([faces, ids.reshape(-1, 3) + len(corners)]).astype(np.int32),
         edge_length_abs=spacing,
@@ -107,11 +108,11 @@ def _box_around(
     shape: Any, resolution: int, padding: float | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Lower and upper corner of the padded bounding box of a shape, and the target edge length."""
-    lower, upper = extent(shape)
+    lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
         raise GeometryError(f"{shape!r} has no extent in space of three dimensions to put a mesh around")
-    padding = longest / 5 if padding is None else padding
+    padding = room_around((lower, upper)) if padding is None else padding
     return lower - padding, upper + padding, longest / resolution
 
 

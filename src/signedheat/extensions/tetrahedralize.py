@@ -15,11 +15,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..domains.grid import room_around
 from ..domains.kinds import Shape
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError, MemoryLimitError
-from ..lowering.area_elements import area_elements, extent
+from ..lowering.area_elements import area_elements, bounds_around
 
 LEAST_GRADING = 2.7
 """Below this, neighbouring leaves could differ by more than a factor of two in size: g/2 must exceed √3·¾."""
@@ -73,11 +74,11 @@ def tetrahedralize(
     >>> float(mesh.tet_volumes.min()) > 0
     True
     """
-    lower, upper = extent(shape)
+    lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
         raise GeometryError(f"{shape!r} has no extent in space of three dimensions to put a mesh around")
-    padding = longest / 5 if padding is None else padding
+    padding = room_around((lower, upper)) if padding is None else padding
     if resolution < 1 or not 0 <= padding < np.inf or not grading >= LEAST_GRADING:
         raise GeometryError(
             f"resolution must be at least 1, padding at least 0 and grading at least {LEAST_GRADING}, not "

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..diagnostics import GeodesicWindows, Note
 from ..discretization import discretize
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..errors import GeometryError, UnsupportedTypeError
 from ..fields.vertex_field import VertexField
+from ..geometry.components import connected_components
 from ..geometry.curve_segments import CurveSegments, interpolation_at
 from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
 from ..geometry.intrinsic_mesh import IntrinsicMesh
@@ -97,9 +97,7 @@ def without_halos(
     m, e = len(crossed), triangles.n_edges
     through = np.roll(signs, -1, axis=1)[crossed] * signs[crossed] < 0
     face, side = np.nonzero(through)
-    ends = face, m + triangles.edges.face_edges[crossed[face], side]
-    graph = sparse.coo_matrix((np.ones(len(face), dtype=np.int8), ends), shape=(m + e, m + e))
-    line = sparse.csgraph.connected_components(graph, directed=False)[1][:m]
+    line = connected_components(m + e, face, m + triangles.edges.face_edges[crossed[face], side])[:m]
     corners = triangles.corner_vertices[crossed]
     is_sided = np.zeros(len(values), dtype=bool)
     is_sided[sided] = True

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..diagnostics import Diagnostics
 from ..domains.curves import Curve, SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
+from ..geometry.components import connected_components
 from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import locate_points
@@ -141,8 +141,7 @@ class PiecewiseField:
         high = np.flatnonzero(height > np.maximum(longest[self.pairs.faces].max(axis=1), typical))
         ends = self.triangles.edges.vertices[self.pairs.edges[high]]
         n = self.triangles.n_vertices
-        graph = sparse.coo_matrix((np.ones(len(high), dtype=np.int8), tuple(ends.T)), shape=(n, n))
-        line = sparse.csgraph.connected_components(graph, directed=False)[1][ends[:, 0]]
+        line = connected_components(n, *ends.T)[ends[:, 0]]
         far = np.zeros(n, dtype=bool)
         far[line[height[high] > FAR * typical]] = True
         result = np.zeros(len(height), dtype=bool)
@@ -158,8 +157,7 @@ class PiecewiseField:
         edges, first, which = np.unique(edges, return_index=True, return_inverse=True)
         largest = np.zeros((len(first), 2))
         np.maximum.at(largest, which, height)
-        lengths = np.empty(self.triangles.n_edges)
-        lengths[self.triangles.edges.face_edges] = self.triangles.edge_lengths
+        lengths = self.triangles.lengths_of_edges
         lines = []
         for chain, forward in chains(self.triangles.edges.vertices[edges]):
             ends = self.triangles.edges.vertices[edges[chain]]
@@ -185,9 +183,7 @@ class PiecewiseField:
         """(3m,) vertex of the split mesh at each corner, and the original vertex of each vertex of the split mesh."""
         whole = ~self.is_cut
         ends = np.concatenate([self.pairs.tails[whole], self.pairs.heads[whole]])
-        n = self.values.size
-        graph = sparse.csr_matrix((np.ones(len(ends), dtype=bool), (ends[:, 0], ends[:, 1])), shape=(n, n))
-        owner = sparse.csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
+        owner = connected_components(self.values.size, *ends.T)
         _, first = np.unique(owner, return_index=True)
         return owner, self.surface.faces.ravel()[first]
 

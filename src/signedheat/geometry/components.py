@@ -1,9 +1,10 @@
-"""Kernels: vertices that coincide, and connected components of faces."""
+"""Vertices at one position; connected components of graphs and of elements."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..compiled import compiled
 
@@ -19,15 +20,40 @@ def same_positions(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
     return _same_positions(np.ascontiguousarray(vertices) + 0.0)  # −0 becomes 0
 
 
-def face_components(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(m,) connected component of each face, through shared vertices, numbered by first appearance.
+def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
+    """(n,) connected component of each node of a graph, numbered by first appearance.
+
+    Parameters
+    ----------
+    n : int
+        Number of nodes.
+    one, other : (k,) int
+        The ends of each edge.
 
     Examples
     --------
-    >>> face_components(np.array([[0, 1, 2], [3, 4, 5], [2, 6, 7]])).tolist()
+    >>> connected_components(4, np.array([0, 3]), np.array([2, 3])).tolist()
+    [0, 1, 0, 2]
+    """
+    graph = sparse.coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(n, n))
+    labels: NDArray[np.int64] = sparse.csgraph.connected_components(graph.tocsr(), directed=False)[1].astype(np.int64)
+    return labels
+
+
+def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m,) connected component of each element, numbered by first appearance.
+
+    Parameters
+    ----------
+    elements : (m, k) int
+        The vertices of each element, or its edges, or its faces: elements that share one are connected.
+
+    Examples
+    --------
+    >>> element_components(np.array([[0, 1, 2], [3, 4, 5], [2, 6, 7]])).tolist()
     [0, 1, 0]
     """
-    return _face_components(np.ascontiguousarray(faces), int(faces.max()) + 1)
+    return _element_components(np.ascontiguousarray(elements), int(elements.max()) + 1)
 
 
 @compiled(nogil=True)
@@ -64,11 +90,11 @@ def _same_positions(vertices):
 
 
 @compiled(nogil=True)
-def _face_components(faces, n_vertices):
-    parent = np.arange(n_vertices)
-    for f in range(faces.shape[0]):
-        for c in range(1, faces.shape[1]):
-            a, b = faces[f, 0], faces[f, c]
+def _element_components(elements, n):
+    parent = np.arange(n)
+    for e in range(elements.shape[0]):
+        for c in range(1, elements.shape[1]):
+            a, b = elements[e, 0], elements[e, c]
             while parent[a] != a:
                 parent[a] = parent[parent[a]]
                 a = parent[a]
@@ -79,15 +105,15 @@ def _face_components(faces, n_vertices):
                 parent[b] = a
             else:
                 parent[a] = b
-    labels = np.full(n_vertices, -1, dtype=np.int64)
-    result = np.empty(faces.shape[0], dtype=np.int64)
+    labels = np.full(n, -1, dtype=np.int64)
+    result = np.empty(elements.shape[0], dtype=np.int64)
     count = 0
-    for f in range(faces.shape[0]):
-        a = faces[f, 0]
+    for e in range(elements.shape[0]):
+        a = elements[e, 0]
         while parent[a] != a:
             a = parent[a]
         if labels[a] < 0:
             labels[a] = count
             count += 1
-        result[f] = labels[a]
+        result[e] = labels[a]
     return result

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import floor
 
 Point = tuple[float, float]
+Cell = tuple[int, int]
+Triangle = tuple[int, int, int]
+Apex = dict[tuple[int, int], int]
+"""The corner opposite each directed edge, in the triangle that runs along it."""
 
 CLOSE = 1e-9
 """Distance, in barycentric coordinates, below which a point counts as lying on a segment."""
+
+FLAT = 1e-14
+"""Twice the area below which a triangle is as good as flat, and is not made by a flip."""
 
 
 def turn(a: Point, b: Point, c: Point) -> float:
@@ -27,17 +36,20 @@ def arrange(points: list[Point], segments: Sequence[tuple[int, int]]) -> list[li
     >>> arrange(corners, [(0, 2), (1, 3)]), corners[4]
     ([[0, 4, 2], [1, 4, 3]], (0.5, 0.5))
     """
+    buckets = Buckets.of(points, segments)
     for k, (a, b) in enumerate(segments):
-        for c, d in segments[:k]:
+        for other in buckets.earlier_segments(k):
+            c, d = segments[other]
             if len({a, b, c, d}) == 4:
-                cross(points, a, b, c, d)
+                cross(points, buckets, a, b, c, d)
     chains = []
-    for a, b in segments:
+    for k, (a, b) in enumerate(segments):
         p, q = points[a], points[b]
         direction = (q[0] - p[0], q[1] - p[1])
         square = direction[0] ** 2 + direction[1] ** 2
         inside = []
-        for i, r in enumerate(points):
+        for i in buckets.points_along(k):
+            r = points[i]
             along = ((r[0] - p[0]) * direction[0] + (r[1] - p[1]) * direction[1]) / square
             if i not in (a, b) and 0 < along < 1 and abs(turn(p, q, r)) <= CLOSE * square**0.5:
                 inside.append((along, i))
@@ -45,16 +57,90 @@ def arrange(points: list[Point], segments: Sequence[tuple[int, int]]) -> list[li
     return chains
 
 
-def cross(points: list[Point], a: int, b: int, c: int, d: int) -> None:
-    """Append the crossing of segments ab and cd to `points`, unless there is a point already."""
+def cross(points: list[Point], buckets: Buckets, a: int, b: int, c: int, d: int) -> None:
+    """Append the point at which two segments cross, unless a point is there already."""
     p, q, r, s = points[a], points[b], points[c], points[d]
     left, right = turn(r, s, p), turn(r, s, q)
     if left * right >= 0 or turn(p, q, r) * turn(p, q, s) >= 0:
         return
     t = left / (left - right)
     x = (p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1]))
-    if all(abs(x[0] - y[0]) + abs(x[1] - y[1]) > CLOSE for y in points):
+    if all(abs(x[0] - points[i][0]) + abs(x[1] - points[i][1]) > CLOSE for i in buckets.points_near(x)):
+        buckets.put(len(points), x)
         points.append(x)
+
+
+@dataclass(frozen=True)
+class Buckets:
+    """Which points and segments lie in each cell of a square grid about as fine as the segments are long.
+
+    Attributes
+    ----------
+    size : float
+        Side of a cell.
+    cells : list of lists of cells
+        Those that each segment passes, or comes close to.
+    points, segments : dict from cells to lists of int
+        What is in each.
+    """
+
+    size: float
+    cells: list[list[Cell]]
+    points: dict[Cell, list[int]]
+    segments: dict[Cell, list[int]]
+
+    @classmethod
+    def of(cls, points: Sequence[Point], segments: Sequence[tuple[int, int]]) -> Buckets:
+        """Sort points and segments into cells: a few for each segment, on average."""
+        lengths = [abs(points[b][0] - points[a][0]) + abs(points[b][1] - points[a][1]) for a, b in segments]
+        size = max(sum(lengths) / max(len(lengths), 1), 1e-3 / max(len(lengths), 1))
+        cells = [cells_along(points[a], points[b], size) for a, b in segments]
+        passing = defaultdict(list)
+        for k, passed in enumerate(cells):
+            for cell in passed:
+                passing[cell].append(k)
+        buckets = cls(size, cells, defaultdict(list), passing)
+        for i, x in enumerate(points):
+            buckets.put(i, x)
+        return buckets
+
+    def put(self, i: int, x: Point) -> None:
+        """Add a point."""
+        self.points[floor(x[0] / self.size), floor(x[1] / self.size)].append(i)
+
+    def points_near(self, x: Point) -> list[int]:
+        """Points that may lie close to x."""
+        return [i for cell in cells_along(x, x, self.size) for i in self.points.get(cell, ())]
+
+    def points_along(self, k: int) -> list[int]:
+        """Points that may lie on a segment."""
+        return [i for cell in self.cells[k] for i in self.points.get(cell, ())]
+
+    def earlier_segments(self, k: int) -> list[int]:
+        """Segments of lower number that may cross a segment, in order."""
+        return sorted({other for cell in self.cells[k] for other in self.segments[cell] if other < k})
+
+
+def cells_along(p: Point, q: Point, size: float) -> list[Cell]:
+    """Cells of a square grid within twice `CLOSE` of a segment, column by column.
+
+    Examples
+    --------
+    >>> cells_along((0.5, 0.5), (2.5, 0.75), 1.0)
+    [(0, 0), (1, 0), (2, 0)]
+    """
+    (x, y), (u, v) = (p, q) if p[0] <= q[0] else (q, p)
+    margin = 2 * CLOSE
+    found = []
+    for column in range(floor((x - margin) / size), floor((u + margin) / size) + 1):
+        begin, end = max(x, column * size - margin), min(u, (column + 1) * size + margin)
+        low, high = (y, v) if u == x else (y + (v - y) * (at - x) / (u - x) for at in (begin, end))
+        low, high = sorted((min(max(low, min(y, v)), max(y, v)), min(max(high, min(y, v)), max(y, v))))
+        if u - x <= 2 * margin:  # as good as vertical
+            low, high = min(y, v), max(y, v)
+        rows = range(floor((low - margin) / size), floor((high + margin) / size) + 1)
+        found += [(column, row) for row in rows]
+    return found
 
 
 def triangulate(
@@ -76,7 +162,7 @@ def triangulate(
     >>> triangulate([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0)], [[3], [], []], [(3, 2)])
     [(0, 3, 2), (1, 2, 3)]
     """
-    apex = {(0, 1): 2, (1, 2): 0, (2, 0): 1}
+    apex: Apex = {(0, 1): 2, (1, 2): 0, (2, 0): 1}
     on_sides = set()
     for k, side in enumerate(sides):
         tail = k
@@ -84,11 +170,13 @@ def triangulate(
             split_edge(apex, tail, (k + 1) % 3, i)
             tail = i
         on_sides.update(side)
+    corner = (0, *next((v, w) for (u, v), w in apex.items() if u == 0))
     for i in range(3, len(points)):
         if i not in on_sides:
-            insert(points, apex, i)
+            corner = insert(points, apex, i, corner)
+    leaving = dict(apex.keys())
     for a, b in segments:
-        force(points, apex, a, b)
+        force(points, apex, leaving, a, b)
     return sorted({rotated(u, v, w) for (u, v), w in apex.items()})
 
 
@@ -97,13 +185,13 @@ def rotated(u: int, v: int, w: int) -> tuple[int, int, int]:
     return min((u, v, w), (v, w, u), (w, u, v))
 
 
-def add(apex: dict[tuple[int, int], int], u: int, v: int, w: int) -> None:
-    """Add a triangle: `apex` maps each of its directed edges to the opposite corner."""
+def add(apex: Apex, u: int, v: int, w: int) -> None:
+    """Add a triangle, known to each of its directed edges by the corner opposite."""
     apex[u, v], apex[v, w], apex[w, u] = w, u, v
 
 
-def split_edge(apex: dict[tuple[int, int], int], u: int, v: int, i: int) -> None:
-    """Insert point i on an edge, splitting the triangles on both sides of it."""
+def split_edge(apex: Apex, u: int, v: int, i: int) -> None:
+    """Put a point on an edge, in the triangles on both of its sides."""
     for a, b in ((u, v), (v, u)):
         if (a, b) in apex:
             w = apex.pop((a, b))
@@ -111,27 +199,43 @@ def split_edge(apex: dict[tuple[int, int], int], u: int, v: int, i: int) -> None
             add(apex, i, b, w)
 
 
-def insert(points: Sequence[Point], apex: dict[tuple[int, int], int], i: int) -> None:
-    """Insert point i into the triangle that contains it, or on the edge that it lies on."""
-    x = points[i]
-    best, where = -float("inf"), (0, 0, 0)
-    for (u, v), w in apex.items():
-        depth = min(turn(points[u], points[v], x), turn(points[v], points[w], x), turn(points[w], points[u], x))
-        if depth > best:
-            best, where = depth, (u, v, w)
-    u, v, w = where
+def insert(points: Sequence[Point], apex: Apex, i: int, begin: Triangle) -> Triangle:
+    """Put a point into the triangle that has it, or on its edge; a triangle beside it."""
+    u, v, w = locate(points, apex, points[i], begin)
     for a, b in ((u, v), (v, w), (w, u)):
         p, q = points[a], points[b]
         length = ((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2) ** 0.5
-        if (b, a) in apex and turn(p, q, x) <= CLOSE * length:
+        if (b, a) in apex and turn(p, q, points[i]) <= CLOSE * length:
             split_edge(apex, a, b, i)
-            return
+            return a, i, apex[a, i]
     for a, b in ((u, v), (v, w), (w, u)):
         add(apex, a, b, i)
+    return u, v, i
 
 
-def force(points: Sequence[Point], apex: dict[tuple[int, int], int], a: int, b: int) -> None:
-    """Flip the edges that cross segment ab until it is an edge itself (Sloan 1993)."""
+def locate(points: Sequence[Point], apex: Apex, x: Point, begin: Triangle) -> Triangle:
+    """The triangle that a point lies in: a walk over the edges that hide it, or, where that goes round, a search."""
+    here = begin
+    for _ in range(len(apex)):
+        depths = [(turn(points[a], points[b], x), a, b) for a, b in edges_of(here)]
+        depth, a, b = min(depths)
+        if depth >= 0 or (b, a) not in apex:
+            break
+        here = (b, a, apex[b, a])
+    if depth >= 0:
+        return here
+    each = ((u, v, w) for (u, v), w in apex.items())
+    return max(each, key=lambda triangle: min(turn(points[a], points[b], x) for a, b in edges_of(triangle)))
+
+
+def edges_of(triangle: Triangle) -> tuple[tuple[int, int], ...]:
+    """The directed edges of a triangle."""
+    u, v, w = triangle
+    return (u, v), (v, w), (w, u)
+
+
+def force(points: Sequence[Point], apex: Apex, leaving: dict[int, int], a: int, b: int) -> None:
+    """Flip the edges that cross a segment until it is an edge itself (Sloan 1993)."""
     if (a, b) in apex or (b, a) in apex:
         return
     p, q = points[a], points[b]
@@ -142,17 +246,52 @@ def force(points: Sequence[Point], apex: dict[tuple[int, int], int], a: int, b: 
         r, s = points[u], points[v]
         return turn(p, q, r) * turn(p, q, s) < 0 and turn(r, s, p) * turn(r, s, q) < 0
 
-    queue = deque((u, v) for u, v in apex if u < v and crosses(u, v))
-    patience = 100 + len(queue) ** 3
-    while queue and patience:
+    remaining = crossed_edges(apex, leaving, a, b, crosses)
+    patience = 100 + len(remaining) ** 2
+    flipped = True
+    while remaining and flipped and patience:
         patience -= 1
-        u, v = queue.popleft()
-        w, x = apex[u, v], apex[v, u]
-        if turn(points[x], points[v], points[w]) <= 0 or turn(points[w], points[u], points[x]) <= 0:
-            queue.append((u, v))
-            continue
-        del apex[u, v], apex[v, u]
-        add(apex, w, x, v)
-        add(apex, x, w, u)
-        if crosses(w, x):
-            queue.append((w, x))
+        flipped, waiting = False, []
+        for u, v in reversed(remaining):  # there and back: flips at one end make room for the next
+            w, x = apex[u, v], apex[v, u]
+            if min(turn(points[x], points[v], points[w]), turn(points[w], points[u], points[x])) <= FLAT:
+                waiting.append((u, v))
+                continue
+            del apex[u, v], apex[v, u]
+            add(apex, w, x, v)
+            add(apex, x, w, u)
+            leaving.update({u: x, v: w, w: x, x: w})
+            flipped = True
+            if crosses(w, x):
+                waiting.append((w, x))
+        remaining = waiting
+
+
+def crossed_edges(
+    apex: Apex, leaving: dict[int, int], a: int, b: int, crosses: Callable[[int, int], bool]
+) -> list[tuple[int, int]]:
+    """Edges that a segment crosses: met on the way from triangle to triangle, or, where that is lost, searched for."""
+    found = []
+    edge = next((edge for edge in link(apex, a, leaving[a]) if crosses(*edge)), None)
+    while edge is not None:
+        u, v = edge
+        found.append((min(u, v), max(u, v)))
+        w = apex.get((v, u))
+        if w == b:
+            return found
+        edge = None if w is None else next((e for e in ((u, w), (w, v)) if crosses(*e)), None)
+    return [(u, v) for u, v in apex if u < v and crosses(u, v)]
+
+
+def link(apex: Apex, a: int, first: int) -> Iterator[tuple[int, int]]:
+    """Directed edges opposite a vertex, in the triangles around it: counter-clockwise from one, then the rest."""
+    u = first
+    while (a, u) in apex:
+        yield u, apex[a, u]
+        u = apex[a, u]
+        if u == first:
+            return
+    u = first
+    while (u, a) in apex:
+        yield apex[u, a], u
+        u = apex[u, a]

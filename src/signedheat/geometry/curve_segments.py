@@ -77,9 +77,7 @@ def given_directions(
         which, around = incident_faces(triangles, on_edges)
         side = (triangles.edges.face_edges[around] == edges[along][which, None]).argmax(axis=1)
         seen = in_layout(triangles, positions, around, normals[along[which]])
-        turned = np.conj(triangles.edge_directions[around, side]) * seen
-        turned = np.where(triangles.reflected[around, side], np.conj(turned), turned)
-        np.add.at(directions, along[which], turned)
+        np.add.at(directions, along[which], triangles.in_edge_frames(seen, around, side))
     length = np.abs(directions)
     scale = np.linalg.norm(normals, axis=1)
     flat = np.flatnonzero(length <= 1e-6 * scale)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,12 @@ class EdgeTable:
     def face_counts(self) -> NDArray[np.int64]:
         """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
         return np.bincount(self.face_edges.ravel(), minlength=len(self.vertices))
+
+    def per_edge(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(e,) what (m, 3) values at the sides of faces say of each edge: the last of its faces; zero where none is."""
+        result = np.zeros(len(self.vertices), dtype=values.dtype)
+        result[self.face_edges] = values
+        return result
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> NDArray[np.int64]:
         """Fill-reducing order of unknowns at edges, from one of the vertices: ``order[k]`` is eliminated k-th.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from .components import connected_components
 from .edges import edge_table
 
 MOST_SIDES = 12
@@ -38,10 +38,8 @@ def hole_fillings(
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
     following = next_around_gap(points, normals, tails, heads)
     linked = np.flatnonzero(following >= 0)
-    n = len(tails)
-    graph = sparse.csr_matrix((np.ones(len(linked)), (linked, following[linked])), shape=(n, n))
-    loops = sparse.csgraph.connected_components(graph, directed=False)[1]
-    short = np.bincount(loops, minlength=1)[loops] <= MOST_SIDES if n else np.empty(0, dtype=bool)
+    loops = connected_components(len(tails), linked, following[linked])
+    short = np.bincount(loops, minlength=1)[loops] <= MOST_SIDES if len(tails) else np.empty(0, dtype=bool)
     known = {(min(i, j), max(i, j)) for i, j in edges.vertices[_touching(edges.vertices, tails[short])].tolist()}
     fillings: list[tuple[int, int, int]] = []
     for first in np.unique(loops[short], return_index=True)[1]:

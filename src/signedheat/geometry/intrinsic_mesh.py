@@ -13,8 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .components import element_components
 from .edges import EdgeTable, edge_table
-from .triangle_kernels import gather, join_faces
+from .triangle_kernels import gather
+
+Index = NDArray[np.int64] | slice
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +92,16 @@ class IntrinsicMesh:
         """(m, 3) lengths of `edge_vectors`."""
         return np.abs(self.edge_vectors)
 
+    @cached_property
+    def lengths_of_edges(self) -> NDArray[np.float64]:
+        """(e,) lengths, each as one of the edge's faces has it."""
+        return self.edges.per_edge(self.edge_lengths)
+
     @property
     def agree_on_lengths(self) -> bool:
-        """Whether all faces at an edge have the same length for it; flattened voxel faces do not."""
-        of_edges = np.empty(self.n_edges)
-        of_edges[self.edges.face_edges] = self.edge_lengths
-        return bool(np.allclose(of_edges[self.edges.face_edges], self.edge_lengths, rtol=1e-6, atol=0))
+        """Whether all faces of every edge give it the same length; flattened voxel faces do not."""
+        of_edges = self.lengths_of_edges[self.edges.face_edges]
+        return bool(np.allclose(of_edges, self.edge_lengths, rtol=1e-6, atol=0))
 
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
@@ -147,18 +154,30 @@ class IntrinsicMesh:
 
     @cached_property
     def face_components(self) -> NDArray[np.int64]:
-        """(m,) connected component of each face across edges: id of its first face. Components may share vertices."""
-        return join_faces(self.edges.face_edges, self.n_edges)
+        """(m,) part of the surface that each face lies in, joined across edges; parts may share vertices."""
+        return element_components(self.edges.face_edges)
 
-    def in_edge_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """(m, 3) vectors in face layouts, (m, 3) or (m, 1), expressed in the frames of the faces' edges (Eq. 8)."""
-        turned = np.conj(self.edge_directions) * vectors
-        return np.where(self.reflected, np.conj(turned), turned)
+    def in_edge_frames(
+        self, vectors: NDArray[np.complex128], faces: Index = slice(None), sides: Index = slice(None)
+    ) -> NDArray[np.complex128]:
+        """Vectors in the layouts of some faces, as the frames of some of their edges see them.
 
-    def in_face_frames(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """(m, 3) vectors at the edges of each face, from an (e,) array in edge frames to the face's layout (Eq. 8)."""
-        of_face = vectors[self.edges.face_edges]
-        return self.edge_directions * np.where(self.reflected, np.conj(of_face), of_face)
+        Parameters
+        ----------
+        vectors : (k, 3), (k, 1) or (k,) complex
+            For all sides of the faces; or, where sides are given, for one of each.
+        faces : (k,) int, optional
+            All of them by default.
+        sides : (k,) int, optional
+            Which side of each face; all three by default.
+        """
+        turned = np.conj(self.edge_directions[faces, sides]) * vectors
+        return np.where(self.reflected[faces, sides], np.conj(turned), turned)
+
+    def in_face_frames(self, vectors: NDArray[np.complex128], faces: Index = slice(None)) -> NDArray[np.complex128]:
+        """(k, 3) the vectors of an (e,) edge array as seen in the layouts of some faces."""
+        of_face = vectors[self.edges.face_edges[faces]]
+        return self.edge_directions[faces] * np.where(self.reflected[faces], np.conj(of_face), of_face)
 
     def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """(m,) sum of the vectors at the three edges of each face, in its layout: three times the average of Sec. 6."""

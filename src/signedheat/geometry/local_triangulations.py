@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .components import connected_components
 from .edges import edge_table
 from .hole_filling import hole_fillings
 from .local_triangulation_kernels import accept_apart, signs_from_parents, voronoi_fans
@@ -175,7 +176,7 @@ def aligned(
     tail, head = edge_table(faces).vertices.T
     bend = 1.0 - np.abs((normals[tail] * normals[head]).sum(axis=1))
     graph = sparse.csr_matrix((np.maximum(bend, 0) + 1e-6, (tail, head)), shape=(n, n))
-    parts = sparse.csgraph.connected_components(graph, directed=False)[1]
+    parts = connected_components(n, tail, head)
     roots = np.unique(parts, return_index=True)[1]
     tree = sparse.coo_matrix(sparse.csgraph.minimum_spanning_tree(graph))
     above = np.full(len(roots), n)  # one node above all roots makes one tree of the forest

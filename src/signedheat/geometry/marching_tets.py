@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..errors import OutsideError
+from .components import connected_components
 from .meshes import Tets
 from .tet_faces import face_table
 
@@ -147,7 +147,6 @@ def manifold(
     forward = forward[np.argsort(undirected[forward], kind="stable")]
     backward = backward[np.argsort(undirected[backward], kind="stable")]
     joins = np.concatenate([forward, after[forward]]), np.concatenate([after[backward], backward])
-    graph = sparse.coo_matrix((np.ones(len(joins[0]), dtype=np.int8), joins), shape=(3 * m, 3 * m))
-    _, vertex = sparse.csgraph.connected_components(graph, directed=False)
+    vertex = connected_components(3 * m, *joins)
     _, first = np.unique(vertex, return_index=True)
     return positions[tails[first]], vertex.reshape(m, 3)

@@ -115,38 +115,3 @@ def add_fluxes(corners, positions, directions, n):
             opposite = positions[f, (k + 2) % 3] - positions[f, (k + 1) % 3]
             sums[corners[f, k]] += 0.5 * (opposite.real * directions[f].imag - opposite.imag * directions[f].real)
     return sums
-
-
-@compiled
-def join_faces(face_edges, n_edges):
-    """Connected component of each face across edges, given by the first face of the component."""
-    leader = np.arange(len(face_edges))
-    last = np.full(n_edges, -1)
-    for f in range(len(face_edges)):
-        for k in range(3):
-            other = last[face_edges[f, k]]
-            last[face_edges[f, k]] = f
-            if other >= 0:
-                a, b = _root(leader, other), _root(leader, f)
-                leader[max(a, b)] = min(a, b)
-    for f in range(len(face_edges)):
-        leader[f] = _root(leader, f)
-    return leader
-
-
-@compiled
-def _root(leader, f):
-    while leader[f] != f:
-        leader[f] = leader[leader[f]]
-        f = leader[f]
-    return f
-
-
-@compiled
-def extremes(vectors):
-    """Least and greatest maximum norm of complex vectors; their squared lengths may underflow."""
-    smallest, largest = np.inf, 0.0
-    for vector in vectors:
-        size = max(abs(vector.real), abs(vector.imag))
-        smallest, largest = min(smallest, size), max(largest, size)
-    return smallest, largest

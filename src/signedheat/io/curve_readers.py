@@ -233,7 +233,11 @@ def projected_nodes(domain: EmbeddedSurface, points: NDArray[np.float64]) -> lis
 
 def damaged(path: PathLike, number: int, words: list[str], reason: str) -> FileFormatError:
     """The error for a line that cannot be parsed."""
-    return FileFormatError(f"{path}: line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})")
+    return FileFormatError(
+        f"line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})",
+        element=f"line {number}",
+        path=path,
+    )
 
 
 def nodes_of(faces: NDArray[np.int64], weights: NDArray[np.float64], domain: EmbeddedSurface) -> list[Node]:

@@ -35,7 +35,7 @@ def from_trimesh(kind: type, thing: Any) -> Any:
 def to_trimesh(shape: SurfaceShape) -> Any:
     """As a `trimesh.Trimesh` (not processed: nothing is merged) or `trimesh.PointCloud`."""
     if isinstance(shape, PointCloud):
-        return trimesh.PointCloud(np.array(shape.points))  # type: ignore[no-untyped-call]
+        return trimesh.PointCloud(np.array(shape.points))
     if isinstance(shape, PolygonMesh):
         raise GeometryError(
             "trimesh holds triangles only, and this is a PolygonMesh",

@@ -23,7 +23,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
-from ..geometry.components import face_components, same_positions
+from ..geometry.components import element_components, same_positions
 from ..operators.grid.node_sources import NodeSources
 from ..operators.grid.wavefront import padded_shape
 from .grid.binning import merge_in_cells
@@ -107,7 +107,7 @@ def area_elements(shape: Any) -> AreaElements:
 @area_elements.register
 def _(shape: TriangleMesh) -> AreaElements:
     corners = shape.vertices[shape.faces]
-    components = connected_components(shape.vertices, shape.faces)
+    components = components_of(shape.vertices, shape.faces)
     return AreaElements(corners, shape.face_area_vectors, shape.face_areas, components)
 
 
@@ -128,7 +128,7 @@ def _(shape: PolygonMesh) -> AreaElements:
     lengths = np.linalg.norm(total, axis=1, keepdims=True)
     normals = total / np.where(lengths > 0, lengths, 1)
     weights = np.einsum("ij,ij->i", vectors, normals[polygon])
-    return AreaElements(corners, vectors, weights, connected_components(shape.vertices, fans))
+    return AreaElements(corners, vectors, weights, components_of(shape.vertices, fans))
 
 
 @area_elements.register
@@ -145,31 +145,6 @@ def _(shape: PointCloud) -> AreaElements:
     return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
 
 
-@singledispatch
-def extent(shape: Any) -> NDArray[np.float64]:
-    """(2, d) lower and upper corner of the bounding box of a shape."""
-    corners = area_elements(shape).corners
-    return np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
-
-
-@extent.register
-def _(shape: PointCloud) -> NDArray[np.float64]:
-    return np.stack([shape.points.min(axis=0), shape.points.max(axis=0)])
-
-
-@extent.register
-def _(shape: TetMesh) -> NDArray[np.float64]:
-    return shape.bounds
-
-
-@extent.register
-def _(shape: TriangleMesh) -> NDArray[np.float64]:
-    used = np.zeros(shape.n_vertices, dtype=bool)
-    used[shape.faces] = True
-    vertices = shape.vertices[used]
-    return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
-
-
 def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = None) -> Grid:
     """A grid of cubic cells around shapes, with `resolution` nodes along its longest side.
 
@@ -178,8 +153,16 @@ def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = 
     >>> grid_around([PointCloud([[0, 0, 0], [1, 2, 4]])], 7, padding=1.0)
     Grid(origin=[-1.0, -1.0, -1.0], spacing=[1.0, 1.0, 1.0], shape=(4, 5, 7))
     """
-    extents = np.stack([extent(shape) for shape in shapes])
-    return Grid.around([extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)], resolution, padding)
+    return Grid.around(bounds_around(shapes), resolution, padding)
+
+
+def bounds_around(shapes: Sequence[Any]) -> NDArray[np.float64]:
+    """(2, d) lower and upper corner of the box around shapes that have area elements."""
+    for shape in shapes:
+        if area_elements.dispatch(type(shape)) is area_elements.dispatch(object):
+            area_elements(shape)  # which raises
+    bounds = np.stack([shape.bounds for shape in shapes])
+    return np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
 
 def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> NDArray[np.float64]:
@@ -197,9 +180,9 @@ def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> ND
     return (unit_ball * reach**dimension / k / counts)[which.ravel()]
 
 
-def connected_components(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def components_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m,) connected component of each face; vertices at the same position are one vertex."""
-    return face_components(same_positions(vertices)[faces])
+    return element_components(same_positions(vertices)[faces])
 
 
 def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSamples:

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..cache import LastUsed, fingerprint
 from ..discretization import Levels, SourceTerm
 from ..errors import ConstraintError
 from ..linear import Factor, factorize, upper_triangle, whole
+from ..linear.conjugate_gradients import conjugate_gradients
 
 _MAX_ROUNDS = 12
 _MAX_INNER = 30
-_BATCH = 32  # right-hand sides solved at a time
+BATCH = 32
+"""Right-hand sides solved at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +40,7 @@ class DirectIntegration:
     stiffness: sparse.csr_matrix
     factorize: Callable[[sparse.csr_matrix], Factor] = factorize
     spring: float = 1e8
-    _last: list[Any] = field(default_factory=list, repr=False)
+    _pulled: LastUsed[bytes, Factor] = field(default_factory=LastUsed, init=False, repr=False)
 
     @cached_property
     def components(self) -> NDArray[np.int64]:
@@ -55,10 +57,10 @@ class DirectIntegration:
         return self.solve_many([divergence], [source])[0]
 
     def solve_many(
-        self, divergences: Sequence[NDArray[np.float64]], sources: Sequence[SourceTerm]
+        self, divergences: Iterable[NDArray[np.float64]], sources: Sequence[SourceTerm]
     ) -> list[NDArray[np.float64]]:
-        """`solve` for several sources at once."""
-        solved = self.factor.solve(np.stack(divergences).T)
+        """The same for several sources at once."""
+        solved = self.factor.solve(np.stack(list(divergences)).T)
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
@@ -92,8 +94,8 @@ class DirectIntegration:
         loads = sparse.csr_matrix(entries, shape=(len(group), len(free)))
         _, pull = self._interpolate(rows, divergence[:, None], values[:, None])
         capacitance = np.empty((len(free), len(free)))
-        for begin in range(0, len(free), _BATCH):
-            batch = slice(begin, begin + _BATCH)
+        for begin in range(0, len(free), BATCH):
+            batch = slice(begin, begin + BATCH)
             lifted = loads[:, batch].toarray()
             _, multipliers = self._interpolate(rows, np.zeros((len(divergence), lifted.shape[1])), lifted)
             capacitance[:, batch] = loads.T @ multipliers
@@ -134,7 +136,9 @@ class DirectIntegration:
         values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
         gap, worst, slow = levels, np.inf, False
         for _ in range(_MAX_ROUNDS):
-            displacements = _conjugate_gradients(lambda d: rows @ pull(d), gap) if slow else gap
+            displacements = gap
+            if slow:  # roughly: what remains is left to the next round
+                displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=_MAX_INNER)
             step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
             values += step
             multipliers -= spring * (displacements - rows @ step)
@@ -146,15 +150,14 @@ class DirectIntegration:
         return values, multipliers
 
     def _pulled_factor(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
-        """Factor of ``C + Aᵀ S A``, S the diagonal matrix of `springs`; the last one is cached."""
-        key = (rows.indptr, rows.indices, rows.data, springs)
-        if self._last and all(np.array_equal(old, new) for old, new in zip(self._last[0], key, strict=True)):
-            return self._last[1]
+        """Factor of ``C + Aᵀ S A``; the last one is kept."""
+        key = fingerprint(rows.indptr, rows.indices, rows.data, springs)
+        return self._pulled(key, lambda: self._factorize_pulled(rows, springs))
+
+    def _factorize_pulled(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
         unreached = np.isin(self.components[self._first_vertices], self._component_of(rows), invert=True)
-        factor = self.factorize(_grounded(matrix, self._first_vertices[unreached]))
-        self._last[:] = key, factor
-        return factor
+        return self.factorize(_grounded(matrix, self._first_vertices[unreached]))
 
     @cached_property
     def _first_vertices(self) -> NDArray[np.int64]:
@@ -193,28 +196,6 @@ def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.
     diagonal = matrix.indptr[vertices]
     data[diagonal] += np.where(data[diagonal] > 0, data[diagonal], 1.0)
     return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
-
-
-def _conjugate_gradients(
-    operator: Callable[[NDArray[np.float64]], NDArray[np.float64]], rhs: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Solve approximately for each column by itself; the caller repeats it on the remaining residual."""
-    solution, residual = np.zeros_like(rhs), rhs.copy()
-    direction, size = residual.copy(), (residual**2).sum(axis=0)
-    goal = 1e-6 * size
-    for _ in range(_MAX_INNER):
-        image = operator(direction)
-        curvature = (direction * image).sum(axis=0)
-        active = (size > goal) & (curvature > 0)
-        if not active.any():
-            break
-        length = np.divide(size, curvature, out=np.zeros_like(size), where=active)
-        solution += length * direction
-        residual -= length * image
-        smaller = (residual**2).sum(axis=0)
-        direction = residual + np.divide(smaller, size, out=np.zeros_like(size), where=size > 0) * direction
-        size = smaller
-    return solution
 
 
 def _refuse_contradictions(rows: sparse.csr_matrix, levels: NDArray[np.float64], values: NDArray[np.float64]) -> None:

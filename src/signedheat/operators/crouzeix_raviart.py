@@ -39,13 +39,10 @@ def vector_heat_forces(
 ) -> NDArray[np.complex128]:
     """``(M + t L) X`` of Eq. 12, summed over some faces only: complete at edges all of whose faces are among them."""
     diagonal, factor = _local_entries(triangles, time, faces)
-    z, reflected = triangles.edge_directions[faces], triangles.reflected[faces]
-    edge = triangles.edges.face_edges[faces]
-    x = z * np.where(reflected, np.conj(vectors[edge]), vectors[edge])
+    x = triangles.in_face_frames(vectors, faces)
     forces = diagonal * x + factor * np.roll(x, -1, axis=1) + np.roll(factor * x, 1, axis=1)
-    turned = np.conj(z) * forces
     sums = np.zeros(len(vectors), dtype=np.complex128)
-    np.add.at(sums, edge, np.where(reflected, np.conj(turned), turned))
+    np.add.at(sums, triangles.edges.face_edges[faces], triangles.in_edge_frames(forces, faces))
     return sums
 
 

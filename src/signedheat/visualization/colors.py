@@ -32,9 +32,9 @@ def distance_colors(low: float, high: float) -> ScalarMappable:
     """
     reach = max(abs(low), abs(high), 1e-300)
     norm = mpl_colors.FuncNorm((signed_root, signed_square), -reach, reach)
-    return mpl_cm.ScalarMappable(
-        norm, mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
-    )
+    colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
+    scale: ScalarMappable = mpl_cm.ScalarMappable(norm, colors)
+    return scale
 
 
 def signed_root(values: Any) -> Any:

@@ -32,7 +32,7 @@ def ensure_picture_writable(path: PathLike) -> None:
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure; width and height in inches."""
-    figure = mpl_figure.Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    figure: Figure = mpl_figure.Figure(figsize=(width, height), layout="constrained", facecolor="white")
     backend_agg.FigureCanvasAgg(figure)
     return figure
 

@@ -7,7 +7,7 @@ import pytest
 
 import signedheat as sh
 from shapes.grid_cases import assert_closed_manifold, enclosed_volume
-from signedheat.linear.stages import solve_in_stages
+from signedheat.linear.restarts import matrix_forces, solve_with_restarts
 from signedheat.lowering.grid import masked as masked_grid
 from signedheat.lowering.grid.free_nodes import FreeNodes
 
@@ -169,7 +169,7 @@ def test_stages_are_what_logarithms_are():
 
     matrix = sparse.csr_matrix(sparse.eye_array(n) + nodes.laplacian)
     factor = sparse.linalg.splu(matrix.tocsc())
-    stages = solve_in_stages(matrix, factor.solve, np.eye(n)[:, :1])
+    stages = solve_with_restarts(factor.solve, matrix_forces(matrix), np.eye(n)[:, :1])
     assert len(stages) > 2
     logarithm = np.full(n, np.nan)
     for values, offset in stages:

@@ -31,8 +31,6 @@ class Faces(NamedTuple):
     def of(cls, triangles: IntrinsicMesh) -> Faces:
         """The arrays of an intrinsic mesh."""
         table = triangles.edges
-        lengths = np.empty(triangles.n_edges)
-        lengths[table.face_edges] = triangles.edge_lengths
         at_edge, at_vertex = table.face_edges.ravel(), triangles.corner_vertices.ravel()
         edge_counts = np.bincount(at_edge, minlength=triangles.n_edges)
         vertex_counts = np.bincount(at_vertex, minlength=triangles.n_vertices)
@@ -42,7 +40,7 @@ class Faces(NamedTuple):
             table.face_edges,
             table.forward,
             table.vertices,
-            lengths,
+            triangles.lengths_of_edges,
             np.argsort(at_edge, kind="stable"),
             np.concatenate([[0], np.cumsum(edge_counts)]),
             np.argsort(at_vertex, kind="stable"),

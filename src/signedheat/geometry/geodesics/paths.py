@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 
 from ...errors import SourceError
 from ..intrinsic_mesh import IntrinsicMesh
@@ -133,7 +133,7 @@ def faces_at(
 def through_vertices(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str) -> LocatedPoints:
     """The path between two points that are connected only through vertices at which fans of faces touch."""
     edges, n = triangles.edges, triangles.n_vertices
-    arcs, lengths = [edges.vertices], [edge_lengths(triangles)]
+    arcs, lengths = [edges.vertices], [triangles.lengths_of_edges]
     for node, place in ((n, start), (n + 1, end)):
         faces, points, _ = faces_at(triangles, place)
         corners = triangles.corner_vertices[faces].ravel()
@@ -153,23 +153,8 @@ def through_vertices(triangles: IntrinsicMesh, start: LocatedPoints, end: Locate
         )
     chain = concatenated([start, points_at_vertices(triangles, np.array(path[-2:0:-1])), end])
     step = np.arange(len(chain) - 1)
-    part = face_components(triangles)[shared_faces(triangles, chain[step], chain[step + 1])]
+    part = triangles.face_components[shared_faces(triangles, chain[step], chain[step + 1])]
     turning = np.concatenate([[0], 1 + np.flatnonzero(np.diff(part)), [len(chain) - 1]])
     step = np.arange(len(turning) - 1)
     located, _, ends, _ = join(triangles, chain[turning], step, step + 1, name)
     return located[ends[:-1]]
-
-
-def edge_lengths(triangles: IntrinsicMesh) -> NDArray[np.float64]:
-    """(e,) lengths of the edges, each as in one of its faces."""
-    lengths = np.zeros(triangles.n_edges)
-    lengths[triangles.edges.face_edges] = triangles.edge_lengths
-    return lengths
-
-
-def face_components(triangles: IntrinsicMesh) -> NDArray[np.int64]:
-    """(m,) connected component of each face, through shared edges."""
-    m, edge = triangles.n_faces, triangles.edges.face_edges.ravel()
-    face = np.repeat(np.arange(m), 3)
-    graph = csr_matrix((np.ones(len(edge)), (face, m + edge)), shape=(m + triangles.n_edges,) * 2)
-    return connected_components(graph, directed=False)[1][:m]

@@ -47,7 +47,7 @@ def refine_to_conform(
     everything = MergedSources.of(parts)
     cut_faces, split_edges = affected_elements(triangles, everything, [not part.is_conforming for part in parts])
     finer, moved = flip_new_faces(*FaceCutter(triangles, everything, cut_faces, split_edges).assemble())
-    pieces = iter([moved.part(k, part.oriented) for k, part in enumerate(parts)])
+    pieces = iter(moved.parts([part.oriented for part in parts]))
     return finer, [[next(pieces) for _ in group] for group in groups]
 
 
@@ -79,16 +79,19 @@ class MergedSources:
             [who[a:b] for a, b in pairwise(offsets)],
         )
 
-    def part(self, k: int, oriented: bool) -> CurveSegments:
-        """The k-th source, separated again."""
-        mine = self.owners == k
-        old = self.samples[k]
+    def parts(self, oriented: Sequence[bool]) -> list[CurveSegments]:
+        """The sources, each by itself again."""
+        order = np.argsort(self.owners, kind="stable")
+        bounds = np.searchsorted(self.owners[order], np.arange(len(oriented) + 1))
+        each = zip(pairwise(bounds), self.samples, oriented, strict=True)
+        return [self._part(order[begin:end], old, has_sides) for (begin, end), old, has_sides in each]
+
+    def _part(self, mine: NDArray[np.int64], old: NDArray[np.int64], oriented: bool) -> CurveSegments:
+        """The source that has some of the pieces; its old nodes come first."""
         nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
-        rank = np.full(len(self.nodes), -1)
-        rank[nodes[::-1]] = np.arange(len(nodes))[::-1]
-        return CurveSegments(
-            self.nodes[nodes], rank[self.ends[mine]], self.faces[mine], self.edges[mine], self.vectors[mine], oriented
-        )
+        known, first = np.unique(nodes, return_index=True)
+        ends = first[np.searchsorted(known, self.ends[mine])]
+        return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
 
 
 def affected_elements(
@@ -154,6 +157,7 @@ class FaceCutter:
             members.sort(key=lambda i: nodes.along[i])
         self.sub_edges = {e: [self.new_edge() for _ in range(len(m) + 1)] for e, m in self.on_edge.items()}
 
+        self.chains: dict[int, tuple[list[int], list[float], dict[int, int]]] = {}
         inside = defaultdict(list)
         rows = zip(merged.ends.tolist(), merged.faces.tolist(), merged.edges.tolist(), strict=True)
         for p, (ends, face, edge) in enumerate(rows):
@@ -182,18 +186,25 @@ class FaceCutter:
         return self.node_at[vertex]
 
     def cut_along(self, p: int, edge: int) -> None:
-        """Cut segment p, which runs along a split edge, at the points of the edge between its ends."""
-        merged, chain = self.merged, self.on_edge[edge]
-        at = [0.0, *merged.nodes.along[chain].tolist(), 1.0]
-        vertices = [*(self.vertex_of[i] for i in chain), *self.triangles.edges.vertices[edge].tolist()]
-        vertices = [vertices[-2], *vertices[:-2], vertices[-1]]
-        a, b = (vertices.index(self.vertex_of[i]) for i in merged.ends[p].tolist())
+        """Cut a piece along a split edge at the points of the edge between its ends."""
+        merged, (vertices, at, place) = self.merged, self.along_edge(edge)
+        a, b = (place[self.vertex_of[i]] for i in merged.ends[p].tolist())
         step = 1 if a < b else -1
         for k in range(a, b, step):
             vector = merged.vectors[p] * (abs(at[k + step] - at[k]) / abs(at[b] - at[a]))
             ends = self.node(vertices[k]), self.node(vertices[k + step])
             sub = self.sub_edges[edge][min(k, k + step)]
             self.pieces.append(NewSegment(*ends, -1, sub, vector, merged.owners[p]))
+
+    def along_edge(self, edge: int) -> tuple[list[int], list[float], dict[int, int]]:
+        """Vertices along a split edge, where each is from tail to head, and which place in the list each has."""
+        if edge not in self.chains:
+            chain = self.on_edge[edge]
+            tail, head = self.triangles.edges.vertices[edge].tolist()
+            vertices = [tail, *(self.vertex_of[i] for i in chain), head]
+            at = [0.0, *self.merged.nodes.along[chain].tolist(), 1.0]
+            self.chains[edge] = vertices, at, {v: k for k, v in reversed(list(enumerate(vertices)))}
+        return self.chains[edge]
 
     def cut_face(self, face: int, inside: list[int]) -> None:
         """Cut one face along the segments inside it."""

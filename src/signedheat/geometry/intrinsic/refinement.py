@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
 
+from ..components import connected_components
 from .coincidence_kernels import coinciding
 from .delaunay import doubled, lay_out
 from .gluing_kernels import Gluing
@@ -134,8 +133,7 @@ def sectors(gluing: Gluing) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     t = gluing.sibling[h]
     following = 3 * (t // 3) + (t + 1) % 3
     other = np.where(gluing.forward[h] == gluing.forward[t], t, following)
-    graph = csr_matrix((np.ones(len(h)), (h, other)), shape=(n, n))
-    label = connected_components(graph, directed=False)[1]
+    label = connected_components(n, h, other)
     leaving = lay_out(gluing).edge_vectors
     angles = np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
     return label, np.bincount(label, weights=angles.ravel())

@@ -139,14 +139,12 @@ def transfer_segments(
     off = (starts.barycentric == 0) & (ends.barycentric == 0)
     side = (off.argmax(axis=1) + 1) % 3
     on_edge = off.any(axis=1)
-    turned = np.conj(after.edge_directions[faces, side]) * grown
-    turned = np.where(after.reflected[faces, side], np.conj(turned), turned)
     return CurveSegments(
         located[chosen],
         who[np.stack([who_start, who_end], axis=1)],
         faces,
         np.where(on_edge, after.edges.face_edges[faces, side], -1),
-        np.where(on_edge, turned, grown),
+        np.where(on_edge, after.in_edge_frames(grown, faces, side), grown),
         source.oriented,
     )
 

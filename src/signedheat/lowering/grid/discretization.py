@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...discretization import discretize
+from ...discretization import DiffusesEach, discretize
 from ...domains.grid import Grid
 from ...errors import MemoryLimitError, SourceError
 from ...memory import available_memory
@@ -69,7 +69,7 @@ def fitting_spacing(grid: Grid, available: int) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, eq=False)
-class GridDiscretization:
+class GridDiscretization(DiffusesEach):
     """A grid, as the three steps see it."""
 
     grid: Grid

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
-from ...discretization import Levels
+from ...discretization import Levels, SolvesEach
 from ...domains.grid import Grid
+from ...linear.conjugate_gradients import conjugate_gradients
 from ...operators.grid.multilevel import collapse, diffuse_multilevel, skip_finest
 from ...operators.grid.node_sources import NodeSources
 from ...operators.grid.readout import quotients
@@ -26,7 +26,7 @@ MULTIPLIER_STEPS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class GridIntegration:
+class GridIntegration(SolvesEach):
     """Step 3 on a grid."""
 
     grid: Grid
@@ -86,18 +86,20 @@ class GridIntegration:
             return (rows.T @ (weights * at_samples)).reshape(self.grid.shape)
 
         def apply(phi: NDArray[np.float64]) -> NDArray[np.float64]:
-            pull = strength * deviation(rows @ phi.ravel(), source, free)
-            return laplacian(phi, self.grid.spacing) + spread(pull)
+            pull = strength * deviation(rows @ phi, source, free)
+            return (laplacian(phi.reshape(self.grid.shape), self.grid.spacing) + spread(pull)).ravel()
 
         # constants are in the kernel of C; their cost is that of the penalty alone
         constant = strength * float(weights.sum()) / self.grid.n_nodes
 
         def precondition(residual: NDArray[np.float64]) -> NDArray[np.float64]:
-            return solve_poisson(residual, self.grid.spacing) + residual.mean() / constant
+            inverse = solve_poisson(residual.reshape(self.grid.shape), self.grid.spacing)
+            return (inverse + residual.mean() / constant).ravel()
 
         wanted = strength * deviation(levels.values, source, free) - deviation(multipliers, source, free)
-        right_hand_side = divergence + spread(wanted)
-        return conjugate_gradients(apply, right_hand_side, precondition, start)
+        right_hand_side = (divergence + spread(wanted)).ravel()
+        phi = conjugate_gradients(apply, right_hand_side, precondition, start.ravel(), TOLERANCE)
+        return phi.reshape(self.grid.shape)
 
 
 def deviation(values: NDArray[np.float64], source: GridSource, levels: Levels) -> NDArray[np.float64]:
@@ -137,37 +139,3 @@ def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray
     change = np.zeros(source.grid.n_nodes)
     change[touched] = lsqr(source.interpolation[:, touched], values, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
     return change
-
-
-def conjugate_gradients(
-    apply: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    right_hand_side: NDArray[np.float64],
-    precondition: Callable[[NDArray[np.float64]], NDArray[np.float64]],
-    start: NDArray[np.float64],
-    limit: int = 500,
-) -> NDArray[np.float64]:
-    """Preconditioned conjugate gradients for a consistent symmetric positive semidefinite system.
-
-    Examples
-    --------
-    >>> conjugate_gradients(lambda x: 2 * x, np.array([2.0, 4.0]), lambda r: r, np.zeros(2))
-    array([1., 2.])
-    """
-    solution = start.copy()
-    residual = right_hand_side - apply(solution)
-    guess = precondition(residual)
-    direction = guess.copy()
-    product = float(np.vdot(residual, guess))
-    goal = TOLERANCE**2 * max(product, float(np.vdot(right_hand_side, precondition(right_hand_side))))
-    for _ in range(limit):
-        if product <= goal:
-            break
-        image = apply(direction)
-        step = product / float(np.vdot(direction, image))
-        solution += step * direction
-        residual -= step * image
-        guess = precondition(residual)
-        product, previous = float(np.vdot(residual, guess)), product
-        direction *= product / previous
-        direction += guess
-    return solution

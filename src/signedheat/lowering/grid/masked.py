@@ -12,16 +12,16 @@ import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...discretization import Levels
+from ...cache import LastUsed
+from ...discretization import DiffusesEach, Levels
 from ...domains.grid import Grid
 from ...geometry.directions import unit
-from ...geometry.visibility import uphill_roots
-from ...linear import factorize, upper_triangle
-from ...linear.krylov import IncompleteCholesky, outward_order
-from ...linear.stages import solve_in_stages
+from ...linear import upper_triangle
+from ...linear.incomplete_cholesky import from_first
+from ...linear.restarts import Stage
 from ..area_elements import sample_on_grid
 from ..direct_integration import DirectIntegration
-from ..tets.discretization import from_first
+from ..heat_system import HeatSystem, bend_around_corners
 from .free_nodes import FreeNodes
 from .integration import deviation
 from .masked_source import MaskedSource
@@ -41,11 +41,11 @@ FACING = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class MaskedGridDiscretization:
+class MaskedGridDiscretization(DiffusesEach):
     """A grid with solid nodes, as the three steps see it."""
 
     grid: Grid
-    _factors: dict[float, Any] = field(default_factory=dict, repr=False)
+    _heats: LastUsed[float, HeatSystem] = field(default_factory=LastUsed, init=False, repr=False)
 
     @cached_property
     def nodes(self) -> FreeNodes:
@@ -75,10 +75,8 @@ class MaskedGridDiscretization:
     def diffuse(self, source: MaskedSource) -> NDArray[np.float64]:
         """Solve ``(1 − tΔ) X = X₀`` (Eq. 12) and turn X where the shortest way from the source is bent.
 
-        In flat space diffusion transports vectors without turning them. Where the straight line to the source passes
-        solid nodes, or passes the end of a source that ends at a wall, the shortest path is bent; the direction of X is
-        then minus the gradient of the diffused scalar heat (Crane et al. 2013), and its sign is that of the side of
-        the source from which this heat has come, found by steepest ascent.
+        That is where the straight line to the source passes solid nodes, or leads past the end of a source that a wall
+        ends.
         """
         nodes, dimension = self.nodes, self.grid.dimension
         vectors = np.zeros((len(nodes.ids), dimension + 1))
@@ -90,33 +88,18 @@ class MaskedGridDiscretization:
             vectors[known], slopes[known] = values[known], nodes.gradients(values[:, -1])[known]
             with np.errstate(divide="ignore"):
                 heights[known] = np.log(np.maximum(values[known, -1], 0.0)) + logarithm
-        vectors, straight = vectors[:, :-1], self._straight(source)
+        straight = self._straight(source)
         falling = nodes.remove_wall_reflection(-unit(slopes), ~straight)
-        roots = uphill_roots(heights, nodes.neighbors, straight)
-        side = np.sign(np.einsum("ij,ij->i", unit(vectors), falling))[roots]
-        return np.where(straight[:, None], vectors, side[:, None] * falling)
+        return bend_around_corners(vectors[:, :-1], falling, heights, nodes.neighbors, straight)
 
-    def solve_heat(self, time: float, loads: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
+    def solve_heat(self, time: float, loads: NDArray[np.float64]) -> list[Stage]:
         """``(1 − tΔ)⁻¹`` (Eq. 12) of columns, in stages that each begin where the one before underflows."""
-        matrix = self._heat_matrix(time)
-        return solve_in_stages(matrix, self._solver(matrix, time), loads)
+        return self._heats(time, lambda: self._heat_system(time)).solve(loads)
 
-    def _solver(self, matrix: sparse.csr_matrix, time: float) -> Any:
-        if self.direct:
-            if time not in self._factors:
-                self._factors.clear()
-                self._factors[time] = factorize(matrix)
-            return self._factors[time].solve
-
-        def solve(loads: NDArray[np.float64]) -> NDArray[np.float64]:
-            order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
-            return IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
-
-        return solve
-
-    def _heat_matrix(self, time: float) -> sparse.csr_matrix:
+    def _heat_system(self, time: float) -> HeatSystem:
         matrix = self.nodes.laplacian
-        return sparse.csr_matrix(sparse.eye_array(matrix.shape[0]) + time * matrix)
+        matrix = sparse.csr_matrix(sparse.eye_array(matrix.shape[0]) + time * matrix)
+        return HeatSystem(matrix, self.direct, DIRECTION_ERROR)
 
     def _straight(self, source: MaskedSource) -> NDArray[np.bool_]:
         """(n,) nodes that the source reaches along a straight line."""

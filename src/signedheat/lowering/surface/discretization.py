@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...cache import LastUsed, fingerprint
 from ...diagnostics import EdgesLengthened, LargeAngles, Note, VerticesAdded
 from ...discretization import discretize
 from ...domains.segments import segments_of_each
@@ -58,14 +59,12 @@ class SurfaceDiscretization:
     positions: NDArray[np.float64] | None = None
     spacing: float = math.nan
     notes: tuple[Note, ...] = ()
-    _heats: dict[float, VectorHeat] = field(default_factory=dict, repr=False)
-    _turned: dict[bytes, SurfaceDiscretization] = field(default_factory=dict, repr=False)
+    _heats: LastUsed[float, VectorHeat] = field(default_factory=LastUsed, init=False, repr=False)
+    _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 
     def __post_init__(self) -> None:
         if math.isnan(self.spacing):
-            lengths = np.empty(self.triangles.n_edges)
-            lengths[self.triangles.edges.face_edges] = self.triangles.edge_lengths
-            object.__setattr__(self, "spacing", 0.5 * float(lengths.mean()))
+            object.__setattr__(self, "spacing", 0.5 * float(self.triangles.lengths_of_edges.mean()))
 
     @cached_property
     def integration(self) -> DirectIntegration:
@@ -99,12 +98,12 @@ class SurfaceDiscretization:
         """The same surface with other first faces at nonmanifold edges; shares all of step 3, which ignores them."""
         if triangles is self.triangles:
             return self
-        key = triangles.first_halfedges.tobytes()
-        if key not in self._turned:
-            self._turned.clear()
-            turned = self._turned[key] = replace(self, triangles=triangles, _heats={}, _turned={})
-            turned.__dict__.update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
-        return self._turned[key]
+        return self._turned(fingerprint(triangles.first_halfedges), lambda: self._turn_to(triangles))
+
+    def _turn_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
+        turned = replace(self, triangles=triangles)
+        turned.__dict__.update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
+        return turned
 
     def _cut_into(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
         """The same surface with refined triangles, whose first vertices are the present ones."""
@@ -115,8 +114,6 @@ class SurfaceDiscretization:
             restriction=np.arange(self.triangles.n_vertices) if self.restriction is None else self.restriction,
             transfer=None,
             notes=(*self.notes, VerticesAdded(added)),
-            _heats={},
-            _turned={},
         )
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
@@ -129,12 +126,11 @@ class SurfaceDiscretization:
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[NDArray[np.complex128]]]:
         """Solve Eq. 12 for several sources with the same t at once."""
-        heat = self._heats.get(sources[0].time)
-        if heat is None:
-            self._heats.clear()
-            order = self.triangles.edges.elimination_order(self.vertex_order)
-            heat = self._heats[sources[0].time] = VectorHeat(self.triangles, sources[0].time, order)
+        heat = self._heats(sources[0].time, lambda: self._vector_heat(sources[0].time))
         return heat.solve([source.vectors for source in sources])
+
+    def _vector_heat(self, time: float) -> VectorHeat:
+        return VectorHeat(self.triangles, time, self.triangles.edges.elimination_order(self.vertex_order))
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
         """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout.

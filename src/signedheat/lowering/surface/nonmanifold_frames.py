@@ -81,9 +81,7 @@ def mirrored(part: CurveSegments, changed: NDArray[np.bool_]) -> CurveSegments:
 
 def from_sources(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
     """(n_vertices,) distance of every vertex from the sources along edges."""
-    lengths = np.zeros(triangles.n_edges)
-    lengths[triangles.edges.face_edges] = triangles.edge_lengths
-    n = triangles.n_vertices
+    lengths, n = triangles.lengths_of_edges, triangles.n_vertices
     tail, head = triangles.edges.vertices.T
     onto = [corner_distances(triangles, part) for part in parts]
     vertices, offsets = (np.concatenate(a) for a in zip(*onto, strict=True))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, csr_matrix, vstack
-from scipy.sparse.csgraph import connected_components
 
 from ...domains.segments import segments_of_each
 from ...errors import SourceError
+from ...geometry.components import connected_components
 from ...geometry.curve_segments import CurveSegments, interpolation_at
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.surface_points import (
@@ -172,7 +172,7 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
     marked[edges] = True
     faces, sides = np.nonzero(marked[triangles.edges.face_edges])
     inward = 1j * triangles.edge_vectors[faces, sides]
-    on_edges = in_frames(triangles, faces, inward)
+    on_edges = triangles.in_edge_frames(inward[:, None], faces)
     on_edges[np.arange(len(faces)), sides] = 0
     sums = scatter(triangles.n_edges, triangles.edges.face_edges[faces], on_edges)
 
@@ -219,22 +219,14 @@ def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr
     share = areas / np.bincount(which, areas, len(vertices))[which]
     share = share * located.barycentric[corner[:, 0], corner[:, 1]][which]
     outward = -1j * triangles.edge_vectors[faces] * (share / areas)[:, None]
-    turned = np.conj(triangles.edge_directions[faces]) * outward
-    turned = np.where(triangles.reflected[faces], np.conj(turned), turned)
-    return scatter(triangles.n_edges, triangles.edges.face_edges[faces], turned)
-
-
-def in_frames(
-    triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
-    """(k, 3) vectors in the layouts of some faces, (k, 3) or (k, 1), expressed in the frames of the faces' edges."""
-    turned = np.conj(triangles.edge_directions[faces]) * vectors[:, None]
-    return np.where(triangles.reflected[faces], np.conj(turned), turned)
+    in_frames = triangles.in_edge_frames(outward, faces)
+    return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
 
 
 def from_faces(triangles: IntrinsicMesh, faces: NDArray[np.int64], vectors: NDArray[np.complex128]) -> csr_array:
-    """(1, e) sparse: the vector of each face added to its three edges."""
-    return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames(triangles, faces, vectors))
+    """(1, e) sums of face vectors over the three edges of each face."""
+    in_frames = triangles.in_edge_frames(vectors[:, None], faces)
+    return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
 
 
 def scatter(n: int, index: NDArray[np.int64], values: NDArray[np.complex128]) -> csr_array:
@@ -255,8 +247,7 @@ def connected(parts: Sequence[CurveSegments]) -> NDArray[np.int64]:
     first, who = unique_points(concatenated([p.nodes for p in parts]))
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
     ends = who[np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])]
-    graph = csr_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(first), len(first)))
-    labels = connected_components(graph, directed=False)[1]
+    labels = connected_components(len(first), *ends.T)
     seen, order = np.unique(labels, return_index=True)
     rank = np.empty(len(seen), dtype=np.int64)
     rank[np.argsort(order)] = np.arange(len(seen))

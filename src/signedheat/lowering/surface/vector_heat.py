@@ -11,21 +11,17 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ...geometry.intrinsic_mesh import IntrinsicMesh
-from ...geometry.triangle_kernels import extremes
 from ...linear import Factor, factorize
+from ...linear.restarts import Stage, restart, scaled
 from ...operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
-
-_FAINT = 2.0**-900  # relative to the largest X; smaller values may be wrong, because intermediate ones underflow
 
 
 @dataclass(frozen=True, eq=False)
 class VectorHeat:
     """Solver of ``(M + tL) X = X₀`` (Eq. 12) on the edges of triangles.
 
-    X decays like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. Farther out
-    it is solved for again: restricted to the faint edges, X satisfies the same equation with a right-hand side along
-    their border, where X is still accurate. Scaled up, that is the next right-hand side for the same factor. The result
-    is the exact solution of the original system, not that of a new source at the border.
+    X falls like exp(−r/√t) and leaves the range of floating-point numbers at about 300 mean edge lengths. What lies
+    beyond is solved for again with the same factor (`linear.restarts`).
 
     Parameters
     ----------
@@ -58,50 +54,27 @@ class VectorHeat:
         """X for each X₀, in stages, each up to a positive factor, NaN between the source and the stage's border."""
         starts = np.zeros((len(sources), self.triangles.n_edges), dtype=np.complex128)
         for source, start in zip(sources, starts, strict=True):
-            self._raise(source.indices, source.data, start)
+            start[source.indices] = scaled(source.data, self._smallest_mass)[0]
         together = self._solve(starts.T)
-        return [self._carried_on(start, near) for start, near in zip(starts, together.T, strict=True)]
+        each = zip(starts, together.T, strict=True)
+        return [[stage.values for stage in self._restarted(start, values)] for start, values in each]
 
-    def _carried_on(self, start: NDArray[np.complex128], near: NDArray[np.complex128]) -> list[NDArray[np.complex128]]:
-        stages = [near]
-        smallest, largest = extremes(near)
-        if smallest >= _FAINT * largest:
-            return stages
-        unknown = np.ones(len(near), dtype=bool)
-        while True:
-            size = np.where(unknown, _size(stages[-1]), 0.0)
-            faint = unknown & (size < _FAINT * size.max())
-            if not faint.any() or faint.sum() == unknown.sum():
-                return stages
-            border = self._at_border(stages[-1], faint, start)
-            if not border.any():
-                return stages
-            start, held = np.zeros_like(border), np.flatnonzero(border)
-            self._raise(held, border[held], start)
-            stages.append(self._solve(start[:, None])[:, 0])
-            stages[-1][~faint] = np.nan
-            unknown = faint
+    def _restarted(self, start: NDArray[np.complex128], values: NDArray[np.complex128]) -> list[Stage]:
+        def solve(loads: NDArray[np.complex128]) -> NDArray[np.complex128]:
+            return self._solve(loads[:, None])[:, 0]
 
-    def _at_border(
-        self, vectors: NDArray[np.complex128], faint: NDArray[np.bool_], start: NDArray[np.complex128]
-    ) -> NDArray[np.complex128]:
-        """(M + tL) applied to X on the faint edges and zero elsewhere."""
+        return restart(solve, self._border_forces, start, Stage(values, 0.0), self._smallest_mass)
+
+    def _border_forces(
+        self, vectors: NDArray[np.complex128], faint: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
+        """(M + tL) applied to X, at the edges of faces that are faint in part."""
         edges = self.triangles.edges.face_edges
         of_face = faint[edges]
-        near_border = np.zeros(len(faint), dtype=bool)
-        near_border[edges[of_face.any(axis=1) & ~of_face.all(axis=1)]] = True
-        around = np.flatnonzero(near_border[edges].any(axis=1))
-        forces = vector_heat_forces(self.triangles, self.time, np.where(faint, vectors, 0), around)
-        return np.where(near_border, forces, np.where(faint, start, 0))
-
-    def _raise(
-        self, edges: NDArray[np.integer], vectors: NDArray[np.complex128], start: NDArray[np.complex128]
-    ) -> None:
-        """Write vectors into `start`, scaled by a power of two so that the largest X will be about one."""
-        largest = _size(vectors).max(initial=0.0)
-        if largest > 0:
-            steps = int(np.frexp(self._smallest_mass)[1] - np.frexp(largest)[1])
-            start[edges] = np.ldexp(vectors.view(np.float64), steps).view(np.complex128)
+        border = np.zeros(len(faint), dtype=bool)
+        border[edges[of_face.any(axis=1) & ~of_face.all(axis=1)]] = True
+        around = np.flatnonzero(border[edges].any(axis=1))
+        return border, vector_heat_forces(self.triangles, self.time, vectors, around)
 
     def _solve(self, columns: NDArray[np.complex128]) -> NDArray[np.complex128]:
         if self.factor.n == len(columns):
@@ -109,8 +82,3 @@ class VectorHeat:
         pairs = np.stack([columns.real, columns.imag], axis=1).reshape(2 * len(columns), -1)
         solution = self.factor.solve(pairs)
         return solution[0::2] + 1j * solution[1::2]
-
-
-def _size(vectors: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Maximum norm of each vector, since the square of its length would underflow."""
-    return np.maximum(np.abs(vectors.real), np.abs(vectors.imag))

@@ -12,14 +12,15 @@ import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...discretization import discretize
+from ...cache import LastUsed
+from ...discretization import DiffusesEach, discretize
 from ...domains.tet_mesh import TetMesh
-from ...geometry.directions import unit
 from ...geometry.tet_clipping import Planes
-from ...geometry.visibility import tet_neighbors, uphill_roots, visible
-from ...linear import factorize, upper_triangle, whole
-from ...linear.krylov import IncompleteCholesky, outward_order
-from ...linear.stages import solve_in_stages
+from ...geometry.visibility import tet_neighbors, visible
+from ...linear import upper_triangle
+from ...linear.incomplete_cholesky import from_first
+from ...linear.restarts import Stage
+from ..heat_system import HeatSystem, bend_around_corners
 from .integration import TetIntegration
 from .source import TetSource, tet_source
 
@@ -37,7 +38,7 @@ SPRINGS = 30.0
 
 
 @dataclass(frozen=True, eq=False)
-class TetDiscretization:
+class TetDiscretization(DiffusesEach):
     """The discretisation of a tet mesh.
 
     Parameters
@@ -50,7 +51,7 @@ class TetDiscretization:
 
     mesh: TetMesh
     direct: bool
-    _factors: dict[float, Any] = field(default_factory=dict, repr=False)
+    _heats: LastUsed[float, HeatSystem] = field(default_factory=LastUsed, init=False, repr=False)
 
     @cached_property
     def planes(self) -> Planes:
@@ -102,19 +103,23 @@ class TetDiscretization:
 
     def diffuse(self, source: TetSource) -> NDArray[np.float64]:
         """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per face, averaged in the tets (App. B.2)."""
+        heat = self._heats(source.time, lambda: self._heat_system(source.time))
         if self._is_convex:
-            return self._in_tets(self._stages(source.time, source.vectors))[0]
+            return self._in_tets(heat.solve(source.vectors))[0]
         loads = np.concatenate([source.vectors, source.strengths[:, None]], axis=1)
-        return self._bend(*self._in_tets(self._stages(source.time, loads)), source)
+        means, gradients, factors = self._in_tets(heat.solve(loads))
+        with np.errstate(divide="ignore"):
+            heights = np.log(np.maximum(means[:, 3], 0)) + factors
+        neighbors = tet_neighbors(self.mesh.faces)
+        return bend_around_corners(means[:, :3], -gradients, heights, neighbors, self._straight(source, neighbors))
 
-    def _stages(self, time: float, loads: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], float]]:
-        """X at the faces, in stages, since it underflows a few hundred faces away from the source."""
-        matrix = self._heat_matrix(time)
-        return solve_in_stages(matrix, lambda forces: self._solve(matrix, time, forces), loads)
+    def _heat_system(self, time: float) -> HeatSystem:
+        """M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
+        matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass(self.mesh.faces)
+        matrix.setdiag(matrix.diagonal() + mass)
+        return HeatSystem(matrix, self.direct, DIRECTION_ERROR)
 
-    def _in_tets(
-        self, stages: list[tuple[NDArray[np.float64], float]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _in_tets(self, stages: list[Stage]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Means of X in the tets, positive multiples of the gradient of its last column, and logarithms of its scale.
 
         Each tet takes them from the last stage in which all its four faces are known.
@@ -131,46 +136,12 @@ class TetDiscretization:
             gradients[known], factors[known] = slopes, factor
         return means, gradients, factors
 
-    def _bend(
-        self,
-        means: NDArray[np.float64],
-        gradients: NDArray[np.float64],
-        factors: NDArray[np.float64],
-        source: TetSource,
-    ) -> NDArray[np.float64]:
-        """X at the tets, turned where it has diffused around a corner.
-
-        In flat space diffusion transports vectors without turning them. Where the straight line to the source leaves
-        the domain, the shortest path is bent; the direction of X is then minus the gradient of the diffused scalar heat
-        (Crane et al. 2013), and its sign that of the side of the source from which this heat has come, found by
-        steepest ascent.
-        """
+    def _straight(self, source: TetSource, neighbors: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(m,) tets that the source reaches along a straight line."""
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
-        neighbors = tet_neighbors(self.mesh.faces)
         ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
-        straight = visible(*ends, neighbors, self.mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs)
-        vectors, strengths = means[:, :3], means[:, 3]
-        with np.errstate(divide="ignore"):
-            heights = np.log(np.maximum(strengths, 0)) + factors
-        roots = uphill_roots(heights, neighbors, straight)
-        side = -np.sign(np.einsum("mi,mi->m", unit(vectors), gradients))[roots]
-        return np.where(straight[:, None], vectors, -side[:, None] * gradients)
-
-    def _solve(self, matrix: sparse.csr_matrix, time: float, loads: NDArray[np.float64]) -> NDArray[np.float64]:
-        if self.direct:
-            if time not in self._factors:
-                self._factors.clear()
-                self._factors[time] = factorize(matrix)
-            return self._factors[time].solve(loads)
-        order = outward_order(matrix, np.flatnonzero(loads.any(axis=1)))
-        return IncompleteCholesky.of(matrix, order).solve(loads, relative=0.0, componentwise=DIRECTION_ERROR)
-
-    def _heat_matrix(self, time: float) -> sparse.csr_matrix:
-        """M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
-        matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass(self.mesh.faces)
-        matrix.setdiag(matrix.diagonal() + mass)
-        return matrix
+        return visible(*ends, neighbors, self.mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs)
 
     @cached_property
     def _laplacian(self) -> sparse.csr_matrix:
@@ -203,13 +174,6 @@ class TetDiscretization:
         vertices, n = self.vertices[known], self.mesh.n_vertices
         counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[known], n)
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
-
-
-def from_first(matrix: sparse.csr_matrix) -> IncompleteCholesky:
-    """Incomplete factor of a matrix given by its upper triangle, ordered by graph distance from its first unknowns."""
-    full = whole(matrix)
-    _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
-    return IncompleteCholesky.of(full, outward_order(full, first))
 
 
 @discretize.register

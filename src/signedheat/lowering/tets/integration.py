@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...discretization import Levels, SourceTerm
-from ..direct_integration import DirectIntegration
+from ..direct_integration import BATCH, DirectIntegration
 
 PIN = 1e6
 """Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
@@ -47,7 +47,7 @@ class TetIntegration(DirectIntegration):
         springs, factor = self.springs(source), self.anchored(source)
         pull = sparse.csr_matrix(rows.T @ sparse.diags_array(springs))
         fitted = factor.solve(divergence + pull @ levels.values)
-        values = levels.values - self._bend(fitted, source)
+        values = levels.values - self._quadratic_correction(fitted, source)
         fitted = factor.solve(divergence + pull @ values)
         if levels.groups is None:
             return self._reached(fitted, rows)
@@ -55,30 +55,35 @@ class TetIntegration(DirectIntegration):
         first = levels.groups[np.unique(parts, return_index=True)[1]]  # one group of each part keeps its level
         others = np.setdiff1d(levels.groups, first)
         if len(others):
-            members = (levels.groups[:, None] == others).astype(np.float64)
-            lifted = factor.solve(pull @ members)
-            forces = (springs[:, None] * members).T
-            balance = forces @ (members - rows @ lifted)
-            fitted = fitted + lifted @ np.linalg.solve(balance, forces @ (rows @ fitted - values))
+            chosen = np.flatnonzero(np.isin(levels.groups, others))
+            entries = np.ones(len(chosen)), (chosen, np.searchsorted(others, levels.groups[chosen]))
+            members = sparse.csr_matrix(entries, shape=(len(springs), len(others)))
+            forces = sparse.csr_matrix(members.T @ sparse.diags_array(springs))
+            balance = np.empty((len(others), len(others)))
+            for begin in range(0, len(others), BATCH):
+                lifted = members[:, begin : begin + BATCH].toarray()
+                balance[:, begin : begin + BATCH] = forces @ (lifted - rows @ factor.solve(pull @ lifted))
+            constants = np.linalg.solve(balance, forces @ (rows @ fitted - values))
+            fitted = fitted + factor.solve(pull @ (members @ constants))
         return self._centered(fitted, source)
 
     def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
         """Impose levels at the samples exactly (Eq. 14)."""
-        bend = self._bend(self.factor.solve(divergence), source)
-        return super().fit_exactly(divergence, source, replace(levels, values=levels.values - bend))
+        correction = self._quadratic_correction(self.factor.solve(divergence), source)
+        return super().fit_exactly(divergence, source, replace(levels, values=levels.values - correction))
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), where A φ is corrected for the curvature of φ."""
         free = super().penalize(divergence, source, strength)
-        pull = source.interpolation.T @ (strength * source.weights * self._bend(free, source))
+        pull = source.interpolation.T @ (strength * source.weights * self._quadratic_correction(free, source))
         return super().penalize(divergence - pull, source, strength)
 
     def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
-        return super()._at_samples(values, source) + self._bend(values, source)
+        return super()._at_samples(values, source) + self._quadratic_correction(values, source)
 
-    def _bend(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
-        """(s,) φ minus its linear interpolant, on the source: the quadratic correction."""
-        return source.bends @ self.gradients(np.nan_to_num(values)).ravel()
+    def _quadratic_correction(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
+        """(s,) φ minus its linear interpolant, on the source."""
+        return source.quadratic_correction @ self.gradients(np.nan_to_num(values)).ravel()
 
     def springs(self, source: SourceTerm) -> NDArray[np.float64]:
         """(s,) stiffness of the springs: stiff for samples at vertices, soft for those inside tets."""

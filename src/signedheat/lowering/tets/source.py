@@ -38,9 +38,9 @@ class TetSource:
     interpolation : (s, n) sparse
         Row i averages φ over patch i of the source: the clipped polygons that are nearest to one vertex. Where the
         source conforms to faces of the mesh, the patch is the vertex itself.
-    bends : (s, 3n) sparse
-        The quadratic correction, which makes `interpolation` exact for quadratic φ: maps the gradients of φ at the
-        unknowns (x, y, z of each in turn) to its difference from the average of the linear interpolant.
+    quadratic_correction : (s, 3n) sparse
+        What makes `interpolation` exact for quadratic φ: maps the gradients of φ at the unknowns (x, y, z of each in
+        turn) to its difference from the average of the linear interpolant.
     weights : (s,) float
         Area of each patch.
     components, source_ids : (s,) int
@@ -54,7 +54,7 @@ class TetSource:
     centers: NDArray[np.float64]
     time: float
     interpolation: sparse.csr_matrix
-    bends: sparse.csr_matrix
+    quadratic_correction: sparse.csr_matrix
     weights: NDArray[np.float64]
     components: NDArray[np.int64]
     source_ids: NDArray[np.int64]
@@ -123,14 +123,14 @@ def tet_source(
         )
     leaving = np.flatnonzero(outside > 1e-9)
     patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]
-    rows, bends, weights, members = zip(*patches, strict=True)
+    rows, corrections, weights, members = zip(*patches, strict=True)
     return TetSource(
         vectors=loads[:, :3],
         strengths=loads[:, 3],
         centers=np.concatenate([_centers(mesh, polygons) for polygons in cuts]),
         time=time,
         interpolation=sparse.vstack(rows, format="csr"),
-        bends=sparse.vstack(bends, format="csr"),
+        quadratic_correction=sparse.vstack(corrections, format="csr"),
         weights=np.concatenate(weights),
         components=np.unique(np.concatenate(members), return_inverse=True)[1],
         source_ids=np.repeat(np.arange(len(weights)), [len(found) for found in weights]),
@@ -212,8 +212,8 @@ def _patches(
     away = (_centers(mesh, polygons)[:, None] - mesh.vertices[mesh.tets[polygons.tets]])[inside].reshape(-1, 3)
     steps = (entries / np.where(real, weights, 1)[index])[n_on:, None] * away / 2
     places = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
-    bends = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
-    return rows[real], bends[real], weights[real], found[real] // n_unknowns
+    corrections = sparse.csr_matrix((steps.ravel(), places), shape=(len(found), 3 * n_unknowns))
+    return rows[real], corrections[real], weights[real], found[real] // n_unknowns
 
 
 def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> NDArray[np.float64]:

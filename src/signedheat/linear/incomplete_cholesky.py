@@ -1,4 +1,4 @@
-"""Conjugate gradients preconditioned by an incomplete Cholesky factor without fill, IC(0).
+"""Incomplete Cholesky factors without fill, IC(0), which precondition conjugate gradients.
 
 For systems too large to factorise. The factor takes as much memory as half the matrix; time per iteration is linear.
 """
@@ -10,8 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from threadpoolctl import threadpool_limits
 
 from ..compiled import compiled
+from .conjugate_gradients import conjugate_gradients
+from .matrices import whole
 
 SMALLEST = 1e-290
 """Unknowns below this have lost bits to underflow, and are left out of the stopping criterion."""
@@ -69,29 +72,43 @@ class IncompleteCholesky:
     def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> NDArray[np.float64]:
         """Solve by conjugate gradients for one right-hand side (n,) or several (n, k), as one block-diagonal system.
 
-        Stops once ``‖r‖ ≤ relative · ‖b‖``, or once ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row. The second
-        criterion keeps the relative accuracy of solutions that decay by hundreds of orders of magnitude. For these,
-        `order` should be by distance from the nonzeros of b: errors then propagate outward with the solution, and decay
-        with it.
+        Conjugate gradients on all columns at once. They stop once ``‖r‖ ≤ relative · ‖b‖``, or once
+        ``|r_i| ≤ componentwise · A_ii |x_i|`` in every row (an entrywise backward error, Oettli & Prager 1964): the
+        second keeps solutions right that fall by hundreds of orders of magnitude. In `order` by distance from where b
+        is not zero, errors travel outward with the solution and shrink with it.
         """
         b = np.asarray(rhs, dtype=np.float64)
         x = np.zeros((self.n, b[0].size))
         scale = np.abs(b).max() if b.size else 0.0
         if scale > 0:
-            solution, _ = _conjugate_gradients(
-                self.indptr,
-                self.indices,
-                self.diagonal,
-                self.lower,
-                self.pivots,
-                self.factor,
-                np.ascontiguousarray(b.reshape(self.n, -1)[self.order] / scale),
-                relative,
-                componentwise,
-                MOST_ITERATIONS,
-            )
-            x[self.order] = solution * scale
+            load = np.ascontiguousarray(b.reshape(self.n, -1)[self.order] / scale)
+            x[self.order] = self._iterate(load, relative, componentwise) * scale
         return x.reshape(b.shape)
+
+    def _iterate(self, load: NDArray[np.float64], relative: float, componentwise: float) -> NDArray[np.float64]:
+        shape, goal = load.shape, relative**2 * float(np.einsum("ij,ij->", load, load))
+
+        def multiply(p: NDArray[np.float64]) -> NDArray[np.float64]:
+            product: NDArray[np.float64] = _multiply(
+                self.indptr, self.indices, self.diagonal, self.lower, p.reshape(shape)
+            )
+            return product.ravel()
+
+        def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
+            solution: NDArray[np.float64] = _precondition(
+                self.indptr, self.indices, self.factor, self.pivots, r.reshape(shape)
+            )
+            return solution.ravel()
+
+        def converged(x: NDArray[np.float64], r: NDArray[np.float64]) -> bool:
+            small = np.einsum("i,i->", r, r) <= goal
+            return bool(small or _settled(self.diagonal, x.reshape(shape), r.reshape(shape), componentwise))
+
+        with threadpool_limits(1, "blas"):  # threads only wait between the inner products
+            solution = conjugate_gradients(
+                multiply, load.ravel(), precondition, tolerance=0.0, limit=MOST_ITERATIONS, converged=converged
+            )
+        return solution.reshape(shape)
 
 
 def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -103,7 +120,17 @@ def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArra
     >>> outward_order(chain, np.array([1]))
     array([1, 0, 2])
     """
-    return _breadth_first(matrix.indptr, matrix.indices, matrix.data, np.asarray(seeds, dtype=np.int64))
+    order: NDArray[np.int64] = _breadth_first(
+        matrix.indptr, matrix.indices, matrix.data, np.asarray(seeds, dtype=np.int64)
+    )
+    return order
+
+
+def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
+    """What solves a system given by its upper triangle: unknowns in the order of its own graph, from the first on."""
+    full = whole(upper)
+    _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
+    return IncompleteCholesky.of(full, outward_order(full, first))
 
 
 @compiled
@@ -194,9 +221,10 @@ def _factorize(indptr, indices, factor, pivots):
 
 
 @compiled
-def _precondition(indptr, indices, factor, pivots, r, z):
-    """``z = (L Lᵀ)⁻¹ r``, by forward and back substitution."""
+def _precondition(indptr, indices, factor, pivots, r):
+    """z = (L Lᵀ)⁻¹ r, row by row down and up."""
     n, width = r.shape
+    z = np.empty((n, width))
     for i in range(n):
         for c in range(width):
             z[i, c] = r[i, c]
@@ -211,62 +239,34 @@ def _precondition(indptr, indices, factor, pivots, r, z):
         for k in range(indptr[i], indptr[i + 1]):
             for c in range(width):
                 z[indices[k], c] -= factor[k] * z[i, c]
+    return z
 
 
 @compiled
-def _conjugate_gradients(indptr, indices, diagonal, lower, pivots, factor, b, relative, componentwise, most):
-    n, width = b.shape
-    x = np.zeros((n, width))
-    r = b.copy()
-    z = np.empty((n, width))
+def _multiply(indptr, indices, diagonal, lower, p):
+    """A p, from the lower triangle."""
+    n, width = p.shape
     q = np.empty((n, width))
-    _precondition(indptr, indices, factor, pivots, r, z)
-    p = z.copy()
-    rho = 0.0
-    size = 0.0
     for i in range(n):
         for c in range(width):
-            rho += r[i, c] * z[i, c]
-            size += b[i, c] * b[i, c]
-    for iteration in range(most):
-        if rho <= 0.0:
-            return x, iteration
-        curvature = 0.0
-        for i in range(n):
+            q[i, c] = diagonal[i] * p[i, c]
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
             for c in range(width):
-                q[i, c] = diagonal[i] * p[i, c]
-            for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                for c in range(width):
-                    q[i, c] += lower[k] * p[j, c]
-                    q[j, c] += lower[k] * p[i, c]
-        for i in range(n):
-            for c in range(width):
-                curvature += p[i, c] * q[i, c]
-        alpha = rho / curvature
-        rest = 0.0
-        worst = 0.0
-        for i in range(n):
-            largest = 0.0
-            residual = 0.0
-            for c in range(width):
-                x[i, c] += alpha * p[i, c]
-                r[i, c] -= alpha * q[i, c]
-                rest += r[i, c] * r[i, c]
-                largest = max(largest, abs(x[i, c]))
-                residual = max(residual, abs(r[i, c]))
-            if residual > SMALLEST:
-                worst = max(worst, residual / (diagonal[i] * largest + 1e-320))
-        if rest <= relative * relative * size or worst <= componentwise:
-            return x, iteration + 1
-        _precondition(indptr, indices, factor, pivots, r, z)
-        before = rho
-        rho = 0.0
-        for i in range(n):
-            for c in range(width):
-                rho += r[i, c] * z[i, c]
-        beta = rho / before
-        for i in range(n):
-            for c in range(width):
-                p[i, c] = z[i, c] + beta * p[i, c]
-    return x, most
+                q[i, c] += lower[k] * p[j, c]
+                q[j, c] += lower[k] * p[i, c]
+    return q
+
+
+@compiled
+def _settled(diagonal, x, r, componentwise):
+    """Whether every row's residual is small beside its own unknowns."""
+    n, width = x.shape
+    for i in range(n):
+        largest, residual = 0.0, 0.0
+        for c in range(width):
+            largest = max(largest, abs(x[i, c]))
+            residual = max(residual, abs(r[i, c]))
+        if residual > SMALLEST and residual / (diagonal[i] * largest + 1e-320) > componentwise:
+            return False
+    return True

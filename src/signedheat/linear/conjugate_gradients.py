@@ -1,0 +1,80 @@
+"""The method of conjugate gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Operator = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def conjugate_gradients(
+    operator: Operator,
+    rhs: NDArray[np.float64],
+    precondition: Operator | None = None,
+    start: NDArray[np.float64] | None = None,
+    tolerance: float = 1e-6,
+    limit: int = 500,
+    converged: Callable[[NDArray[np.float64], NDArray[np.float64]], bool] | None = None,
+) -> NDArray[np.float64]:
+    """Solve ``A x = b``, A symmetric and positive definite; or semidefinite, with b within its range.
+
+    Preconditioned conjugate gradients (Hestenes & Stiefel 1952; Saad, *Iterative Methods for Sparse Linear Systems*,
+    2nd ed., Alg. 9.1). A system stops once ``rᵀ P r ≤ tolerance² · max(r₀ᵀ P r₀, bᵀ P b)``, P the preconditioner and r
+    the residual that the recurrence keeps; once A has no curvature left along the search direction; all of them after
+    `limit` steps, or once `converged` says so.
+
+    Parameters
+    ----------
+    operator : callable
+        A times an array of the shape of `rhs`.
+    rhs : (n,) or (n, k) float
+        b; each column is a system of its own.
+    precondition : callable, optional
+        P, about A⁻¹ and symmetric positive definite; by default the identity.
+    start : array of the shape of `rhs`, optional
+        Zero by default.
+    tolerance : float
+        Of the stopping criterion; zero leaves it to `converged` and `limit`.
+    limit : int
+        Most steps.
+    converged : callable, optional
+        From x and r, whether to stop.
+
+    Examples
+    --------
+    >>> conjugate_gradients(lambda x: np.array([2.0, 4.0]) * x, np.array([2.0, 8.0])).round(12)
+    array([1., 2.])
+    """
+    apply_p = precondition or np.copy
+    x = np.zeros_like(rhs) if start is None else start.copy()
+    r = rhs.copy() if start is None else rhs - operator(x)
+    z = apply_p(r)
+    p, product = z.copy(), _products(r, z)
+    goal = tolerance**2 * (product if start is None else np.maximum(product, _products(rhs, apply_p(rhs))))
+    for _ in range(limit):
+        active = product > goal
+        if not active.any():
+            break
+        q = operator(p)
+        curvature = _products(p, q)
+        active &= curvature > 0
+        if not active.any():
+            break
+        step = np.divide(product, curvature, out=np.zeros_like(product), where=active)
+        x += step * p
+        r -= step * q
+        if converged is not None and converged(x, r):
+            break
+        z = apply_p(r)
+        product, previous = _products(r, z), product
+        p *= np.divide(product, previous, out=np.zeros_like(product), where=previous > 0)
+        p += z
+    return x
+
+
+def _products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) inner products of columns; that of two vectors has no axis."""
+    return np.asarray(np.vdot(a, b) if a.ndim == 1 else np.einsum("ij,ij->j", a, b))

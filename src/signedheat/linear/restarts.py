@@ -1,0 +1,124 @@
+"""Solutions that fall out of the range of floating-point numbers: underflow-safe restarts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+FAINT = 2.0**-900
+"""Rows below this fraction of the largest are computed anew: what underflows on the way to them may be missing."""
+
+Solve = Callable[[NDArray[Any]], NDArray[Any]]
+"""From right-hand sides (n, k) or (n,), the solutions."""
+
+Forces = Callable[[NDArray[Any], NDArray[np.bool_]], tuple[NDArray[np.bool_], NDArray[Any]]]
+"""From x, zero but on the faint rows, and these: (n,) rows that couple faint ones to others, and A x there."""
+
+
+class Stage(NamedTuple):
+    """Part of a solution: ``values · exp(logarithm)``.
+
+    Attributes
+    ----------
+    values : (n, k) or (n,) float or complex
+        NaN on rows that an earlier stage knows well.
+    logarithm : float
+        Natural logarithm of the factor that belongs to them.
+    """
+
+    values: NDArray[Any]
+    logarithm: float
+
+
+def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any], size: float = 1.0) -> list[Stage]:
+    """Solve ``A x = loads`` for columns that decay exponentially away from where the loads are.
+
+    Parameters
+    ----------
+    solve : callable
+        Solves for right-hand sides of the loads' shape.
+    border_forces : callable
+        What couples the faint rows to the others: `matrix_forces` makes it from A.
+    loads : (n, k) or (n,) float or complex
+        Right-hand sides.
+    size : float
+        About the size of A's diagonal; loads are scaled to it, so that the largest x is about one.
+
+    Returns
+    -------
+    list of Stage
+        Each covers what the ones before it are too small on.
+
+    Examples
+    --------
+    >>> A = sparse.csr_matrix(sparse.diags_array([-1.0, 1e9, -1.0], offsets=[-1, 0, 1], shape=(50, 50)))
+    >>> factor = sparse.linalg.splu(A.tocsc())
+    >>> stages = solve_with_restarts(factor.solve, matrix_forces(A), np.eye(50)[:, :1], size=1e9)
+    >>> len(stages), round(float((np.log(stages[-1].values[49, 0]) + stages[-1].logarithm) / np.log(1e-9)), 6)
+    (2, 50.0)
+    """
+    loads, logarithm = scaled(loads, size)
+    return restart(solve, border_forces, loads, Stage(solve(loads), logarithm), size)
+
+
+def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Stage, size: float = 1.0) -> list[Stage]:
+    """The same from a first stage on, whose loads are given as they were scaled for it.
+
+    On the faint rows x satisfies the same equation with a right-hand side along their border, where x is still known
+    well. Scaled up, that is the next right-hand side for the same solver, so the result is exact.
+    """
+    stages, unknown = [first], np.ones(len(loads), dtype=bool)
+    while True:
+        values, logarithm = stages[-1]
+        sizes = np.where(unknown, largest_components(values), 0.0)
+        faint = unknown & (sizes < FAINT * sizes.max(initial=0.0))
+        if not faint.any():
+            return stages
+        inside = _rows(faint, values)
+        border, forces = border_forces(np.where(inside, values, 0), faint)
+        forces = np.where(_rows(border, values), forces, np.where(inside, loads, 0))
+        if not forces.any():
+            return stages
+        loads, raised = scaled(forces, size)
+        stages.append(Stage(np.where(inside, solve(loads), np.nan), logarithm + raised))
+        unknown = faint
+
+
+def scaled(loads: NDArray[Any], size: float) -> tuple[NDArray[Any], float]:
+    """Loads times a power of two, so that the largest is about `size`; and the logarithm of what undoes it."""
+    largest = float(largest_components(loads).max(initial=0.0))
+    if largest == 0.0:
+        return loads, 0.0
+    steps = int(np.frexp(size)[1] - np.frexp(largest)[1])
+    raised = np.ldexp(np.ascontiguousarray(loads).view(np.float64), steps).view(loads.dtype)
+    return raised, -steps * float(np.log(2.0))
+
+
+def matrix_forces(matrix: sparse.csr_matrix) -> Forces:
+    """The forces at the border of faint rows, from the whole matrix A."""
+    pattern = sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+
+    def border_forces(values: NDArray[Any], faint: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[Any]]:
+        beside = pattern @ faint
+        return (beside > 0) & (beside < np.diff(matrix.indptr)), matrix @ values
+
+    return border_forces
+
+
+def largest_components(values: NDArray[Any]) -> NDArray[np.float64]:
+    """(n,) largest real or imaginary part in each row: squares would underflow."""
+    parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
+    sizes = np.zeros(len(values))
+    for part in parts:
+        for column in part.reshape(len(part), -1).T:
+            np.maximum(sizes, np.abs(column), out=sizes)
+    return sizes
+
+
+def _rows(chosen: NDArray[np.bool_], values: NDArray[Any]) -> NDArray[np.bool_]:
+    """The same choice for every column."""
+    return chosen.reshape(-1, *[1] * (values.ndim - 1))
