@@ -89,10 +89,14 @@ class IncompleteCholesky:
         shape, goal = load.shape, relative**2 * float(np.einsum("ij,ij->", load, load))
 
         def multiply(p: NDArray[np.float64]) -> NDArray[np.float64]:
-            return _multiply(self.indptr, self.indices, self.diagonal, self.lower, p.reshape(shape)).ravel()
+            q: NDArray[np.float64] = _multiply(self.indptr, self.indices, self.diagonal, self.lower, p.reshape(shape))
+            return q.ravel()
 
         def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
-            return _precondition(self.indptr, self.indices, self.factor, self.pivots, r.reshape(shape)).ravel()
+            z: NDArray[np.float64] = _precondition(
+                self.indptr, self.indices, self.factor, self.pivots, r.reshape(shape)
+            )
+            return z.ravel()
 
         def converged(x: NDArray[np.float64], r: NDArray[np.float64]) -> bool:
             small = np.einsum("i,i->", r, r) <= goal
@@ -114,7 +118,9 @@ def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArra
     >>> outward_order(chain, np.array([1]))
     array([1, 0, 2])
     """
-    return _breadth_first(matrix.indptr, matrix.indices, matrix.data, np.asarray(seeds, dtype=np.int64))
+    seeds = np.asarray(seeds, dtype=np.int64)
+    order: NDArray[np.int64] = _breadth_first(matrix.indptr, matrix.indices, matrix.data, seeds)
+    return order
 
 
 def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
