@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,9 @@ from .errors import ConstraintError
 class Constraint(Protocol):
     """The protocol of constraints: they finish step 3."""
 
-    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+    def integrate(
+        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
+    ) -> NDArray[np.float64]:
         """φ at the unknowns, from b, the divergence of Y."""
 
 
@@ -31,7 +33,9 @@ class Free:
     Free()
     """
 
-    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+    def integrate(
+        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
+    ) -> NDArray[np.float64]:
         return integration.solve(divergence, source)
 
 
@@ -55,7 +59,9 @@ class ZeroSet:
 
     hard: bool = False
 
-    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+    def integrate(
+        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
+    ) -> NDArray[np.float64]:
         levels = Levels(np.zeros(len(source.weights)))
         return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
@@ -70,7 +76,9 @@ class EachComponent:
     EachComponent()
     """
 
-    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+    def integrate(
+        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
+    ) -> NDArray[np.float64]:
         return integration.fit(divergence, source, Levels(np.zeros(len(source.weights)), source.components))
 
 
@@ -103,7 +111,9 @@ class LevelValues:
             raise ConstraintError(f"level values must be finite, not {list(values)}")
         object.__setattr__(self, "values", values)
 
-    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+    def integrate(
+        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
+    ) -> NDArray[np.float64]:
         n_sources, n_components = int(source.source_ids.max()) + 1, int(source.components.max()) + 1
         if len(self.values) == n_sources:
             index = source.source_ids
@@ -144,5 +154,7 @@ class Soft:
         if not (np.isfinite(self.weight) and self.weight > 0):
             raise ConstraintError(f"the weight of a soft constraint must be positive and finite, not {self.weight}")
 
-    def integrate(self, integration: Integration, divergence: Any, source: SourceTerm) -> NDArray[np.float64]:
+    def integrate(
+        self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
+    ) -> NDArray[np.float64]:
         return integration.penalize(divergence, source, float(self.weight))

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 import runpy
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
+
+import pytest
+
+import signedheat as sh
 
 ROOT = Path(__file__).parents[2]
 PUBLIC = (
@@ -46,3 +53,37 @@ def test_a_wrong_type_is_found(tmp_path):
     found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     [error] = [line for line in found.stdout.splitlines() if "error:" in line and "wrong.py" in line]
     assert "assert-type" in error
+
+
+def annotations(thing: object) -> dict[str, str]:
+    """Parameters and result of a function, fields, properties and methods of a class, as they are written."""
+    if not isinstance(thing, type):
+        return dict(inspect.get_annotations(thing)) if callable(thing) else {}
+    found = {}
+    for base in thing.__mro__[:-1]:
+        if base.__module__.startswith("signedheat"):
+            found |= {f"{base.__name__}.{name}": kind for name, kind in inspect.get_annotations(base).items()}
+            for name, member in vars(base).items():
+                function = getattr(member, "fget", None) or getattr(member, "func", None) or member
+                function = getattr(function, "__func__", function)
+                if inspect.isfunction(function) and (not name.startswith("_") or name in ("__init__", "__call__")):
+                    found |= {f"{name}.{k}": kind for k, kind in inspect.get_annotations(function).items()}
+    return {name: kind for name, kind in found.items() if not name.partition(".")[2].startswith("_")}
+
+
+@pytest.mark.parametrize("name", sh.__all__)
+def test_nothing_public_is_of_any_type(name):
+    kinds = annotations(getattr(sh, name))
+    assert {where: kind for where, kind in kinds.items() if re.search(r"\bAny\b", str(kind))} == {}
+
+
+def test_any_types_would_be_found():
+    class Public:
+        """Stands in for a class of the package."""
+
+        field: Any
+
+        def method(self, argument: Any) -> None: ...
+
+    Public.__module__ = "signedheat.test"
+    assert set(annotations(Public)) >= {"Public.field", "method.argument"}

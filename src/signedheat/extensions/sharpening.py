@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from functools import singledispatch
-from typing import Any, Protocol, TypeVar, overload, runtime_checkable
+from typing import Protocol, TypeVar, overload, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics, Note, SlopeErrors
-from ..discretization import Discretization
+from ..discretization import Discretization, SourceTerm
 from ..domains.grid import Dimension
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..fields.grid_field import GridField
@@ -32,7 +32,7 @@ class Method(Protocol):
         discretization: Discretization,
         elements: LinearElements,
         values: NDArray[np.float64],
-        source: Any,
+        source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """Sharpened values at the unknowns, from the old ones, and notes for the diagnostics."""
@@ -47,7 +47,7 @@ def sharpen(field: GridField[Dimension], *, progress: Progress | None = None) ->
 def sharpen(field: AnyField, method: Method | None = None, progress: Progress | None = None) -> AnyField: ...
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
-def sharpen(field: Field, *arguments: Any, **options: Any) -> Field:
+def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     """Replace a field by the distance to its own zero set, with the signs of the field (Sec. 7.3).
 
     On grids: the distance of every node to the zero set, second order.

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import singledispatch
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ..diagnostics import ConvexRounds, Note
-from ..discretization import Discretization
+from ..discretization import Discretization, SourceTerm
 from ..domains.validation import finite_number, positive_number
 from ..errors import OutsideError, SignedHeatError, SourceError, UnsupportedTypeError
 from ..lowering.direct_integration import DirectIntegration
+from ..lowering.surface.source import SurfaceSource
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
@@ -58,7 +58,7 @@ class Geodesic:
         discretization: Discretization,
         elements: LinearElements,
         values: NDArray[np.float64],
-        source: Any,
+        source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """Distances with the signs of φ; connected components without a zero set keep their values."""
@@ -73,13 +73,14 @@ class Geodesic:
                 "that it was computed from",
             )
         distance = np.where(np.isfinite(distance), distance, np.abs(values))
-        sides = values if getattr(source, "oriented", True) else np.ones_like(values)
+        unsided = isinstance(source, SurfaceSource) and not source.oriented
+        sides = np.ones_like(values) if unsided else values
         return np.where(np.isnan(values), np.nan, np.copysign(distance, sides)), notes
 
 
 @singledispatch
 def straight_distance(
-    discretization: Any, values: NDArray[np.float64], source: Any, tolerance: float
+    discretization: object, values: NDArray[np.float64], source: SourceTerm | None, tolerance: float
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Distance of every unknown from the zero set of `values`, inf where there is none in its component; and notes."""
     raise UnsupportedTypeError(f"there are no straight lines on a {type(discretization).__name__}")
@@ -125,7 +126,7 @@ class Convex:
         discretization: Discretization,
         elements: LinearElements,
         values: NDArray[np.float64],
-        source: Any,
+        source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """The maximiser of Eq. 18, starting from φ⁰ = `values`."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import Note, RoundCorners
-from ..discretization import discretize
+from ..discretization import SourceTerm, discretize
 from ..fields.tet_field import TetField
 from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.any_angle import FacePlanes, any_angle_distance
@@ -41,7 +40,7 @@ def _(field: TetField, method: Method | None = None, progress: Progress | None =
 
 @straight_distance.register
 def _(
-    lowered: TetDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
+    lowered: TetDiscretization, values: NDArray[np.float64], source: SourceTerm | None, tolerance: float
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Any-angle distance from the zero set in space, around the boundary of the mesh.
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import GeodesicWindows, Note
-from ..discretization import discretize
+from ..discretization import SourceTerm, discretize
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..errors import GeometryError, UnsupportedTypeError
 from ..fields.vertex_field import VertexField
@@ -19,6 +18,7 @@ from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in, concatenated, incident_faces
 from ..lowering.surface.discretization import SurfaceDiscretization
+from ..lowering.surface.source import SurfaceSource
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
 from .sharpening import Method, sharpen_field, sharpened
@@ -63,12 +63,11 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
 
 @straight_distance.register
 def _(
-    surface: SurfaceDiscretization, values: NDArray[np.float64], source: Any, tolerance: float
+    surface: SurfaceDiscretization, values: NDArray[np.float64], source: SourceTerm | None, tolerance: float
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Polyhedral distance from the zero set of the values and from unoriented sources."""
-    parts = getattr(source, "parts", ())
-    unsided = [part for part in parts if not part.oriented]
-    if not unsided:
+    unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
+    if not isinstance(source, SurfaceSource) or not unsided:
         distance, windows = distance_to_zero_line(surface.triangles, values, tolerance)
         return distance, (GeodesicWindows(int(windows)),)
     # Unoriented curves run along edges of refined triangles, whose first vertices are those of the surface.
@@ -76,7 +75,7 @@ def _(
     near = near[: len(values)]
     if source.oriented:
         sided = np.concatenate(
-            [interpolation_at(source.triangles, part.nodes).indices for part in parts if part.oriented]
+            [interpolation_at(source.triangles, part.nodes).indices for part in source.parts if part.oriented]
         )
         lines = without_halos(surface.triangles, values, near < HALO * surface.spacing, sided[sided < len(values)])
         distance, more = distance_to_zero_line(surface.triangles, lines, tolerance)
