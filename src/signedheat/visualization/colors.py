@@ -80,5 +80,5 @@ def add_color_bar(
         ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
         reach = float(colors.norm.vmax or 0.0)
         bar.ax.set_ylim(max(min(isolines[0] - step, 0.0), -reach), min(max(isolines[-1] + step, 0.0), reach))
-        bar.set_ticks(np.union1d(ticks, [0.0]))
+        bar.set_ticks(np.union1d(ticks, [0.0]).tolist())
         bar.ax.yaxis.set_major_formatter("{x:g}")
