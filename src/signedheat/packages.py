@@ -91,4 +91,6 @@ def require(name: str, purpose: str) -> ModuleType:
         missing = isinstance(error, ModuleNotFoundError) and error.name == package
         cause = "is not installed" if missing else f"cannot be imported ({error})"
         remedy = REMEDIES.get(package, f"pip install {package}")
-        raise MissingPackageError(f"{purpose} need the package {package}, which {cause}: {remedy}") from error
+        raise MissingPackageError(
+            f"{purpose} need the package {package}, which {cause}", remedy=remedy, element=package
+        ) from error
