@@ -40,7 +40,7 @@ def outward_signs(
     if len(chosen) > MOST:
         chosen = np.sort(np.random.default_rng(0).choice(chosen, MOST, replace=False))
     places = fits.places[chosen]
-    links, sided = sign_links(places, axes[chosen], fits.reaches[chosen])
+    links, sided = sign_links(places, axes[chosen], fits.reaches[chosen], fits.noisy)
     tails, heads, weights = links.tails, links.heads, links.weights
     m = len(chosen)
     if given:

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 JOGGLE = 1e-4
-"""Points are moved by this part of the distance to their neighbours: flat faces and lattices are slow to triangulate."""
+"""Part of the distance to neighbours by which points are moved: flat faces and lattices are slow to triangulate."""
 STEEPEST = 0.5
 """Cosine between a normal and the direction to a ball's centre below which the ball tells nothing about the side."""
 NEARBY = 8
 """Neighbours that a point is compared with directly."""
 DIRECT_WEIGHT = 0.1
-"""Weight of a direct comparison beside that of a ball."""
+"""Weight of a direct comparison beside that of a ball; that of a ball where the points are noisy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class SignLinks:
 
 
 def sign_links(
-    places: NDArray[np.float64], axes: NDArray[np.float64], reaches: NDArray[np.float64]
+    places: NDArray[np.float64], axes: NDArray[np.float64], reaches: NDArray[np.float64], noisy: bool = False
 ) -> tuple[SignLinks, bool]:
     """What balls and neighbours tell about the signs of axes; whether there were balls.
 
@@ -57,6 +57,8 @@ def sign_links(
         Unit normals, up to sign.
     reaches : (n,) float
         Distance to neighbours.
+    noisy : bool
+        Whether places are known so roughly that balls tell no more than neighbours.
 
     Examples
     --------
@@ -66,7 +68,7 @@ def sign_links(
     >>> bool((links.weights >= 0).all())
     True
     """
-    near = _neighbor_links(places, axes)
+    near = _neighbor_links(places, axes, 1.0 if noisy else DIRECT_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
     try:
         tets = Delaunay(places + moves)
@@ -120,7 +122,7 @@ def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: De
     return SignLinks(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())
 
 
-def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64]) -> SignLinks:
+def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64], weight: float) -> SignLinks:
     """Neighbours compared as if on a circle: one axis reflected in the plane midway is the other."""
     n, k = len(places), min(NEARBY, len(places) - 1)
     neighbors = cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
@@ -130,4 +132,4 @@ def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64]) -> S
     step /= np.where(length > 0, length, 1.0)[:, None]
     here, there = axes[tails], axes[heads]
     cosines = (here * there).sum(axis=1) - 2 * (here * step).sum(axis=1) * (there * step).sum(axis=1)
-    return SignLinks(tails, heads, DIRECT_WEIGHT * _confidence(cosines))
+    return SignLinks(tails, heads, weight * _confidence(cosines))

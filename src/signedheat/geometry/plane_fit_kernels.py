@@ -85,25 +85,29 @@ def plane_through(a, b, axis):
 
 
 @compiled(nogil=True)
-def weigh_by_height(offsets, near, axis, height, weights):
-    """Write Tukey's biweight of the heights over the plane through the origin, times `near`; return the sum."""
+def weigh_by_height(offsets, near, axis, base, height, weights):
+    """Write Tukey's biweight of the heights over a plane through `base`, times `near`; return the sum."""
     total = 0.0
+    level = axis[0] * base[0] + axis[1] * base[1] + axis[2] * base[2]
     for j in range(len(near)):
-        part = (axis[0] * offsets[j, 0] + axis[1] * offsets[j, 1] + axis[2] * offsets[j, 2]) / height
+        part = (axis[0] * offsets[j, 0] + axis[1] * offsets[j, 1] + axis[2] * offsets[j, 2] - level) / height
         weights[j] = near[j] * (1.0 - part * part) ** 2 if abs(part) < 1.0 else 0.0
         total += weights[j]
     return total
 
 
 @compiled(nogil=True)
-def robust_planes(points, neighbors, distances, height, n_starts, rounds, axes, centers, deviations):
+def robust_planes(points, neighbors, distances, heights, on_surface, n_starts, axes, centers, deviations):
     """Fit a plane near each point to those of its neighbours that lie within a height of it, from several starts.
 
-    The first neighbour is the point itself. Heights are parts of the reach. What explains most neighbours is kept.
+    The first neighbour is the point itself. Heights are parts of the reach, one after the other: over the plane through
+    the point, if `on_surface`, else through the centre of those found before, the point itself at first. The plane with
+    most neighbours within the last height is kept.
     """
     n, k = neighbors.shape
     offsets, near, weights = np.empty((k, 3)), np.empty(k), np.empty(k)
-    axis, center = np.empty(3), np.empty(3)
+    axis, center, origin = np.empty(3), np.empty(3), np.zeros(3)
+    base = origin if on_surface else center
     for i in range(n):
         reach, most = distances[i, k - 1], -1.0
         axes[i, 2] = 1.0
@@ -118,11 +122,11 @@ def robust_planes(points, neighbors, distances, height, n_starts, rounds, axes, 
                 weighted_plane(offsets, near, k if start == 0 else min(k, 7), axis, center)
             elif k < 4 or not plane_through(offsets[1 + start // 4], offsets[2 + (start > 2)], axis):
                 continue
-            square = 0.0
-            for _ in range(rounds):
-                weigh_by_height(offsets, near, axis, height * reach, weights)
+            square, center[0], center[1], center[2] = 0.0, 0.0, 0.0, 0.0
+            for height in heights:
+                weigh_by_height(offsets, near, axis, base, height * reach, weights)
                 square = weighted_plane(offsets, weights, k, axis, center)
-            explained = weigh_by_height(offsets, near, axis, height * reach, weights)
+            explained = weigh_by_height(offsets, near, axis, base, heights[-1] * reach, weights)
             if explained > most:
                 most, deviations[i] = explained, square**0.5 / reach
                 for c in range(3):

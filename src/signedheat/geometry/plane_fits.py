@@ -19,8 +19,11 @@ CLEAN_DEVIATION = 0.07
 thin sheets and edges too, where the points resolve them; noise as wide as the neighbourhood has .09 or more."""
 ANGLE_ERROR = 0.06
 """Radians by which noise may turn the plane of a noisy neighbourhood, as estimated from its deviation."""
-HEIGHT = 0.25
-"""Height over the plane, in reaches, beyond which a neighbour belongs to another sheet; twice that with noise."""
+CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
+"""Heights over the plane through a point, in reaches, beyond which a neighbour belongs to another sheet, one by one."""
+NOISY_HEIGHTS = (0.5, 0.5, 0.5)
+"""The same over planes that move from a noisy point to where its neighbours are densest."""
+_TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
 _CHUNK = 16384
 _TRIED = 2000
 
@@ -69,7 +72,9 @@ def fit_planes(points: NDArray[np.float64]) -> PlaneFits:
     """
     tree = cKDTree(points)
     n_neighbors, noisy = neighborhood_size(points, tree)
-    axes, places, reaches, deviations = planes_near(points, tree, np.arange(len(points)), n_neighbors, noisy)
+    heights, starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)
+    everything = np.arange(len(points))
+    axes, places, reaches, deviations = planes_near(points, tree, everything, n_neighbors, heights, starts)
     if noisy:
         places = points - ((points - places) * axes).sum(axis=1, keepdims=True) * axes
     else:
@@ -83,12 +88,12 @@ def neighborhood_size(points: NDArray[np.float64], tree: cKDTree) -> tuple[int, 
     if largest <= CLEAN_NEIGHBORS:
         return largest, False
     tried = np.arange(0, len(points), -(-len(points) // _TRIED))
-    deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, noisy=False, height=2 * HEIGHT)[3]
+    deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, _TRIAL_HEIGHTS)[3]
     if np.median(deviations) < CLEAN_DEVIATION:
         return CLEAN_NEIGHBORS, False
     sizes = [k for k in NOISY_NEIGHBORS if k <= largest // 4]
     for k in sizes:
-        deviations = planes_near(points, tree, tried, k, noisy=True, height=np.inf)[3]
+        deviations = planes_near(points, tree, tried, k, (np.inf,), 1)[3]
         if 2 * np.median(deviations) < ANGLE_ERROR * k**0.5:
             return k, True
     return (sizes[-1] if sizes else CLEAN_NEIGHBORS), bool(sizes)
@@ -99,19 +104,26 @@ def planes_near(
     tree: cKDTree,
     chosen: NDArray[np.int64],
     n_neighbors: int,
-    noisy: bool,
-    height: float | None = None,
+    heights: tuple[float, ...],
+    n_starts: int = 5,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Axes, centres, reaches and deviations of planes near chosen points."""
     n = len(chosen)
     axes, centers, deviations, reaches = np.zeros((n, 3)), points[chosen], np.zeros(n), np.zeros(n)
-    starts, rounds = (1, 2) if noisy else (5, 3)
-    if height is None:
-        height = 2 * HEIGHT if noisy else HEIGHT
     for begin in range(0, n, _CHUNK):
         part = slice(begin, begin + _CHUNK)
         distances, neighbors = tree.query(points[chosen[part]], k=n_neighbors + 1, workers=-1)
         neighbors[:, 0] = chosen[part]
-        robust_planes(points, neighbors, distances, height, starts, rounds, axes[part], centers[part], deviations[part])
+        robust_planes(
+            points,
+            neighbors,
+            distances,
+            np.array(heights),
+            n_starts > 1,
+            n_starts,
+            axes[part],
+            centers[part],
+            deviations[part],
+        )
         reaches[part] = distances[:, -1]
     return axes, centers, reaches, deviations

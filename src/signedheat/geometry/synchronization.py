@@ -72,7 +72,7 @@ def _merged(tails: NDArray[np.int64], heads: NDArray[np.int64], weights: NDArray
 
 
 def _contraction(graph: _Graph) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Group of each node, and its sign in it: pairs that are each other's strongest, and those whose strongest they are."""
+    """Group of each node, and its sign in it: pairs that are each other's strongest, and whose strongest is in one."""
     rows = np.repeat(np.arange(graph.n_nodes), np.diff(graph.starts))
     low, high = np.minimum(rows, graph.neighbors), np.maximum(rows, graph.neighbors)
     order = np.lexsort((high, low, -np.abs(graph.weights), rows))  # ties go the same way from both ends
