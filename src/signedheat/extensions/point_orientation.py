@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..domains.point_cloud import PointCloud
 from ..errors import GeometryError
 from ..geometry.axis_orientation import outward_signs
-from ..geometry.plane_fits import PlaneFits, fit_planes
+from ..geometry.plane_fits import fit_planes
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +91,53 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
     return PointOrientation(oriented, fitted, turned, fits.n_neighbors, fits.noisy, sided)
 
 
+def orient_axes(
+    points: NDArray[np.float64], axes: NDArray[np.float64], given: bool = False, groups: NDArray[np.int64] | None = None
+) -> NDArray[np.float64]:
+    """(n,) signs that turn normals known up to sign outwards, all together.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        Points on a surface; of those that coincide, the first counts.
+    axes : (n, 3) float
+        Unit normals, up to sign.
+    given : bool
+        Whether the axes' own signs are evidence: weak, and relative; if most are inverted, that is found out.
+    groups : (n,) int, optional
+        Points of the same group, of one triangle, say, share one sign.
+
+    Notes
+    -----
+    Of fewer than four distinct points nothing can be told: their signs are positive.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> truth = samples.oriented_points(samples.sphere(), 500)
+    >>> axes = truth.normals * np.where(truth.normals[:, :1] < 0, -1, 1)
+    >>> bool((orient_axes(truth.points, axes) == np.where(truth.normals[:, 0] < 0, -1, 1)).all())
+    True
+    """
+    members = np.arange(len(points)) if groups is None else np.unique(groups, return_inverse=True)[1].ravel()
+    _, first, place = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    if len(first) < 4:
+        return np.ones(len(points))
+    order = np.argsort(first, kind="stable")
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    first, place = first[order], rank[place.ravel()]
+    present, kept = np.unique(members[first], return_inverse=True)
+    fits = fit_planes(points[first])
+    found, _ = outward_signs(fits, axes[first], given, None if groups is None else kept.ravel())
+    if groups is None:
+        agrees = (axes * axes[first[place]]).sum(axis=1) >= 0
+        return np.where(agrees, 1.0, -1.0) * found[place]
+    signs = np.ones(int(members.max()) + 1)
+    signs[present[kept.ravel()]] = found
+    return signs[members]
+
+
 def orient_triangles(corners: NDArray[np.float64], given: bool = True, n_samples: int = 20_000) -> NDArray[np.float64]:
     """(m,) signs, −1 for triangles to turn round so that loose triangles, taken together, face outwards.
 
@@ -127,21 +174,9 @@ def orient_triangles(corners: NDArray[np.float64], given: bool = True, n_samples
     owners = np.repeat(np.arange(len(solid)), counts)
     order = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
     points = _spread(corners[solid][owners], order, counts[owners])
-    places, first = np.unique(points, axis=0, return_index=True)
-    if len(places) < 4:
-        return signs
-    first = np.sort(first)
     axes = (vectors[solid] / areas[solid, None])[owners]
-    fits = _own_planes(fit_planes(points[first]), axes[first])
-    groups = owners[first]
-    found, _ = outward_signs(fits, axes[first], given, np.unique(groups, return_inverse=True)[1].ravel())
-    signs[solid[groups]] = found
+    signs[solid[owners]] = orient_axes(points, axes, given, owners)
     return signs
-
-
-def _own_planes(fits: PlaneFits, axes: NDArray[np.float64]) -> PlaneFits:
-    """The same places, with axes that are known."""
-    return replace(fits, axes=axes)
 
 
 def _spread(corners: NDArray[np.float64], order: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -154,4 +189,4 @@ def _spread(corners: NDArray[np.float64], order: NDArray[np.int64], counts: NDAr
     root = np.sqrt(u)
     weights = np.stack([1 - root, root * (1 - v), root * v], axis=1)
     weights = np.where((counts == 1)[:, None], 1 / 3, weights)
-    return np.einsum("nk,nkj->nj", weights, corners)
+    return np.asarray((weights[:, :, None] * corners).sum(axis=1))

@@ -49,7 +49,8 @@ def outward_signs(
         weights = np.concatenate([weights, np.full(m, GIVEN_WEIGHT * 0.5 * float(np.median(told[:m])))])
     nodes = np.arange(m + 2)
     if groups is not None:
-        nodes = np.unique(np.concatenate([groups[chosen], groups.max() + [1, 2]]), return_inverse=True)[1].ravel()
+        outside = int(groups.max()) + 1
+        nodes = np.unique(np.append(groups[chosen], [outside, outside + 1]), return_inverse=True)[1].ravel()
     found = synchronize_signs(nodes[tails], nodes[heads], weights, int(nodes.max()) + 1)[nodes]
     signs = np.zeros(n)
     signs[chosen] = found[:m] * (found[m] if sided else found[m + 1] if given else 1.0)

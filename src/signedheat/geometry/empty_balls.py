@@ -1,10 +1,10 @@
 """What empty balls tell about the sides of points on an unknown surface.
 
 The ball around a Delaunay tet touches four points and holds none. Where it touches two of them from along their
-normals, it lies on one side of the surface near both: inside or outside, but the same. So the tets say how normals known
-up to sign belong together, across edges, gaps and thin walls alike, without any triangulated surface. The hull's faces
-say which side is out. (Poles of Voronoi cells: Amenta & Bern 1999; labels from balls that overlap: Kolluri, Shewchuk &
-O'Brien 2004.)
+normals, it lies on one side of the surface near both: inside or outside, but the same. So the tets say how normals
+known up to sign belong together, across edges, gaps and thin walls alike, without any triangulated surface. The hull's
+faces say which side is out. (Poles of Voronoi cells: Amenta & Bern 1999; labels from balls that overlap: Kolluri,
+Shewchuk & O'Brien 2004.)
 """
 
 from __future__ import annotations

@@ -65,9 +65,9 @@ def fit_planes(points: NDArray[np.float64]) -> PlaneFits:
 
     Examples
     --------
-    >>> x, y = np.meshgrid(np.arange(4.0), np.arange(4.0))
-    >>> sheets = np.concatenate([np.stack([x, y, np.full_like(x, z)], axis=-1).reshape(-1, 3) for z in (0.0, 0.9)])
-    >>> bool(np.allclose(abs(fit_planes(sheets).axes[:, 2]), 1))
+    >>> xy = np.random.default_rng(0).random((400, 2))
+    >>> sheets = np.concatenate([np.c_[xy[:200], np.zeros(200)], np.c_[xy[200:], np.full(200, 0.1)]])
+    >>> bool(np.median(np.abs(fit_planes(sheets).axes[:, 2])) > 0.999)
     True
     """
     tree = cKDTree(points)

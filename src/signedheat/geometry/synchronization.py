@@ -28,7 +28,7 @@ class _Graph:
 def synchronize_signs(
     tails: NDArray[np.int64], heads: NDArray[np.int64], weights: NDArray[np.float64], n_nodes: int
 ) -> NDArray[np.float64]:
-    """(n,) signs s that make Σ w s_tail s_head large: neither node, nor group met on the way, gains by turning.
+    """(n,) signs s that make Σ w s_tail s_head large: no sign gains by turning alone, and hardly any group of them.
 
     Groups that tell most about each other merge first, and what they tell about third ones adds up (greedy additive
     contraction, Keuper et al. 2015, for signs instead of cuts), until nothing is left to tell. Then groups are taken
