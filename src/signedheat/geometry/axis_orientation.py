@@ -1,0 +1,76 @@
+"""Normals known up to sign, of points on an unknown surface, turned outwards together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from .empty_balls import sign_links
+from .plane_fits import PlaneFits
+from .synchronization import synchronize_signs
+from .thinning import spread_out
+
+SPREAD = 0.35
+"""Distance between the noisy points that stand for all, in reaches: noise that planes leave is small beside it."""
+MOST = 100_000
+"""Points for which tets are made; the others follow their neighbours."""
+GIVEN_WEIGHT = 0.1
+"""Weight of given signs, beside half of all that balls and neighbours tell about a point."""
+
+
+def outward_signs(
+    fits: PlaneFits, axes: NDArray[np.float64], given: bool = False, groups: NDArray[np.int64] | None = None
+) -> tuple[NDArray[np.float64], bool]:
+    """(n,) signs that turn axes outwards, and whether anything said which side is out.
+
+    Parameters
+    ----------
+    fits : PlaneFits
+        Where the points are, and how noisy.
+    axes : (n, 3) float
+        Unit normals, up to sign.
+    given : bool
+        Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out.
+    groups : (n,) int, optional
+        Points of the same group, counted from 0, share one sign.
+    """
+    n = len(axes)
+    chosen = spread_out(fits.places, SPREAD * fits.reaches) if fits.noisy else np.arange(n)
+    if len(chosen) > MOST:
+        chosen = np.sort(np.random.default_rng(0).choice(chosen, MOST, replace=False))
+    places = fits.places[chosen]
+    links, sided = sign_links(places, axes[chosen], fits.reaches[chosen], fits.noisy)
+    tails, heads, weights = links.tails, links.heads, links.weights
+    m = len(chosen)
+    if given:
+        told = np.bincount(tails, np.abs(weights), m + 1) + np.bincount(heads, np.abs(weights), m + 1)
+        tails, heads = np.concatenate([tails, np.arange(m)]), np.concatenate([heads, np.full(m, m + 1)])
+        weights = np.concatenate([weights, np.full(m, GIVEN_WEIGHT * 0.5 * float(np.median(told[:m])))])
+    nodes = np.arange(m + 2)
+    if groups is not None:
+        outside = int(groups.max()) + 1
+        nodes = np.unique(np.append(groups[chosen], [outside, outside + 1]), return_inverse=True)[1].ravel()
+    found = synchronize_signs(nodes[tails], nodes[heads], weights, int(nodes.max()) + 1)[nodes]
+    signs = np.zeros(n)
+    signs[chosen] = found[:m] * (found[m] if sided else found[m + 1] if given else 1.0)
+    rest = np.flatnonzero(signs == 0)
+    if len(rest):
+        signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
+    return (signs if groups is None else _shared(signs, groups)), sided
+
+
+def _followed(
+    places: NDArray[np.float64], normals: NDArray[np.float64], others: NDArray[np.float64], axes: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Signs of axes at other places that agree with the normals around them."""
+    distances, near = cKDTree(places).query(others, k=min(6, len(places)), workers=-1)
+    distances, near = distances.reshape(len(others), -1), near.reshape(len(others), -1)
+    weights = 1.0 / (distances + 1e-9 * max(float(distances.max()), np.finfo(float).tiny))
+    cosines = np.einsum("nj,nkj->nk", axes, normals[near])
+    return np.where((weights * cosines * np.abs(cosines)).sum(axis=1) >= 0, 1.0, -1.0)
+
+
+def _shared(signs: NDArray[np.float64], groups: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Signs of the majority of each group."""
+    return np.where(np.bincount(groups, signs) >= 0, 1.0, -1.0)[groups]

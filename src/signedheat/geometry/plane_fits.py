@@ -1,0 +1,129 @@
+"""Planes fitted to points on an unknown surface, and how large the neighbourhoods must be for that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from .plane_fit_kernels import robust_planes
+
+CLEAN_NEIGHBORS = 12
+"""Neighbours that a plane is fitted to where there is no noise to average out."""
+NOISY_NEIGHBORS = (24, 48, 96, 192)
+"""Sizes of neighbourhood that noise may call for."""
+CLEAN_DEVIATION = 0.07
+"""Deviation from robust planes, in reaches of neighbourhoods, above which points are noisy: curvature stays below .06,
+thin sheets and edges too, where the points resolve them; noise as wide as the neighbourhood has .09 or more."""
+ANGLE_ERROR = 0.06
+"""Radians by which noise may turn the plane of a noisy neighbourhood, as estimated from its deviation."""
+CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
+"""Heights over the plane through a point, in reaches, beyond which a neighbour belongs to another sheet, one by one."""
+NOISY_HEIGHTS = (0.5, 0.5, 0.5)
+"""The same over planes that move from a noisy point to where its neighbours are densest."""
+_TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
+_CHUNK = 16384
+_TRIED = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneFits:
+    """Planes near points.
+
+    Attributes
+    ----------
+    axes : (n, 3) float
+        Unit normals, up to sign.
+    places : (n, 3) float
+        The points themselves; where they are noisy, their feet on the planes.
+    reaches : (n,) float
+        Distance to the last neighbour used.
+    deviations : (n,) float
+        Root mean square height of the neighbours over the plane, in reaches.
+    n_neighbors : int
+        Size of the neighbourhoods.
+    noisy : bool
+        Whether the points lie around the surface rather than on it.
+    """
+
+    axes: NDArray[np.float64]
+    places: NDArray[np.float64]
+    reaches: NDArray[np.float64]
+    deviations: NDArray[np.float64]
+    n_neighbors: int
+    noisy: bool
+
+
+def fit_planes(points: NDArray[np.float64]) -> PlaneFits:
+    """Fit a plane near each of (n, 3) distinct points, at the scale that their noise calls for.
+
+    Without noise the neighbourhoods are small, and sheets that lie close together, or meet in an edge, are told apart:
+    of several planes that explain the point, the one that explains most neighbours. With noise they are as large as it
+    takes to average it out.
+
+    Examples
+    --------
+    >>> xy = np.random.default_rng(0).random((400, 2))
+    >>> sheets = np.concatenate([np.c_[xy[:200], np.zeros(200)], np.c_[xy[200:], np.full(200, 0.1)]])
+    >>> bool(np.median(np.abs(fit_planes(sheets).axes[:, 2])) > 0.999)
+    True
+    """
+    tree = cKDTree(points)
+    n_neighbors, noisy = neighborhood_size(points, tree)
+    heights, starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)
+    everything = np.arange(len(points))
+    axes, places, reaches, deviations = planes_near(points, tree, everything, n_neighbors, heights, starts)
+    if noisy:
+        places = points - ((points - places) * axes).sum(axis=1, keepdims=True) * axes
+    else:
+        places = points
+    return PlaneFits(axes, places, reaches, deviations, n_neighbors, noisy)
+
+
+def neighborhood_size(points: NDArray[np.float64], tree: cKDTree) -> tuple[int, bool]:
+    """Neighbours from which to fit planes, and whether noise calls for them; told from at most 2,000 of the points."""
+    largest = len(points) - 1
+    if largest <= CLEAN_NEIGHBORS:
+        return largest, False
+    tried = np.arange(0, len(points), -(-len(points) // _TRIED))
+    deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, _TRIAL_HEIGHTS)[3]
+    if np.median(deviations) < CLEAN_DEVIATION:
+        return CLEAN_NEIGHBORS, False
+    sizes = [k for k in NOISY_NEIGHBORS if k <= largest // 4]
+    for k in sizes:
+        deviations = planes_near(points, tree, tried, k, (np.inf,), 1)[3]
+        if 2 * np.median(deviations) < ANGLE_ERROR * k**0.5:
+            return k, True
+    return (sizes[-1] if sizes else CLEAN_NEIGHBORS), bool(sizes)
+
+
+def planes_near(
+    points: NDArray[np.float64],
+    tree: cKDTree,
+    chosen: NDArray[np.int64],
+    n_neighbors: int,
+    heights: tuple[float, ...],
+    n_starts: int = 5,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Axes, centres, reaches and deviations of planes near chosen points."""
+    n = len(chosen)
+    axes, centers, deviations, reaches = np.zeros((n, 3)), points[chosen], np.zeros(n), np.zeros(n)
+    for begin in range(0, n, _CHUNK):
+        part = slice(begin, begin + _CHUNK)
+        distances, neighbors = tree.query(points[chosen[part]], k=n_neighbors + 1, workers=-1)
+        neighbors[:, 0] = chosen[part]
+        robust_planes(
+            points,
+            neighbors,
+            distances,
+            np.array(heights),
+            n_starts > 1,
+            n_starts,
+            axes[part],
+            centers[part],
+            deviations[part],
+        )
+        reaches[part] = distances[:, -1]
+    return axes, centers, reaches, deviations

@@ -1,0 +1,103 @@
+"""Signs from pairs, planes from neighbours, points that stand for many."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from signedheat.geometry.plane_fit_kernels import least_eigenvector
+from signedheat.geometry.plane_fits import CLEAN_NEIGHBORS, fit_planes
+from signedheat.geometry.synchronization import synchronize_signs
+from signedheat.geometry.thinning import spread_out
+
+
+def random_pairs(rng, n, m):
+    tails, heads = rng.integers(n, size=(2, m))
+    return tails, heads, rng.random(m)
+
+
+def agreement(tails, heads, weights, signs):
+    return float((weights * signs[tails] * signs[heads])[tails != heads].sum())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pairs_that_agree_are_all_satisfied(seed):
+    rng = np.random.default_rng(seed)
+    tails, heads, weights = random_pairs(rng, 300, 2000)
+    truth = rng.choice([-1.0, 1.0], 300)
+    signs = synchronize_signs(tails, heads, weights * truth[tails] * truth[heads], 300)
+    apart = tails != heads
+    assert ((signs[tails] * signs[heads]) == (truth[tails] * truth[heads]))[apart].all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_pairs_that_contradict_come_near_the_best(seed):
+    """All 2¹⁰ choices tried; and no single sign gains by turning."""
+    rng = np.random.default_rng(seed)
+    n = 10
+    tails, heads, weights = random_pairs(rng, n, 40)
+    weights *= rng.choice([-1.0, 1.0], 40)
+    signs = synchronize_signs(tails, heads, weights, n)
+    found = agreement(tails, heads, weights, signs)
+    best = max(agreement(tails, heads, weights, np.array(s)) for s in itertools.product([-1.0, 1.0], repeat=n))
+    assert found >= 0.75 * best  # pairs at random contradict each other as much as pairs can
+    for node in range(n):
+        turned = signs.copy()
+        turned[node] *= -1
+        assert agreement(tails, heads, weights, turned) <= found + 1e-12
+
+
+def test_without_pairs_all_signs_are_positive():
+    nothing = np.zeros(0, dtype=np.int64)
+    np.testing.assert_array_equal(synchronize_signs(nothing, nothing, np.zeros(0), 3), np.ones(3))
+
+
+def test_least_eigenvector_is_that_of_lapack():
+    rng = np.random.default_rng(0)
+    axis = np.empty(3)
+    for flatness in (1.0, 1e-2, 1e-5, 0.0):
+        for _ in range(50):
+            frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            m = frame @ np.diag([flatness * 0.5, 1.0, 1.5]) @ frame.T
+            value = least_eigenvector(m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2], axis)
+            assert abs(value - 0.5 * flatness) < 1e-7  # half the digits: a cubic's root by its angle
+            assert abs(axis @ frame[:, 0]) > 1 - 1e-10
+
+
+def test_least_eigenvector_of_a_line_is_across_it():
+    axis = np.empty(3)
+    for line in (np.eye(3)[0], np.eye(3)[1], np.eye(3)[2], np.array([0.6, 0.0, -0.8]), np.array([1.0, 2, 2]) / 3):
+        m = np.outer(line, line)
+        least_eigenvector(m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2], axis)
+        assert np.isclose(np.linalg.norm(axis), 1)
+        assert abs(axis @ line) < 1e-6
+
+
+def test_planes_of_both_sides_of_a_box_are_told_apart():
+    rng = np.random.default_rng(0)
+    points = np.concatenate([np.c_[rng.random((2000, 2)), np.full(2000, z)] for z in (0.0, 0.03)])
+    fits = fit_planes(points)
+    assert not fits.noisy and fits.n_neighbors == CLEAN_NEIGHBORS
+    assert (np.abs(fits.axes[:, 2]) > 0.999).mean() > 0.99
+
+
+def test_noise_asks_for_more_neighbors_and_moves_points_to_the_surface():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(20_000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    clean = fit_planes(points)
+    assert not clean.noisy
+    noisy = fit_planes(points + rng.normal(scale=0.02, size=points.shape))
+    assert noisy.noisy and noisy.n_neighbors > CLEAN_NEIGHBORS
+    assert np.abs(np.linalg.norm(noisy.places, axis=1) - 1).mean() < 0.5 * 0.02
+    assert np.median(np.abs((noisy.axes * points).sum(axis=1))) > np.cos(np.radians(10))
+
+
+def test_points_that_stand_for_others_are_apart_and_leave_none_alone():
+    points = np.random.default_rng(0).random((3000, 3))
+    radii = np.where(points[:, 0] < 0.5, 0.1, 0.05)
+    kept = spread_out(points, radii)
+    gaps = np.linalg.norm(points[:, None] - points[kept], axis=2)
+    assert (gaps <= radii[kept]).any(axis=1).all()
+    earlier = np.tril(np.ones((len(kept), len(kept)), dtype=bool), -1).T
+    assert (gaps[kept].T > radii[kept][:, None])[earlier].all()
