@@ -1,0 +1,356 @@
+"""Which side of a broken surface is inside: the signs of φ where surface is missing, guarded by winding numbers.
+
+φ < 0 alone carries on a shape that is half missing better than anything, and invents solids beside open sheets. Winding
+numbers w do neither. Here both must agree that a node is inside, up to a level of w. Where little is missing the level
+is `LEVEL`. A side that is missing altogether is filled by φ < 0 as far as can be had with no more area than there is of
+faces: *no more is missing than is there*. And a region that faces enclose only in part, while other faces enclose
+nothing, is no solid at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..operators.grid.boundary_areas import boundary_areas, completion_areas
+from ..operators.grid.face_values import values_at
+
+LEVEL = 0.4
+"""Winding number that φ < 0 needs; from 1 less this on, nodes are inside whatever φ says."""
+LEVELS = np.array([0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, LEVEL])
+"""Winding numbers down to which a missing side may be filled."""
+CORES = (0.6, 0.75, 0.9)
+"""Winding numbers of the parts of what is no solid that may be solids of their own."""
+FAR = 1.5
+"""Cells from any face beyond which the zero set is completed."""
+REACH = 1.25
+"""Cells before and behind a face at which its sides are looked up."""
+MISSING_SIDE = 0.2
+"""Completed area, over that of the faces, from which a whole side is missing."""
+BOUNDING = 0.12
+"""Mean winding number of both sides from which a face counts as bounding something: ½ on a solid, 0 on a sheet."""
+FILM = 0.7
+"""Area without faces, over that of the faces, from which a region is a mere film on one side of a sheet."""
+OPEN = 0.55
+"""Completed area, over that of the faces, up to which a region is a solid, if (nearly) all faces bound something."""
+CLOSED = 0.02
+"""The same if many faces bound nothing: then open regions are taken for open."""
+ALL, MANY = 0.95, 0.92
+"""Shares of the area of faces that bound something: nearly all, and less than which many do not."""
+HALF, LESS = 0.58, 0.55
+"""Mean of twice the winding number at the faces, 1 on whole shapes: on half a sphere, .61, and on what encloses less,
+such as three sides of a box, .5."""
+MOST = 5
+"""Parts of the completed surface that are told of."""
+SLOPE = 4.0
+"""Cells that a winding number of one is worth beside φ."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompletedArea:
+    """How much of the zero set stands in for missing surface.
+
+    Attributes
+    ----------
+    area : float
+        Of the zero set farther than 1.5 cells from any face, in squared units of length.
+    share : float
+        The same, over the area of the whole zero set.
+    where : (k, 2, d) float
+        Lower and upper corners of boxes around its largest connected parts, largest first; at most five.
+    """
+
+    area: float
+    share: float
+    where: NDArray[np.float64]
+
+    def __str__(self) -> str:
+        return f"{100 * self.share:.1f} % of the surface is completed, most of it {_between(self.where[0])}"
+
+
+@dataclass(frozen=True)
+class ReachesBox:
+    """The zero set leaves the grid, where it is cut off.
+
+    Attributes
+    ----------
+    share : float
+        Nodes on the walls of the box that are inside, over all.
+    """
+
+    share: float
+
+    def __str__(self) -> str:
+        return f"the surface reaches the walls of the grid, of which {100 * self.share:.1f} % are inside"
+
+
+@dataclass(frozen=True)
+class BoundsNothing:
+    """Faces with the same side on both sides: distance to them is positive all around.
+
+    Attributes
+    ----------
+    share : float
+        Their share of the area.
+    """
+
+    share: float
+
+    def __str__(self) -> str:
+        return f"{100 * self.share:.1f} % of the area bounds nothing: open sheets, of which only the distance is known"
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """What is inside.
+
+    Attributes
+    ----------
+    inside : (*shape) bool
+        Nodes that are inside.
+    function : (*shape) float
+        Negative inside; its zero set, where it is farther than 1.5 cells from any face, is the completed surface.
+    refused : (*shape) bool
+        Nodes beside open sheets: φ and the winding number put them inside, and nothing solid is there.
+    open_sheets : bool
+        Whether many faces bound nothing, so that what is open was taken for open.
+    completed : CompletedArea, optional
+    reaches_box : ReachesBox, optional
+    bounds_nothing : BoundsNothing, optional
+        What there is to tell.
+    """
+
+    inside: NDArray[np.bool_]
+    function: NDArray[np.float64]
+    refused: NDArray[np.bool_]
+    open_sheets: bool = False
+    completed: CompletedArea | None = None
+    reaches_box: ReachesBox | None = None
+    bounds_nothing: BoundsNothing | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """Everything on one grid of three axes, those in front of one node in the plane."""
+
+    phi: NDArray[np.float64]
+    winding: NDArray[np.float64]
+    distance: NDArray[np.floating]
+    steps: NDArray[np.float64]
+    front: NDArray[np.int64]
+    back: NDArray[np.int64]
+    areas: NDArray[np.float64]
+    bounding: NDArray[np.bool_]
+    enclosure: float
+
+    @property
+    def cell(self) -> float:
+        return float(self.steps.max())
+
+    @cached_property
+    def trust(self) -> float:
+        """From 1, where all faces bound something, so that what is open is missing, to 0, where many do not."""
+        total = float(self.areas.sum())
+        share = float(self.areas[self.bounding].sum()) / total if total > 0 else 0.0
+        ramps = (share - MANY) / (ALL - MANY), (self.enclosure - LESS) / (HALF - LESS)
+        return float(np.clip(min(ramps), 0.0, 1.0))
+
+    def guarded(self, level: float, box: tuple[slice, ...] = ()) -> NDArray[np.float64]:
+        """Negative where φ < 0 and w > level, or w > 1 − LEVEL."""
+        worth, winding = SLOPE * self.cell, self.winding[box]
+        result = np.maximum(self.phi[box], worth * (level - winding))
+        return np.minimum(result, worth * (1 - LEVEL - winding), out=result)
+
+
+def choose_sides(
+    phi: NDArray[np.float64],
+    winding: NDArray[np.float64],
+    distance: NDArray[np.floating],
+    positions: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    spacing: NDArray[np.float64],
+    origin: NDArray[np.float64],
+) -> Sides:
+    """Decide which nodes of a grid are inside a broken shape.
+
+    Parameters
+    ----------
+    phi : (*shape) float
+        Generalized signed distance, in units of length.
+    winding : (*shape) float
+        Winding number of the shape, 1 inside, of which no body lies in another.
+    distance : (*shape) float
+        Distance to the faces, right where it is less than two cells.
+    positions, vectors : (s, d) float
+        Samples of the faces: places in cells from the first node, and area times normal in units of length.
+    spacing : (d,) float
+        Distance between nodes along each axis; two or three axes.
+    origin : (d,) float
+        Position of the first node, for reports.
+
+    Returns
+    -------
+    Sides
+
+    Notes
+    -----
+    Regions where φ < 0 and w > .4, or w > .6, are solids if the completed part of their boundary is small beside the
+    faces on it: at most .55 where nearly all faces of the shape bound something, so that what is open must be missing;
+    next to nothing where many faces are open sheets. Other regions are looked at again above w = .6, .75, .9, so that
+    closed legs stay solid below an open board.
+    """
+    shape = (1,) * (3 - phi.ndim) + phi.shape
+    steps = np.ones(3)
+    steps[3 - phi.ndim :] = spacing
+    scene = _scene(phi, winding, distance, positions, vectors, shape, steps)
+    bodies, function, present = _bodies(scene)
+    _fill_missing_sides(scene, bodies, present, function)
+    inside = function < 0
+    sides = inside.ravel()
+    bounding = sides[scene.back] != sides[scene.front]
+    total = float(scene.areas.sum())
+    loose = 1.0 - float(scene.areas[bounding].sum()) / total if total > 0 else 1.0
+    on_walls = np.concatenate([side.ravel() for side in walls(inside.reshape(phi.shape))])
+    return Sides(
+        inside.reshape(phi.shape),
+        function.reshape(phi.shape),
+        ((scene.guarded(LEVEL) < 0) & ~inside).reshape(phi.shape),
+        scene.trust == 0.0,
+        _completed(scene, inside, function, np.asarray(origin)),
+        ReachesBox(float(on_walls.mean())) if on_walls.any() else None,
+        BoundsNothing(loose) if loose > 0.5 else None,
+    )
+
+
+def nothing_inside(shape: tuple[int, ...]) -> Sides:
+    """The sides of a shape that bounds nothing."""
+    nowhere = np.zeros(shape, dtype=bool)
+    return Sides(nowhere, np.ones(shape), nowhere, True, bounds_nothing=BoundsNothing(1.0))
+
+
+def walls(values: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+    """The layers of nodes on the walls of a box."""
+    return [np.moveaxis(values, axis, 0)[end] for axis in range(values.ndim) for end in (0, -1)]
+
+
+def _scene(
+    phi: NDArray[np.float64],
+    winding: NDArray[np.float64],
+    distance: NDArray[np.floating],
+    positions: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    shape: tuple[int, ...],
+    steps: NDArray[np.float64],
+) -> _Scene:
+    """Nodes before and behind every sample, and everything with three axes."""
+    dimension = positions.shape[1]
+    areas = np.linalg.norm(vectors, axis=1)
+    spacing = steps[3 - dimension :]
+    away = vectors / np.where(areas > 0, areas, 1)[:, None] * (REACH * steps.max()) / spacing
+    front, back = (
+        np.ravel_multi_index(tuple(np.clip(np.rint(at).astype(np.int64), 0, np.array(phi.shape) - 1).T), phi.shape)
+        for at in (positions + away, positions - away)
+    )
+    three = phi.reshape(shape), np.ascontiguousarray(winding).reshape(shape), distance.reshape(shape)
+    places = np.zeros((len(positions), 3))
+    places[:, 3 - dimension :] = positions
+    at_faces = values_at(three[1], places)
+    enclosure = 2 * float(np.average(np.clip(at_faces, 0.0, 0.5), weights=areas)) if areas.any() else 0.0
+    bounding = at_faces > BOUNDING
+    scene = _Scene(*three, steps, front, back, areas, bounding, enclosure)
+    sides = scene.guarded(LEVEL).ravel() < 0
+    return replace(scene, bounding=bounding | (sides[back] & ~sides[front]))
+
+
+def _bodies(scene: _Scene) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
+    """Labels of the solids, a function that is negative in them alone, and the area of the faces on each."""
+    from scipy.ndimage import label
+
+    function = scene.guarded(LEVEL)
+    candidates = function
+    bodies = np.zeros(function.shape, dtype=np.int32)
+    present = np.zeros(1)
+    trust = scene.trust
+    for core in (*CORES, None):
+        labels, n = label(candidates < 0, output=np.int32)
+        faces = _faces_on(scene, labels, n)
+        total, completed = boundary_areas(labels, candidates, scene.distance, scene.steps, FAR * scene.cell)
+        solid = (total - faces <= FILM * faces) & (completed <= (CLOSED + (OPEN - CLOSED) * trust) * faces)
+        solid[0] = False
+        bodies += np.where(solid, len(present) - 1 + np.cumsum(solid), 0).astype(np.int32)[labels]
+        present = np.concatenate([present, faces[solid]])
+        doubtful = ~solid[labels] & (labels > 0)
+        if not doubtful.any():
+            break
+        if core is None:
+            np.abs(function, out=function, where=doubtful)
+            break
+        candidates = np.where(doubtful, SLOPE * scene.cell * (core - scene.winding), SLOPE * scene.cell)
+        np.copyto(function, candidates, where=doubtful)
+    return bodies, function, present
+
+
+def _faces_on(scene: _Scene, labels: NDArray[np.int32], n: int) -> NDArray[np.float64]:
+    """(n + 1,) area of the faces that have a region behind and not before them."""
+    behind, before = labels.ravel()[scene.back], labels.ravel()[scene.front]
+    result = np.bincount(behind, np.where(behind != before, scene.areas, 0.0), minlength=n + 1)
+    result[0] = 0.0
+    return result.astype(np.float64)
+
+
+def _fill_missing_sides(
+    scene: _Scene, bodies: NDArray[np.int32], present: NDArray[np.float64], function: NDArray[np.float64]
+) -> None:
+    """Extend the function where a whole side of a solid is missing."""
+    from scipy.ndimage import binary_dilation, find_objects, label
+
+    fillable = (scene.phi < 0) & (bodies == 0) & (scene.winding < LEVEL) & (scene.distance > scene.cell)
+    holes, n = label(fillable, output=np.int32)
+    if n == 0 or len(present) == 1:
+        return
+    areas, owners = completion_areas(
+        holes, bodies, present, scene.phi, scene.winding, scene.distance, scene.steps, FAR * scene.cell, LEVELS
+    )
+    budget = present * scene.trust
+    large = (owners > 0) & (areas[:, 0] > MISSING_SIDE * present[owners])
+    boxes = find_objects(holes)
+    for body in np.unique(owners[large]):
+        own = np.flatnonzero(large & (owners == body))
+        affordable = np.flatnonzero(areas[own].sum(axis=0) <= budget[body])
+        if not len(affordable):
+            continue
+        level = LEVELS[affordable[0]]
+        for hole in own:
+            box = tuple(slice(max(0, part.start - 2), part.stop + 2) for part in boxes[hole - 1])
+            near = binary_dilation(holes[box] == hole, np.ones((3, 3, 3)), iterations=2)
+            refused = (scene.guarded(LEVEL, box) < 0) & (function[box] >= 0)
+            np.copyto(function[box], scene.guarded(level, box), where=near & ~refused)
+
+
+def _completed(
+    scene: _Scene, inside: NDArray[np.bool_], function: NDArray[np.float64], origin: NDArray[np.float64]
+) -> CompletedArea | None:
+    """What of the zero set is farther than `FAR` cells from any face."""
+    from scipy.ndimage import binary_erosion, find_objects, label
+
+    far = FAR * scene.cell
+    total, completed = boundary_areas(inside.astype(np.int32), function, scene.distance, scene.steps, far)
+    if completed.sum() == 0:
+        return None
+    rim = inside & ~binary_erosion(inside, border_value=1) & (scene.distance > far)
+    patches, _ = label(rim, np.ones((3, 3, 3)), output=np.int32)
+    areas = np.bincount(patches.ravel())[1:]
+    boxes = find_objects(patches)
+    largest = np.argsort(-areas, kind="stable")[:MOST]
+    where = np.array([[[part.start, part.stop - 1] for part in boxes[k]] for k in largest], dtype=float)
+    where = where.reshape(-1, 3, 2).transpose(0, 2, 1)[..., 3 - len(origin) :]
+    where = origin + where * scene.steps[3 - len(origin) :]
+    return CompletedArea(float(completed.sum()), float(completed.sum() / total.sum()), where)
+
+
+def _between(box: NDArray[np.float64]) -> str:
+    lower, upper = ("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in box)
+    return f"between {lower} and {upper}"

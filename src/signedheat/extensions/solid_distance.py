@@ -1,0 +1,301 @@
+"""What people get by default: distance that is exact where the shape is there, and completed where it is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..constraints import ZeroSet
+from ..discretization import Diagnostics, discretize
+from ..domains.grid import Grid
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.tet_mesh import TetMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import positive_number
+from ..errors import CancellingNormalsError, SourceError
+from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
+from ..lowering.area_elements import AreaSamples, extent, sample_on_grid
+from ..lowering.grid.source import GridSource
+from ..method import diffuse, integrate, normalize
+from ..operators.grid.boundary_areas import distances_to_samples
+from ..operators.grid.face_values import values_at
+from ..progress import Progress, Stopwatch
+from ..solver import SignedHeatSolver, as_list
+from .orientation import orientation
+from .shape_sharpening import Assembled, Fit, assemble, triangles_of
+from .sharpening import sharpen
+from .sides import FAR, Sides, choose_sides, nothing_inside
+from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
+
+Mesh = TriangleMesh | PolygonMesh
+Shape = Mesh | PointCloud
+
+STEPS = 7
+"""Steps that are timed."""
+BOUNDING = 0.22
+"""Mean winding number of a face's two sides from which it tells inside from outside: 0 on a sheet, ½ on a solid, ¼ on
+one half a cell thick."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Which steps of `solid_distance` are taken.
+
+    Attributes
+    ----------
+    orient, unite, sharpen : bool
+        Turn faces that face the wrong way; leave out what lies inside other bodies; measure to the shape itself.
+    """
+
+    orient: bool = True
+    unite: bool = True
+    sharpen: bool = True
+
+
+@overload
+def solid_distance(
+    shape: Shape | Sequence[Mesh],
+    domain: Grid | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    plain: bool = False,
+    progress: Progress | None = None,
+) -> GridField: ...
+@overload
+def solid_distance(
+    shape: Shape | Sequence[Mesh],
+    domain: TetMesh,
+    *,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    plain: bool = False,
+    progress: Progress | None = None,
+) -> TetField: ...
+def solid_distance(
+    shape: Shape | Sequence[Mesh],
+    domain: Grid | TetMesh | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    plain: bool = False,
+    progress: Progress | None = None,
+) -> GridField | TetField:
+    """Signed distance to a solid: to the shape where it is there, to what completes it where surface is missing.
+
+    Orient the shape, unite its bodies, compute its generalized signed distance φ, decide what is inside, and measure
+    distance anew: to the faces, exactly, and to those parts of the completed surface that stand in for what is missing.
+    Around open sheets that bound nothing distance is positive on both sides.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh or PointCloud with normals; or several meshes
+        Broken or not.
+    domain : Grid or TetMesh, optional
+        Where to measure; by default a grid of cubic cells around the shape.
+    resolution : int
+        Nodes along the longest side of that grid.
+    spacing : float or (3,) float, optional
+        Distance between its nodes, in place of `resolution`.
+    padding : float, optional
+        Room around the shape, in its units; by default a fifth of its longest side.
+    diffusion : float
+        τ in ``t = τ h²``.
+    as_oriented : bool
+        Take faces as they are, whichever way they face.
+    keep_overlaps : bool
+        Count what lies inside other bodies as surface.
+    plain : bool
+        Return φ as the method gives it: no distance to the shape itself, no choice of sides.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; what it raises cancels.
+
+    Returns
+    -------
+    GridField or TetField
+        φ < 0 inside. ``diagnostics.notes`` holds, each where there is something to tell: `orientation`
+        (`OrientationReport`), `left_out` (`LeftOut`), `completed_area` (`CompletedArea`), `reaches_box`
+        (`ReachesBox`) and `bounds_nothing` (`BoundsNothing`).
+
+    Raises
+    ------
+    SourceError
+        If the shape cannot be a source, for instance points without normals, or does not fit the domain.
+    GeometryError
+        If resolution, spacing or padding make no grid.
+    MemoryLimitError
+        If the grid cannot fit in memory; nothing has been allocated then.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> ball, other = samples.sphere(3), samples.sphere(3, center=(1.0, 0, 0))
+    >>> field = solid_distance(samples.union(ball, other), resolution=32)
+    >>> bool(np.abs(field([[0.5, 0, 0]]) + np.sqrt(0.75)) < 0.05)
+    True
+    """
+    solid = _joined(shape)
+    if domain is None:
+        bounds = extent(solid)
+        domain = Grid.around(bounds, resolution, padding, spacing)
+    steps = Steps(not as_oriented, not keep_overlaps, not plain)
+    diffusion = positive_number(diffusion, "diffusion")
+    if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
+        return _on_grid(solid, domain, steps, diffusion, progress)
+    return _elsewhere(solid, domain, steps, diffusion, progress)
+
+
+def _joined(shape: Shape | Sequence[Mesh]) -> Shape:
+    """One shape of several meshes."""
+    if not isinstance(shape, Sequence):
+        return shape
+    shapes = as_list(shape)
+    if len(shapes) == 1:
+        return shapes[0]  # type: ignore[no-any-return]  # sources are of any kind there
+    for index, each in enumerate(shapes):
+        if not isinstance(each, TriangleMesh | PolygonMesh):
+            raise SourceError(f"several meshes make one solid, and shape {index} is a {type(each).__name__}")
+    meshes = [each.triangulation for each in shapes]
+    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def _oriented(shape: Shape, notes: dict[str, object]) -> Merged:
+    """The shape as `orient` leaves it, which knows its duplicates; points keep the normals that they have."""
+    if isinstance(shape, PointCloud):
+        return merge_duplicates(shape)
+    found = orientation(shape)
+    notes["orientation"] = found.summary
+    return Merged(found.shape, found.walls, 0)
+
+
+def _elsewhere(
+    shape: Shape, domain: Grid | TetMesh, steps: Steps, diffusion: float, progress: Progress | None
+) -> GridField | TetField:
+    """On tets, and on grids with solid nodes: the method, and distance to φ's own zero set where that can be."""
+    notes: dict[str, object] = {}
+    if steps.orient:
+        shape = _oriented(shape, notes).shape
+    if steps.unite and not isinstance(domain, Grid):
+        united = union_of(shape)
+        shape, notes["left_out"] = united.shape, united.left_out
+    field = SignedHeatSolver(domain, diffusion, progress).distance(shape)
+    if steps.sharpen and not (isinstance(domain, Grid) and domain.mask is not None):
+        field = sharpen(field)
+    return replace(field, diagnostics=replace(field.diagnostics, notes={**field.diagnostics.notes, **notes}))
+
+
+def _on_grid(shape: Shape, grid: Grid, steps: Steps, diffusion: float, progress: Progress | None) -> GridField:
+    """Each step, timed, on a grid in space."""
+    notes: dict[str, object] = {}
+    stopwatch = Stopwatch(progress, STEPS)
+    discretization = discretize(grid)  # refuses what cannot fit
+    with stopwatch("orient"):
+        merged = _oriented(shape, notes) if steps.orient else merge_duplicates(shape)
+    with stopwatch("unite"):
+        shape, samples, winding = _united(merged, grid, steps, notes)
+    if samples is None:  # doubled walls alone: there is no φ
+        phi, time = None, float("nan")
+    else:
+        source = GridSource(samples, grid, diffusion)
+        with stopwatch("diffuse"):
+            vectors = diffuse(discretization, source)
+        with stopwatch("normalize"):
+            directions = normalize(discretization, vectors)
+            del vectors
+        with stopwatch("integrate"):
+            phi, time = integrate(discretization, directions, source, ZeroSet()), source.time
+            del directions
+    if not steps.sharpen and phi is not None:
+        return GridField(grid, phi, _diagnostics(notes, stopwatch, time))
+    with stopwatch("sides"):
+        sides = _sides(phi, winding, samples, grid)
+    with stopwatch("sharpen"):
+        sharpened = _sharpened(shape, phi, sides, winding, grid)
+    told = {
+        "completed_area": sides.completed,
+        "reaches_box": sides.reaches_box,
+        "bounds_nothing": sides.bounds_nothing,
+    }
+    notes.update({name: note for name, note in told.items() if note is not None})
+    diagnostics = _diagnostics(notes, stopwatch, time)
+    return GridField(grid, sharpened.values, diagnostics, sharpened.confidence, sharpened.surface)
+
+
+def _diagnostics(notes: dict[str, object], stopwatch: Stopwatch, time: float) -> Diagnostics:
+    return Diagnostics(timings=dict(stopwatch.seconds), time=time, notes=notes)
+
+
+def _sharpened(
+    shape: Shape, phi: NDArray[np.float64] | None, sides: Sides, winding: NDArray[np.float64], grid: Grid
+) -> Assembled:
+    """Distance to the shape; faces beside which nothing is solid do not tell sides."""
+    refused = _widened(sides.refused)
+    upper = np.array(grid.shape) - 1
+
+    def tells(feet: NDArray[np.float64]) -> NDArray[np.bool_]:
+        nodes = tuple(np.clip(np.rint(feet).astype(np.int64), 0, upper).T)
+        return np.logical_and(values_at(winding, feet) > BOUNDING, ~refused[nodes])
+
+    if phi is not None and refused.any():
+        phi = np.where(refused, sides.function, phi)
+    fit: Fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
+    return assemble(*triangles_of(shape), grid, sides.function, fit, phi, tells)
+
+
+def _widened(nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Nodes and the two layers around them."""
+    from scipy.ndimage import binary_dilation
+
+    return binary_dilation(nodes, iterations=2) if nodes.any() else nodes
+
+
+def _united(
+    merged: Merged, grid: Grid, steps: Steps, notes: dict[str, object]
+) -> tuple[Shape, AreaSamples | None, NDArray[np.float64]]:
+    """The shape, its samples and its winding numbers, without what lies inside other bodies."""
+    samples, winding = _wound(merged.shape, grid)
+    if not steps.unite:
+        return merged.shape, samples, winding
+    united = without_covered(merged, winding, grid)
+    if united.left_out.merged_faces or united.left_out.covered_faces:
+        notes["left_out"] = united.left_out
+    if united.shape is merged.shape:
+        return merged.shape, samples, winding
+    return united.shape, *_wound(united.shape, grid)
+
+
+def _wound(shape: Shape, grid: Grid) -> tuple[AreaSamples | None, NDArray[np.float64]]:
+    """Samples of a shape and its winding numbers; none and zeros where all its normals cancel."""
+    try:
+        samples = sample_on_grid([shape], grid, SAMPLE_SIZE)
+    except CancellingNormalsError:
+        return None, np.zeros(grid.shape)
+    return samples, winding_of(samples, grid)
+
+
+def _sides(
+    phi: NDArray[np.float64] | None, winding: NDArray[np.float64], samples: AreaSamples | None, grid: Grid
+) -> Sides:
+    if phi is None or samples is None:
+        return nothing_inside(grid.shape)
+    reach = (FAR + 1) * float(grid.spacing.max())
+    shape = (grid.shape[0], grid.shape[1], grid.shape[2])
+    distance = distances_to_samples(samples.positions, samples.vectors, shape, grid.spacing, reach)
+    return choose_sides(phi, winding, distance, samples.positions, samples.vectors, grid.spacing, grid.origin)

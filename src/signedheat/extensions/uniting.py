@@ -1,0 +1,292 @@
+"""Bodies that overlap become one: what lies inside other bodies is left out (winding numbers on a grid tell)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.grid import Grid
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import CancellingNormalsError, SourceError
+from ..geometry.components import same_positions
+from ..geometry.edges import edge_table
+from ..geometry.refining import split_at_edges
+from ..lowering.area_elements import AreaSamples, grid_around, sample_on_grid
+from ..operators.grid.face_values import ranges_on_faces, values_at
+from ..operators.grid.winding import winding_numbers
+
+Shape = TriangleMesh | PolygonMesh | PointCloud
+
+COVERED = 1.1
+"""Mean of the winding numbers on both sides of a face from which it lies inside another body.
+
+It is ½ on the boundary of the union, 1½ on a body's face inside another one, 1 where two bodies touch: that stays, and
+so do the sides of a gap, however narrow.
+"""
+BURIED = 0.75
+"""The same for a doubled wall, of which both sides see the same."""
+OVERLAP = 1.5
+"""Winding number from which bodies overlap at a node."""
+NEAR = 2
+"""Cells around overlaps in which faces are looked at."""
+SAMPLE_SIZE = 1.0
+"""Longest edge, in cells, of the pieces into which faces are cut to take winding numbers."""
+ROUNDS = 40
+"""How often faces are halved at most."""
+MARGIN = 0.02
+"""Share of an edge that a cut keeps from its ends."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """What a union has left out.
+
+    Attributes
+    ----------
+    covered_faces : int
+        Faces, or points, that lie inside other bodies, wholly or in part.
+    covered_area : float
+        Their share of the area, as far as they do.
+    cut_faces : int
+        Those that lie inside in part, and were cut.
+    merged_faces : int
+        Duplicates.
+    doubled_walls : int
+        Faces that are there twice, once facing each way; they stay, unless they lie inside a body.
+    """
+
+    covered_faces: int = 0
+    covered_area: float = 0.0
+    cut_faces: int = 0
+    merged_faces: int = 0
+    doubled_walls: int = 0
+
+    def __str__(self) -> str:
+        return (
+            f"left out {self.covered_faces} faces, {100 * self.covered_area:.1f} % of the area, that lie inside other "
+            f"bodies ({self.cut_faces} of them in part), and {self.merged_faces} duplicates"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Union:
+    """A shape without what lies inside other bodies of it.
+
+    Attributes
+    ----------
+    shape : TriangleMesh, PolygonMesh or PointCloud
+        What is left; the shape itself where nothing was left out, or else triangles, or points.
+    left_out : LeftOut
+        What is not.
+    """
+
+    shape: Shape
+    left_out: LeftOut
+
+
+@dataclass(frozen=True, eq=False)
+class Merged:
+    """A shape without duplicates.
+
+    Attributes
+    ----------
+    shape : TriangleMesh, PolygonMesh or PointCloud
+        The shape itself where there were none.
+    walls : (m,) bool
+        Faces of doubled walls.
+    count : int
+        Duplicates left out.
+    """
+
+    shape: Shape
+    walls: NDArray[np.bool_]
+    count: int
+
+
+def unite(shape: Shape, domain: Grid | None = None, *, resolution: int = 128) -> Shape:
+    """A shape whose bodies overlap, without what lies inside others: the boundary of their union.
+
+    Walls of cavities, which face into them, stay. Faces that are partly inside are cut where they enter, to a fraction
+    of a cell; all others are left as they are. Duplicates count once.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh or PointCloud with normals
+        A shape whose faces or normals point outwards (see `orient`), whole or broken.
+    domain : Grid, optional
+        On which winding numbers are taken; by default a grid around the shape.
+    resolution : int
+        Nodes along the longest side of that default grid.
+
+    Returns
+    -------
+    TriangleMesh, PolygonMesh or PointCloud
+        The shape itself where nothing is left out. `union_of` also tells what was.
+
+    Raises
+    ------
+    SourceError
+        If the shape is of another kind, or is missed by the grid.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> ball, other = samples.sphere(3), samples.sphere(3, center=(1.0, 0, 0))
+    >>> united = unite(samples.union(ball, other), resolution=48)
+    >>> bool(abs(united.face_areas.sum() - 6 * np.pi) < 0.15)
+    True
+    """
+    return union_of(shape, domain, resolution=resolution).shape
+
+
+def union_of(shape: Shape, domain: Grid | None = None, *, resolution: int = 128) -> Union:
+    """What `unite` gives, and what was left out for it; see there for parameters and errors."""
+    grid = grid_around([shape], resolution) if domain is None else domain
+    merged = merge_duplicates(shape)
+    try:
+        samples = sample_on_grid([merged.shape], grid, SAMPLE_SIZE)
+    except CancellingNormalsError:
+        return without_covered(merged, np.zeros(grid.shape), grid)
+    return without_covered(merged, winding_of(samples, grid), grid)
+
+
+def winding_of(samples: AreaSamples, grid: Grid) -> NDArray[np.float64]:
+    """(*grid.shape) winding numbers of a sampled shape."""
+    return winding_numbers(samples.nodes, grid.shape, samples.positions, samples.vectors)
+
+
+def merge_duplicates(shape: Shape) -> Merged:
+    """Faces on the same corners as others count once, or, if they face both ways, once each way.
+
+    Raises
+    ------
+    SourceError
+        If the shape is neither a mesh nor a point cloud.
+    """
+    if isinstance(shape, PointCloud):
+        return Merged(shape, np.zeros(shape.n_points, dtype=bool), 0)
+    if isinstance(shape, PolygonMesh):
+        return Merged(shape, np.zeros(shape.n_polygons, dtype=bool), 0)
+    if not isinstance(shape, TriangleMesh):
+        raise SourceError(
+            f"bodies of a TriangleMesh, PolygonMesh or PointCloud are united, not of a {type(shape).__name__}"
+        )
+    corners = same_positions(shape.vertices)[shape.faces]
+    first = corners.argmin(axis=1)
+    rows = np.arange(len(corners))
+    ahead, behind = corners[rows, (first + 1) % 3], corners[rows, (first + 2) % 3]
+    triples = np.stack([corners[rows, first], np.minimum(ahead, behind), np.maximum(ahead, behind)], axis=1)
+    _, group, counts = np.unique(triples, axis=0, return_inverse=True, return_counts=True)
+    group = group.ravel()
+    if (counts == 1).all():
+        return Merged(shape, np.zeros(len(corners), dtype=bool), 0)
+    way = np.where(ahead < behind, 1, -1)
+    excess = np.bincount(group, way)
+    first_ahead, first_back = (
+        np.isin(rows, np.unique(np.where(way == sign, group, -1), return_index=True)[1]) & (way == sign)
+        for sign in (1, -1)
+    )
+    walls = (excess[group] == 0) & (first_ahead | first_back)
+    kept = walls | (first_ahead & (excess[group] > 0)) | (first_back & (excess[group] < 0))
+    mesh = shape if kept.all() else TriangleMesh(shape.vertices, shape.faces[kept])
+    return Merged(mesh, walls[kept], int((~kept).sum()))
+
+
+def without_covered(merged: Merged, winding: NDArray[np.float64], grid: Grid) -> Union:
+    """Leave out what lies inside other bodies, as winding numbers tell.
+
+    Parameters
+    ----------
+    merged : Merged
+        The shape.
+    winding : (*grid.shape) float
+        Its winding numbers.
+    grid : Grid
+        Three axes.
+    """
+    from scipy.ndimage import binary_dilation
+
+    shape, walls = merged.shape, int(merged.walls.sum()) // 2
+    overlap = winding > OVERLAP
+    buried = merged.walls.any() and bool((winding > BURIED).any())
+    if not (overlap.any() or buried):
+        return Union(shape, LeftOut(merged_faces=merged.count, doubled_walls=walls))
+    near = binary_dilation(overlap, np.ones((3,) * winding.ndim), iterations=NEAR)
+    depth = np.where(near, winding, np.minimum(winding, 1.0))
+    if isinstance(shape, PointCloud):
+        covered = values_at(depth, (shape.points - grid.origin) / grid.spacing) > COVERED
+        return _points_left(shape, covered)
+    mesh = shape.triangulation
+    flags = merged.walls if mesh is shape else np.zeros(mesh.n_faces, dtype=bool)
+    return _faces_left(merged, mesh, flags, depth, grid)
+
+
+def _points_left(cloud: PointCloud, covered: NDArray[np.bool_]) -> Union:
+    if not covered.any():
+        return Union(cloud, LeftOut())
+    normals, areas = (None if each is None else each[~covered] for each in (cloud.normals, cloud.areas))
+    share = float(covered.mean() if cloud.areas is None else cloud.areas[covered].sum() / cloud.areas.sum())
+    left = PointCloud(cloud.points[~covered], normals, areas, cloud.n_neighbors)
+    return Union(left, LeftOut(int(covered.sum()), share))
+
+
+def _faces_left(
+    merged: Merged, mesh: TriangleMesh, walls: NDArray[np.bool_], depth: NDArray[np.float64], grid: Grid
+) -> Union:
+    """Faces of a mesh that are not covered, cut where they are in part."""
+    duplicates = LeftOut(merged_faces=merged.count, doubled_walls=int(walls.sum()) // 2)
+    vertices, faces, origins, covered = _cut_where_covered(mesh, walls, depth, grid)
+    if not covered.any() or covered.all():  # of bodies that bury each other nothing would be left
+        return Union(merged.shape, duplicates)
+    left_out, kept = np.zeros(mesh.n_faces, dtype=bool), np.zeros(mesh.n_faces, dtype=bool)
+    left_out[origins[covered]] = True
+    kept[origins[~covered]] = True
+    result = TriangleMesh(vertices, faces[~covered])
+    share = 1.0 - float(result.face_areas.sum() / mesh.face_areas.sum())
+    in_part = int((left_out & kept).sum())
+    told = replace(duplicates, covered_faces=int(left_out.sum()), covered_area=share, cut_faces=in_part)
+    return Union(result, told)
+
+
+def _cut_where_covered(
+    mesh: TriangleMesh, walls: NDArray[np.bool_], depth: NDArray[np.float64], grid: Grid
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Vertices, faces, the face of the mesh that each is part of, and whether it is covered."""
+    vertices, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
+    origins = np.arange(len(faces))
+
+    def in_cells(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (points - grid.origin) / grid.spacing
+
+    low, high = ranges_on_faces(depth, in_cells(vertices[faces]))
+    covered = np.where(walls, high > BURIED, low > COVERED)
+    partly = ~walls & (low <= COVERED) & (high > COVERED)
+    for _ in range(ROUNDS):
+        table = edge_table(faces)
+        ends = in_cells(vertices[table.vertices])
+        long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > 1.0
+        split = np.zeros(len(long), dtype=bool)
+        split[table.face_edges[partly]] = True
+        split &= long
+        if not split.any():
+            break
+        vertices, faces, parents = split_at_edges(vertices, faces, split, np.full(len(split), 0.5))
+        origins, covered, partly = origins[parents], covered[parents], partly[parents]
+        low, high = ranges_on_faces(depth, in_cells(vertices[faces[partly]]))
+        covered[partly] = low > COVERED
+        partly[partly] = (low <= COVERED) & (high > COVERED)
+    table = edge_table(faces)
+    height = values_at(depth, in_cells(vertices)) - COVERED
+    a, b = height[table.vertices].T
+    cut = np.zeros(len(table.vertices), dtype=bool)
+    cut[table.face_edges[partly]] = True
+    cut &= (a > 0) != (b > 0)
+    shares = np.clip(a / np.where(cut, a - b, 1.0), MARGIN, 1 - MARGIN)
+    vertices, faces, parents = split_at_edges(vertices, faces, cut, shares)
+    height = np.concatenate([height, np.zeros(len(vertices) - len(height))])
+    covered = np.where(partly[parents], height[faces].sum(axis=1) > 0, covered[parents])
+    return vertices, faces, origins[parents], covered

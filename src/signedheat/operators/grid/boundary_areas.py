@@ -1,0 +1,247 @@
+"""Kernels: how much area the boundary of a region of a grid has, and how much of it lies far from any face.
+
+Crossed edges of a level set along axis a are ``|n_a| / (area per edge)`` to the unit of area, n the unit normal; summed
+over the axes, ``|n_a|`` times that area, once more weighted by ``|n_a|``, gives the area without bias. Grids have three
+axes, those in front of one node in fewer dimensions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import compiled
+
+DISK = 0.6
+"""Radius, in cells, of the disk that a sample stands for."""
+TOUCH = 3
+"""Nodes between a hole and a body that still touch."""
+
+
+def boundary_areas(
+    labels: NDArray[np.int32],
+    function: NDArray[np.float64],
+    distance: NDArray[np.floating],
+    steps: NDArray[np.float64],
+    far: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Area of the boundary of each region, and how much of it is farther than `far` from any face.
+
+    Parameters
+    ----------
+    labels : (n₀, n₁, n₂) int32
+        Region of each node, from 1; 0 outside all.
+    function : (n₀, n₁, n₂) float
+        Smooth function whose level set the boundaries are.
+    distance : (n₀, n₁, n₂) float
+        Distance to the faces.
+    steps : (3,) float
+        Spacing, in units of length; anything along axes of one node.
+    far : float
+        The least distance of what was completed. Where regions reach the walls of the box, these count as completed.
+
+    Returns
+    -------
+    total, completed : (l + 1,) float
+        By label.
+    """
+    return _boundary_areas(labels, function, distance, steps, far, int(labels.max(initial=0)) + 1)
+
+
+def completion_areas(
+    holes: NDArray[np.int32],
+    bodies: NDArray[np.int32],
+    present: NDArray[np.float64],
+    phi: NDArray[np.float64],
+    winding: NDArray[np.float64],
+    distance: NDArray[np.floating],
+    steps: NDArray[np.float64],
+    far: float,
+    levels: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Area that closes bodies across each hole, if what lies beyond is filled down to a level of the winding number.
+
+    Parameters
+    ----------
+    holes, bodies : (n₀, n₁, n₂) int32
+        Labels of what may be filled, where φ < 0, and of what is inside anyhow; 0 elsewhere.
+    present : (b + 1,) float
+        Area of faces by body; of several that a hole touches, it belongs to the one with most.
+    phi, winding, distance : (n₀, n₁, n₂) float
+        What decides, and the distance to the faces.
+    levels : (l,) float
+        Levels of the winding number, ascending.
+
+    Returns
+    -------
+    areas : (h + 1, l) float
+        By hole and level.
+    owners : (h + 1,) int
+        Body that each hole belongs to, 0 for none.
+    """
+    n_holes = int(holes.max(initial=0)) + 1
+    changes, owners = _completion_areas(holes, bodies, present, phi, winding, distance, steps, far, levels, n_holes)
+    return np.cumsum(changes, axis=1)[:, : len(levels)], owners
+
+
+@compiled(nogil=True)
+def _slope(field, i, j, k, axis, steps):
+    """Difference of a grid function along an axis, one-sided at the walls."""
+    n = field.shape[axis]
+    if n == 1:
+        return 0.0
+    at = (i, j, k)[axis]
+    low, high = max(at - 1, 0), min(at + 1, n - 1)
+    if axis == 0:
+        rise = field[high, j, k] - field[low, j, k]
+    elif axis == 1:
+        rise = field[i, high, k] - field[i, low, k]
+    else:
+        rise = field[i, j, high] - field[i, j, low]
+    return rise / ((high - low) * steps[axis])
+
+
+@compiled(nogil=True)
+def _edge_area(field, i, j, k, a, b, c, axis, steps):
+    """Area that one crossed edge, between two nodes along an axis, stands for."""
+    across, square = 0.0, 0.0
+    volume = 1.0
+    for d in range(3):
+        slope = _slope(field, i, j, k, d, steps) + _slope(field, a, b, c, d, steps)
+        square += slope * slope
+        if d == axis:
+            across = abs(slope)
+        if field.shape[d] > 1:
+            volume *= steps[d]
+    return volume / steps[axis] * (across / np.sqrt(square) if square > 0.0 else 1.0)
+
+
+@compiled(nogil=True)
+def _wall_area(shape, i, j, k, steps):
+    """Area of the walls of the box around a node."""
+    result, volume = 0.0, 1.0
+    for d in range(3):
+        if shape[d] > 1:
+            volume *= steps[d]
+    for d in range(3):
+        at = (i, j, k)[d]
+        if shape[d] > 1 and (at == 0 or at == shape[d] - 1):
+            result += volume / steps[d]
+    return result
+
+
+@compiled(nogil=True)
+def _boundary_areas(labels, function, distance, steps, far, n_labels):
+    n0, n1, n2 = labels.shape
+    total, completed = np.zeros(n_labels), np.zeros(n_labels)
+    for i in range(n0):
+        for j in range(n1):
+            for k in range(n2):
+                label = labels[i, j, k]
+                if label == 0:
+                    continue
+                if i == 0 or j == 0 or k == 0 or i == n0 - 1 or j == n1 - 1 or k == n2 - 1:
+                    wall = _wall_area(labels.shape, i, j, k, steps)
+                    total[label] += wall
+                    completed[label] += wall
+                for axis in range(3):
+                    for side in range(-1, 2, 2):
+                        a, b, c = i + side * (axis == 0), j + side * (axis == 1), k + side * (axis == 2)
+                        if a < 0 or b < 0 or c < 0 or a >= n0 or b >= n1 or c >= n2 or labels[a, b, c] != 0:
+                            continue
+                        area = _edge_area(function, i, j, k, a, b, c, axis, steps)
+                        total[label] += area
+                        if 0.5 * (distance[i, j, k] + distance[a, b, c]) > far:
+                            completed[label] += area
+    return total, completed
+
+
+@compiled(nogil=True)
+def _completion_areas(holes, bodies, present, phi, winding, distance, steps, far, levels, n_holes):
+    """Each edge between two nodes is crossed at all levels at which one is filled and the other is not."""
+    n0, n1, n2 = holes.shape
+    changes = np.zeros((n_holes, len(levels) + 1))
+    owners = np.zeros(n_holes, dtype=np.int64)
+    for i in range(n0):
+        for j in range(n1):
+            for k in range(n2):
+                hole = holes[i, j, k]
+                if hole == 0:
+                    continue
+                here = np.searchsorted(levels, winding[i, j, k])  # filled at the levels before this
+                if i == 0 or j == 0 or k == 0 or i == n0 - 1 or j == n1 - 1 or k == n2 - 1:
+                    wall = _wall_area(holes.shape, i, j, k, steps)
+                    changes[hole, 0] += wall
+                    changes[hole, here] -= wall
+                for axis in range(3):
+                    for side in range(-1, 2, 2):
+                        a, b, c = i + side * (axis == 0), j + side * (axis == 1), k + side * (axis == 2)
+                        if a < 0 or b < 0 or c < 0 or a >= n0 or b >= n1 or c >= n2:
+                            continue
+                        body = bodies[a, b, c]
+                        for more in range(1, TOUCH + 1):  # between thin walls, nothing but what is near faces is there
+                            p, q, r = i + more * (a - i), j + more * (b - j), k + more * (c - k)
+                            if p < 0 or q < 0 or r < 0 or p >= n0 or q >= n1 or r >= n2 or phi[p, q, r] >= 0.0:
+                                break
+                            touched = bodies[p, q, r]
+                            if touched > 0 and (owners[hole] == 0 or present[touched] > present[owners[hole]]):
+                                owners[hole] = touched
+                        if 0.5 * (distance[i, j, k] + distance[a, b, c]) <= far:
+                            continue
+                        if body > 0:
+                            first, last = here, len(levels)
+                        elif phi[a, b, c] >= 0.0:
+                            first, last = 0, here
+                        elif holes[a, b, c] != hole:
+                            continue
+                        else:
+                            last = np.searchsorted(levels, winding[a, b, c])
+                            first = here
+                            if first >= last:  # the neighbour counts it
+                                continue
+                        field = phi if body == 0 and phi[a, b, c] >= 0.0 else winding
+                        area = _edge_area(field, i, j, k, a, b, c, axis, steps)
+                        changes[hole, first] += area
+                        changes[hole, last] -= area
+    return changes, owners
+
+
+def distances_to_samples(
+    positions: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    shape: tuple[int, int, int],
+    steps: NDArray[np.float64],
+    reach: float,
+) -> NDArray[np.float32]:
+    """(*shape) distance from each node to samples of a surface, as far as `reach`; which it is everywhere beyond.
+
+    A sample stands for a disk of `DISK` cells around its place, (s, 3) in cells, across its vector.
+    """
+    result = np.full(shape, reach, dtype=np.float32)
+    _distances_to_samples(positions, vectors, steps, reach, DISK * float(steps.max()), result)
+    return result
+
+
+@compiled(nogil=True)
+def _distances_to_samples(positions, vectors, steps, reach, disk, result):
+    low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    for s in range(len(positions)):
+        length = 0.0
+        for d in range(3):
+            length += vectors[s, d] ** 2
+            span = (reach + disk) / steps[d]
+            low[d] = max(0, int(np.ceil(positions[s, d] - span)))
+            high[d] = min(result.shape[d] - 1, int(np.floor(positions[s, d] + span)))
+        length = np.sqrt(length)
+        for i in range(low[0], high[0] + 1):
+            x = (i - positions[s, 0]) * steps[0]
+            for j in range(low[1], high[1] + 1):
+                y = (j - positions[s, 1]) * steps[1]
+                for k in range(low[2], high[2] + 1):
+                    z = (k - positions[s, 2]) * steps[2]
+                    square = x * x + y * y + z * z
+                    height = (x * vectors[s, 0] + y * vectors[s, 1] + z * vectors[s, 2]) / length if length > 0 else 0.0
+                    away = max(0.0, np.sqrt(max(0.0, square - height * height)) - disk)
+                    distance = np.sqrt(height * height + away * away)
+                    if distance < result[i, j, k]:
+                        result[i, j, k] = distance

@@ -1,0 +1,152 @@
+"""Winding numbers on a grid: one Poisson equation says how often a shape winds around every node.
+
+The winding number of a surface falls by one where it is crossed along its normal and is harmonic elsewhere (Jacobson et
+al. 2013), so that ``−Δw = ∇·(n δ)``, n δ the area vectors spread over the nodes around them. What the shape does to the
+walls of the box, the far field of its area vectors tells.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import compiled
+from .node_sources import STRETCH, NodeSources
+from .stencil import divergence, solve_poisson
+
+BLOCK = 4
+"""Cells along the edge of the blocks whose area vectors are one dipole to the walls."""
+PATCH = 8
+"""Nodes along the edge of the patches of the walls to which dipoles are evaluated."""
+CORE = 2.0
+"""Distance in cells within which a dipole's field is that of a ball."""
+CLEARANCE = 10
+"""Cells between the shape and the walls that the far field needs; fewer are made up for."""
+
+
+def winding_numbers(
+    nodes: NodeSources, shape: tuple[int, ...], positions: NDArray[np.float64], vectors: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(*shape) winding number of a shape around the nodes of a grid, smooth over two cells across the shape.
+
+    Parameters
+    ----------
+    nodes : NodeSources
+        Area vectors spread over the nodes, divided by ``(Π spacing)^((d − 1) / d)``.
+    shape : tuple of int
+        Nodes along each axis of the grid, in two or three dimensions.
+    positions : (s, d) float
+        Where the area vectors are, in cells from the first node; those outside the grid may be among them.
+    vectors : (s, d) float
+        Area times unit normal, in units of length.
+
+    Returns
+    -------
+    (*shape) float
+        1 inside a closed shape with outward normals, 0 outside; 2 where two such overlap; a half on the rim of a flat
+        sheet's side. At a face, the mean of its two sides.
+    """
+    dimension = len(shape)
+    spacing = nodes.steps[4 - dimension :]
+    volume = float(np.prod(spacing))
+    dense = dense_vectors(nodes)[..., :dimension].reshape(*shape, dimension)
+    room = _room(dense)
+    inner = tuple(slice(below, below + n) for (below, _), n in zip(room, shape, strict=True))
+    if any(sum(room, ())):
+        dense = np.pad(dense, [*room, (0, 0)])
+        shape, positions = dense.shape[:-1], positions + [below for below, _ in room]
+    right = divergence(dense, spacing)
+    right *= -(volume ** ((dimension - 1) / dimension)) / volume
+    dipoles, strengths = blocks_of_dipoles(positions, vectors, dimension)
+    walls = [_wall(axis, end, shape) for axis in range(dimension) for end in (0, 1)]
+    fields = []
+    for axis, end, lattice in walls:
+        at = lattice.reshape(-1, dimension) * spacing
+        w, flux = _far_field(at, dipoles * spacing, strengths, axis, CORE * float(spacing.max()))
+        flux = _refined(flux.reshape(lattice.shape[:-1]), shape, axis) / spacing[axis]
+        layer = np.moveaxis(right, axis, 0)[-1 if end else 0]
+        layer += flux if end else -flux
+        fields.append(_refined(w.reshape(lattice.shape[:-1]), shape, axis))
+    result = solve_poisson(right, spacing, overwrite=True)
+    excess = [
+        result.take(-1 if end else 0, axis=axis) - field for (axis, end, _), field in zip(walls, fields, strict=True)
+    ]
+    result -= np.median(np.concatenate([part.ravel() for part in excess]))
+    return result[inner]
+
+
+def _room(vectors: NDArray[np.float32]) -> list[tuple[int, int]]:
+    """Layers of nodes to add before and behind along each axis, so that no vectors are close to the walls."""
+    touched = np.logical_or.reduce(vectors != 0, axis=-1)
+    result = []
+    for axis, n in enumerate(touched.shape):
+        lines = np.flatnonzero(np.moveaxis(touched, axis, 0).reshape(n, -1).any(axis=1))
+        result.append((max(0, CLEARANCE - int(lines[0])), max(0, CLEARANCE - (n - 1 - int(lines[-1])))))
+    return result
+
+
+def blocks_of_dipoles(
+    positions: NDArray[np.float64], vectors: NDArray[np.float64], dimension: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean positions and sums of the area vectors in each block of `BLOCK` cells."""
+    blocks = np.floor(positions / BLOCK).astype(np.int64)
+    blocks -= blocks.min(axis=0)
+    key = np.ravel_multi_index(tuple(blocks.T), tuple(blocks.max(axis=0) + 1))
+    _, which = np.unique(key, return_inverse=True)
+    weights = np.linalg.norm(vectors, axis=1) + 1e-300
+    total = np.bincount(which, weights)
+    means = np.stack([np.bincount(which, weights * positions[:, d]) / total for d in range(dimension)], axis=1)
+    sums = np.stack([np.bincount(which, vectors[:, d]) for d in range(dimension)], axis=1)
+    return means.astype(np.float64), sums.astype(np.float64)
+
+
+def dense_vectors(nodes: NodeSources) -> NDArray[np.float32]:
+    """(l₀, l₁, l₂, n, 4) the vectors at all nodes."""
+    l0, l1, l2, stretches = nodes.places.shape
+    result = np.zeros((l0, l1, l2, stretches, STRETCH, 4), dtype=np.float32)
+    taken = nodes.places >= 0
+    result[taken] = nodes.sums[nodes.places[taken]]
+    return result.reshape(l0, l1, l2, stretches * STRETCH, 4)[:, :, :, : nodes.shape[3]]
+
+
+def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, NDArray[np.float64]]:
+    """A lattice of places, in cells, on a wall of the box: half a cell beyond its last nodes."""
+    lines = [
+        np.array([shape[d] - 0.5 if end else -0.5])
+        if d == axis
+        else np.linspace(-0.5, shape[d] - 0.5, max(2, 1 + -(-shape[d] // PATCH)))
+        for d in range(len(shape))
+    ]
+    lattice = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+    return axis, end, lattice.squeeze(axis=axis)
+
+
+def _refined(values: NDArray[np.float64], shape: tuple[int, ...], axis: int) -> NDArray[np.float64]:
+    """Values on a wall's lattice, interpolated to its nodes."""
+    for d, n in enumerate(m for k, m in enumerate(shape) if k != axis):
+        place = (np.arange(n) + 0.5) / n * (values.shape[d] - 1)
+        below = np.minimum(place.astype(np.int64), values.shape[d] - 2)
+        f = (place - below).reshape(-1, *(1,) * (values.ndim - 1 - d))
+        values = values.take(below, axis=d) * (1 - f) + values.take(below + 1, axis=d) * f
+    return values
+
+
+@compiled(nogil=True)
+def _far_field(places, dipoles, strengths, axis, core):
+    """Winding number at places, and its derivative along an axis."""
+    dimension = places.shape[1]
+    sphere = 2.0 * np.pi if dimension == 2 else 4.0 * np.pi
+    value, slope = np.zeros(len(places)), np.zeros(len(places))
+    for i in range(len(places)):
+        for j in range(len(dipoles)):
+            square, product = 0.0, 0.0
+            for d in range(dimension):
+                away = dipoles[j, d] - places[i, d]
+                square += away * away
+                product += away * strengths[j, d]
+            square = max(square, core * core)
+            power = square * np.sqrt(square) if dimension == 3 else square
+            value[i] += product / (sphere * power)
+            away = dipoles[j, axis] - places[i, axis]
+            slope[i] += (dimension * product * away / square - strengths[j, axis]) / (sphere * power)
+    return value, slope

@@ -1,0 +1,194 @@
+"""The default: exact where the shape is there, completed where it is missing, nothing solid in empty space."""
+
+import numpy as np
+import pytest
+from shapes.bodies import box, sheet, turned
+
+from signedheat import Grid, PolygonMesh, SourceError, TriangleMesh, samples, signed_distance, solid_distance
+from signedheat.extensions.sides import BoundsNothing, CompletedArea, ReachesBox
+
+
+def only(mesh, chosen):
+    return TriangleMesh(mesh.vertices, mesh.faces[chosen])
+
+
+def distance_to_boxes(points, boxes):
+    """Exact distance to the union of boxes, outside it; a lower bound inside."""
+    found = []
+    for lower, upper in boxes:
+        lower, upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+        away = np.abs(points - (lower + upper) / 2) - (upper - lower) / 2
+        found.append(np.linalg.norm(np.maximum(away, 0), axis=-1) + np.minimum(away.max(axis=-1), 0))
+    return np.min(found, axis=0)
+
+
+def error(field, truth):
+    return 100 * np.sqrt(np.mean((field.values - truth) ** 2)) / np.ptp(truth)
+
+
+def offset_is_clear(field, mesh, distance):
+    """Vertices of an offset farther than one and a half offsets from samples of the faces."""
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), size=4000)
+    on_faces = np.einsum("wk,fkd->fwd", weights, mesh.vertices[mesh.faces]).reshape(-1, 3)
+    from scipy.spatial import cKDTree
+
+    return np.mean(cKDTree(on_faces).query(field.offset(distance).vertices)[0] > 1.5 * distance)
+
+
+def test_a_box_is_exact():
+    """Twelve faces, far larger than a cell: distance is that of the box to rounding, at edges and corners too."""
+    field = solid_distance(box((-1, -0.5, -0.3), (1, 0.5, 0.3)), resolution=48)
+    assert np.abs(field.values - distance_to_boxes(field.grid.points, [((-1, -0.5, -0.3), (1, 0.5, 0.3))])).max() < 1e-6
+
+
+@pytest.mark.parametrize("fraction", [0.1, 0.5, 1.0])
+def test_turned_faces_change_nothing(fraction):
+    ball = samples.sphere(3)
+    grid = Grid.around(ball.bounds, 32)
+    field = solid_distance(samples.with_flipped_faces(ball, fraction), grid)
+    assert np.array_equal(field.values, solid_distance(ball, grid).values)
+    assert field.diagnostics.notes["orientation"]["turned_faces"] > 0
+    kept = solid_distance(turned(ball), grid, as_oriented=True)
+    assert (kept.values >= 0).mean() > 0.99
+
+
+def test_bodies_unite():
+    boxes = [
+        ((-1, -0.4, -0.4), (1, 0.4, 0.4)),
+        ((-0.3, -1, -0.3), (0.3, 1, 0.3)),
+        ((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2)),
+    ]
+    shape = samples.union(*(box(*each) for each in boxes))
+    field = solid_distance(shape, resolution=64)
+    truth = distance_to_boxes(field.grid.points, boxes)
+    deep = np.abs(truth) > 2 * field.grid.spacing[0]
+    assert np.array_equal((field.values < 0)[deep], (truth < 0)[deep])
+    assert np.abs(field.values - truth)[truth > 0].max() < 0.5 * field.grid.spacing[0]
+    assert field.diagnostics.notes["left_out"].covered_faces == 24
+    kept = solid_distance(shape, field.grid, keep_overlaps=True)
+    assert "left_out" not in kept.diagnostics.notes
+
+
+def test_cavities_stay():
+    shell = samples.union(samples.sphere(3), turned(samples.sphere(3, radius=0.5)))
+    field = solid_distance(shell, resolution=48)
+    radius = np.linalg.norm(field.grid.points, axis=-1)
+    truth = np.maximum(radius - 1, 0.5 - radius)
+    assert error(field, truth) < 0.5
+
+
+def test_half_a_sphere_is_carried_on():
+    """No more is missing than is there: the completed half is about as large as the other. Winding numbers end flat."""
+    ball = samples.sphere(4)
+    left = only(ball, ball.vertices[ball.faces][:, :, 0].mean(axis=1) < 0)
+    field = solid_distance(left, Grid.around(ball.bounds, 48))
+    radius = np.linalg.norm(field.grid.points, axis=-1)
+    flat = np.where(field.grid.points[..., 0] < 0, radius - 1, np.hypot(field.grid.points[..., 0], radius - 1))
+    assert error(field, radius - 1) < 0.5 * 100 * np.sqrt(np.mean((flat - radius + 1) ** 2)) / np.ptp(radius)
+    told = field.diagnostics.notes["completed_area"]
+    assert isinstance(told, CompletedArea)
+    assert 0.25 < told.share < 0.6
+    assert told.where[0, 1, 0] > 0.3  # it is where nothing is
+
+
+def test_half_a_bar_is_carried_on_along_it():
+    bar = samples.union(box((-1, -0.25, -0.25), (1, 0.25, 0.25)))
+    left = only(
+        bar, (bar.vertices[bar.faces][:, :, 0] < 0).any(axis=1) & ~(bar.vertices[bar.faces][:, :, 0] > 0).all(1)
+    )
+    left = TriangleMesh(np.minimum(left.vertices, [0.0, np.inf, np.inf]), left.faces)
+    field = solid_distance(left, Grid.around(bar.bounds, 48))
+    assert (field([[0.3, 0, 0], [0.5, 0, 0]]) < 0).all()
+
+
+def test_patches_are_completed_within_the_surface():
+    ball = samples.sphere(4)
+    holed = samples.without_patches(ball, 6, 0.45)
+    field = solid_distance(holed, Grid.around(ball.bounds, 48))
+    truth = np.linalg.norm(field.grid.points, axis=-1) - 1
+    caps = 1 - np.cos(0.45)  # how far flat caps lie inside; on a fifth of the surface, and as deep below it
+    assert error(field, truth) < 100 * caps * np.sqrt(0.2) / np.ptp(truth)
+    far = np.abs(truth) > 3 * field.grid.spacing[0]
+    assert np.array_equal((field.values < 0)[far], (truth < 0)[far])
+
+
+def test_noise_is_averaged():
+    ball = samples.sphere(4)
+    grid = Grid.around(ball.bounds, 48)
+    truth = np.linalg.norm(grid.points, axis=-1) - 1
+    noisy = samples.soup(ball, jitter=0.02)
+    assert error(solid_distance(noisy, grid), truth) < 1.1 * error(signed_distance(noisy, grid), truth) + 0.1
+
+
+def test_a_sheet_has_no_inside():
+    flat = sheet([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    field = solid_distance(flat, resolution=40)
+    x, y, z = np.moveaxis(np.abs(field.grid.points), -1, 0)
+    away = np.linalg.norm([np.maximum(x - 1, 0), np.maximum(y - 1, 0), z], axis=0)
+    assert np.abs(field.values - away).max() < 1e-6
+    assert field.diagnostics.notes["bounds_nothing"] == BoundsNothing(1.0)
+
+
+def test_doubled_walls_have_no_inside():
+    flat = sheet([[-1, -1, 0], [1, -1, 0], [1, 1, 0.3], [-1, 1, 0.3]])
+    field = solid_distance(samples.union(flat, turned(flat)), resolution=40)
+    assert (field.values >= 0).all()
+    assert offset_is_clear(field, flat, 0.2) < 0.02  # samples of the sheet are random
+
+
+def test_furniture():
+    """Closed legs below open boards of any orientation: legs are solid, no solid is in empty space."""
+    legs = [box((x - 0.08, y - 0.08, -1), (x + 0.08, y + 0.08, -0.02)) for x in (-0.8, 0.8) for y in (-0.5, 0.5)]
+    boards = [
+        sheet([[-1, -0.7, 0], [1, -0.7, 0], [1, 0.7, 0], [-1, 0.7, 0]]),
+        turned(sheet([[-1, -0.7, 0.9], [1, -0.7, 0.9], [1, 0.7, 0.9], [-1, 0.7, 0.9]])),
+        sheet([[-1, -0.7, 0], [-1, 0.7, 0], [-1, 0.7, 0.9], [-1, -0.7, 0.9]]),
+    ]
+    shape = samples.union(*legs, *boards)
+    field = solid_distance(shape, resolution=64, padding=0.4)
+    assert (field([[x, y, -0.5] for x in (-0.8, 0.8) for y in (-0.5, 0.5)]) < 0).all()
+    p = field.grid.points
+    outside = (np.abs(p) > [1, 0.7, 1]).any(axis=-1)
+    assert (field.values[outside] < 0).mean() < 1e-3
+    assert offset_is_clear(field, shape, 0.1) < 0.01
+
+
+def test_the_surface_may_reach_the_box():
+    """A tube open at both ends is carried on through the walls of a box that leaves it no room."""
+    tube = samples.union(box((-1, -0.4, -0.4), (1, 0.4, 0.4)))
+    walls = only(tube, np.ptp(tube.vertices[tube.faces][:, :, 0], axis=1) > 1)
+    field = solid_distance(walls, Grid((-1.1, -0.8, -0.8), 0.05, (45, 33, 33)))
+    told = field.diagnostics.notes
+    assert isinstance(told.get("reaches_box"), ReachesBox) or field.values[0].min() > 0
+    assert field([[0, 0, 0]])[0] == pytest.approx(-0.4, abs=0.01)
+
+
+def test_plain_is_the_method():
+    ball = samples.sphere(3)
+    grid = Grid.around(ball.bounds, 32)
+    plain = solid_distance(ball, grid, plain=True)
+    assert np.allclose(plain.values, signed_distance(ball, grid).values, atol=1e-6)
+
+
+def test_polygons_points_and_several_meshes():
+    cube = PolygonMesh(
+        [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)],
+        [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
+    )
+    field = solid_distance(cube, resolution=32)
+    assert np.abs(field.values - distance_to_boxes(field.grid.points, [((0, 0, 0), (1, 1, 1))])).max() < 1e-6
+    two = solid_distance([cube, box((2, 0, 0), (3, 1, 1))], resolution=32)
+    assert two([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]]) == pytest.approx(
+        [-0.5, 0.5, -0.5], abs=0.1
+    )  # a cell is .135
+    cloud = samples.oriented_points(samples.sphere(3), 3000)
+    points = solid_distance(cloud, resolution=40)
+    assert error(points, np.linalg.norm(points.grid.points, axis=-1) - 1) < 0.7
+    with pytest.raises(SourceError, match="several meshes"):
+        solid_distance([cube, cloud], resolution=32)
+
+
+def test_the_same_bits_again():
+    holed = samples.without_patches(samples.torus(n_around=48, n_across=24), 4, 0.3)
+    one, other = (solid_distance(holed, resolution=40) for _ in range(2))
+    assert np.array_equal(one.values, other.values)

@@ -1,0 +1,23 @@
+"""Boxes and sheets of few faces, and shapes turned inside out."""
+
+import numpy as np
+
+from signedheat import TriangleMesh
+
+
+def turned(mesh):
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def box(lower, upper):
+    """Twelve faces, outward."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    lower = np.asarray(lower, dtype=float)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    faces = [[q[0], q[k], q[k + 1]] for q in quads for k in (1, 2)]
+    return TriangleMesh(lower + corners * (np.asarray(upper) - lower), faces)
+
+
+def sheet(corners):
+    """Two faces on four corners."""
+    return TriangleMesh(corners, [[0, 1, 2], [0, 2, 3]])
