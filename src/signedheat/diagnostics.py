@@ -135,6 +135,113 @@ class SharpenedToShape(Note):
 
 
 @dataclass(frozen=True, eq=False)
+class OrientedFaces(Note):
+    """Which faces were turned, as `Orientation` counts them: number and fraction of the area, and what was found."""
+
+    turned_parts: int
+    turned_faces: int
+    turned_area: float
+    undecided_area: float
+    merged_faces: int
+    doubled_walls: int
+    cavities: int
+
+    def __str__(self) -> str:
+        return (
+            f"{self.turned_faces} faces turned, {self.turned_area:.1%} of the area; "
+            f"{self.merged_faces} duplicates merged; {self.undecided_area:.1%} of the area has no side that is outside"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class OrientedPoints(Note):
+    """Number of normals of a point cloud that were fitted, and that were turned."""
+
+    normals_fitted: int
+    normals_turned: int
+
+    def __str__(self) -> str:
+        return f"{self.normals_fitted} normals fitted, {self.normals_turned} turned"
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut(Note):
+    """What a union leaves out of a shape.
+
+    Attributes
+    ----------
+    covered_faces : int
+        Faces, or points, that lie inside other bodies, wholly or in part.
+    covered_area : float
+        Their fraction of the area, as far as they do.
+    cut_faces : int
+        Those that lie inside in part, and were cut.
+    merged_faces : int
+        Duplicates.
+    doubled_walls : int
+        Faces that are there twice, once facing each way; they stay, unless they lie inside a body.
+    """
+
+    covered_faces: int = 0
+    covered_area: float = 0.0
+    cut_faces: int = 0
+    merged_faces: int = 0
+    doubled_walls: int = 0
+
+    def __str__(self) -> str:
+        return (
+            f"left out: {self.covered_faces} faces, {self.covered_area:.1%} of the area, that lie inside other bodies "
+            f"({self.cut_faces} of them in part), and {self.merged_faces} duplicates"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class CompletedArea(Note):
+    """How much of the zero set stands in for missing surface.
+
+    Attributes
+    ----------
+    completed_area : float
+        Area of the zero set farther than 1.5 cells from any face, in squared units of length.
+    completed_share : float
+        The same, over the area of the whole zero set.
+    where : (k, 2, d) float
+        Lower and upper corners of boxes around its largest connected parts, largest first; at most five.
+    """
+
+    completed_area: float
+    completed_share: float
+    where: NDArray[np.float64]
+
+    def __str__(self) -> str:
+        told = f"{self.completed_share:.1%} of the surface is completed"
+        if not len(self.where):
+            return told
+        lower, upper = ("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in self.where[0])
+        return f"{told}, most of it between {lower} and {upper}"
+
+
+@dataclass(frozen=True, eq=False)
+class ReachesBox(Note):
+    """The zero set leaves the grid, where it is cut off: fraction of the nodes on the walls that are inside."""
+
+    inside_on_walls: float
+
+    def __str__(self) -> str:
+        return f"the surface reaches the walls of the grid, of which {self.inside_on_walls:.1%} are inside"
+
+
+@dataclass(frozen=True, eq=False)
+class BoundsNothing(Note):
+    """Fraction of the area that has the same side on both sides: distance to it is positive all around."""
+
+    open_area: float
+
+    def __str__(self) -> str:
+        return f"{self.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"
+
+
+@dataclass(frozen=True, eq=False)
 class GeodesicWindows(Note):
     """Number of windows in the exact polyhedral distance."""
 

@@ -62,6 +62,10 @@ class SourceError(SignedHeatError):
     """A source that cannot be used on this domain: off the domain, empty, without normals."""
 
 
+class CancellingNormalsError(SourceError):
+    """A source whose normals cancel each other everywhere: doubled walls, of which neither side is inside."""
+
+
 class ConstraintError(SignedHeatError):
     """A constraint that does not fit the sources, for instance the wrong number of level values."""
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from shapes.bodies import box, turned
 
+from shapes.bodies import box, turned
 from signedheat import Grid, PointCloud, SourceError, TriangleMesh, samples, unite
+from signedheat.errors import UnsupportedTypeError
 from signedheat.extensions.uniting import union_of
 from signedheat.geometry.edges import edge_table
 
@@ -46,7 +47,7 @@ def test_faces_far_larger_than_a_cell_are_cut():
 
 
 def test_pieces_of_one_face_share_their_vertices():
-    """The only boundary is where bodies enter each other: no crack between faces that were cut and those that were not."""
+    """The only boundary is where bodies enter each other: no crack between faces that were cut and others."""
     found = union_of(samples.union(box((-1, -1, -1), (1, 1, 1)), box((-0.3, -0.3, 0.2), (0.3, 0.3, 2))), resolution=48)
     mesh = found.shape
     table = edge_table(mesh.faces)
@@ -93,7 +94,7 @@ def test_points():
 
 
 def test_refusals():
-    with pytest.raises(SourceError, match="TriangleMesh"):
+    with pytest.raises(UnsupportedTypeError, match="TriangleMesh"):
         unite(Grid((0, 0, 0), 1.0, (2, 2, 2)), Grid((0, 0, 0), 1.0, (8, 8, 8)))
     with pytest.raises(SourceError, match="dimensions"):
         unite(samples.sphere(1), Grid((0, 0), 1.0, (8, 8)))

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
+from ..diagnostics import LeftOut
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import CancellingNormalsError, SourceError
+from ..errors import CancellingNormalsError, UnsupportedTypeError
 from ..geometry.components import same_positions
 from ..geometry.edges import edge_table
 from ..geometry.refining import split_at_edges
@@ -39,37 +41,6 @@ ROUNDS = 40
 """How often faces are halved at most."""
 MARGIN = 0.02
 """Share of an edge that a cut keeps from its ends."""
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """What a union has left out.
-
-    Attributes
-    ----------
-    covered_faces : int
-        Faces, or points, that lie inside other bodies, wholly or in part.
-    covered_area : float
-        Their share of the area, as far as they do.
-    cut_faces : int
-        Those that lie inside in part, and were cut.
-    merged_faces : int
-        Duplicates.
-    doubled_walls : int
-        Faces that are there twice, once facing each way; they stay, unless they lie inside a body.
-    """
-
-    covered_faces: int = 0
-    covered_area: float = 0.0
-    cut_faces: int = 0
-    merged_faces: int = 0
-    doubled_walls: int = 0
-
-    def __str__(self) -> str:
-        return (
-            f"left out {self.covered_faces} faces, {100 * self.covered_area:.1f} % of the area, that lie inside other "
-            f"bodies ({self.cut_faces} of them in part), and {self.merged_faces} duplicates"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +135,7 @@ def merge_duplicates(shape: Shape) -> Merged:
 
     Raises
     ------
-    SourceError
+    UnsupportedTypeError
         If the shape is neither a mesh nor a point cloud.
     """
     if isinstance(shape, PointCloud):
@@ -172,7 +143,7 @@ def merge_duplicates(shape: Shape) -> Merged:
     if isinstance(shape, PolygonMesh):
         return Merged(shape, np.zeros(shape.n_polygons, dtype=bool), 0)
     if not isinstance(shape, TriangleMesh):
-        raise SourceError(
+        raise UnsupportedTypeError(
             f"bodies of a TriangleMesh, PolygonMesh or PointCloud are united, not of a {type(shape).__name__}"
         )
     corners = same_positions(shape.vertices)[shape.faces]
@@ -208,14 +179,12 @@ def without_covered(merged: Merged, winding: NDArray[np.float64], grid: Grid) ->
     grid : Grid
         Three axes.
     """
-    from scipy.ndimage import binary_dilation
-
     shape, walls = merged.shape, int(merged.walls.sum()) // 2
     overlap = winding > OVERLAP
     buried = merged.walls.any() and bool((winding > BURIED).any())
     if not (overlap.any() or buried):
         return Union(shape, LeftOut(merged_faces=merged.count, doubled_walls=walls))
-    near = binary_dilation(overlap, np.ones((3,) * winding.ndim), iterations=NEAR)
+    near = scipy.ndimage.binary_dilation(overlap, np.ones((3,) * winding.ndim), iterations=NEAR)
     depth = np.where(near, winding, np.minimum(winding, 1.0))
     if isinstance(shape, PointCloud):
         covered = values_at(depth, (shape.points - grid.origin) / grid.spacing) > COVERED

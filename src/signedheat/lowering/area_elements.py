@@ -22,7 +22,7 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import SourceError
+from ..errors import CancellingNormalsError, SourceError
 from ..geometry.components import element_components, same_positions
 from ..operators.grid.node_sources import NodeSources
 from ..operators.grid.wavefront import padded_shape
@@ -191,7 +191,9 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
     Raises
     ------
     SourceError
-        If a shape cannot be used on this grid, no part of any lies within it, or their normals cancel.
+        If a shape cannot be used on this grid, or no part of any lies within it.
+    CancellingNormalsError
+        If their normals cancel everywhere.
     """
     steps = np.zeros(4)
     steps[4 - grid.dimension :] = grid.spacing
@@ -228,14 +230,14 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
     joined = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
     if total <= 0:
         raise SourceError("the source has no area: every face is degenerate")
-    if not len(joined[2]) or not joined[1].any():
+    if not len(joined[2]):
         raise SourceError(
             f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape",
             remedy="move or enlarge it",
         )
     left = float(np.linalg.norm(joined[1], axis=1).sum() / joined[2].sum())
     if left < ROUNDING:
-        raise SourceError(
+        raise CancellingNormalsError(
             "the normals of the source cancel each other everywhere, so that nothing tells inside from outside",
             remedy="remove or turn one of its coinciding sides",
         )
