@@ -13,8 +13,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
+from ..diagnostics import BoundsNothing, CompletedArea, ReachesBox
 from ..operators.grid.boundary_areas import boundary_areas, completion_areas
 from ..operators.grid.face_values import values_at
 
@@ -47,60 +49,6 @@ MOST = 5
 """Parts of the completed surface that are told of."""
 SLOPE = 4.0
 """Cells that a winding number of one is worth beside φ."""
-
-
-@dataclass(frozen=True, eq=False)
-class CompletedArea:
-    """How much of the zero set stands in for missing surface.
-
-    Attributes
-    ----------
-    area : float
-        Of the zero set farther than 1.5 cells from any face, in squared units of length.
-    share : float
-        The same, over the area of the whole zero set.
-    where : (k, 2, d) float
-        Lower and upper corners of boxes around its largest connected parts, largest first; at most five.
-    """
-
-    area: float
-    share: float
-    where: NDArray[np.float64]
-
-    def __str__(self) -> str:
-        return f"{100 * self.share:.1f} % of the surface is completed, most of it {_between(self.where[0])}"
-
-
-@dataclass(frozen=True)
-class ReachesBox:
-    """The zero set leaves the grid, where it is cut off.
-
-    Attributes
-    ----------
-    share : float
-        Nodes on the walls of the box that are inside, over all.
-    """
-
-    share: float
-
-    def __str__(self) -> str:
-        return f"the surface reaches the walls of the grid, of which {100 * self.share:.1f} % are inside"
-
-
-@dataclass(frozen=True)
-class BoundsNothing:
-    """Faces with the same side on both sides: distance to them is positive all around.
-
-    Attributes
-    ----------
-    share : float
-        Their share of the area.
-    """
-
-    share: float
-
-    def __str__(self) -> str:
-        return f"{100 * self.share:.1f} % of the area bounds nothing: open sheets, of which only the distance is known"
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,15 +215,13 @@ def _scene(
 
 def _bodies(scene: _Scene) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
     """Labels of the solids, a function that is negative in them alone, and the area of the faces on each."""
-    from scipy.ndimage import label
-
     function = scene.guarded(LEVEL)
     candidates = function
     bodies = np.zeros(function.shape, dtype=np.int32)
     present = np.zeros(1)
     trust = scene.trust
     for core in (*CORES, None):
-        labels, n = label(candidates < 0, output=np.int32)
+        labels, n = scipy.ndimage.label(candidates < 0, output=np.int32)
         faces = _faces_on(scene, labels, n)
         total, completed = boundary_areas(labels, candidates, scene.distance, scene.steps, FAR * scene.cell)
         solid = (total - faces <= FILM * faces) & (completed <= (CLOSED + (OPEN - CLOSED) * trust) * faces)
@@ -305,10 +251,8 @@ def _fill_missing_sides(
     scene: _Scene, bodies: NDArray[np.int32], present: NDArray[np.float64], function: NDArray[np.float64]
 ) -> None:
     """Extend the function where a whole side of a solid is missing."""
-    from scipy.ndimage import binary_dilation, find_objects, label
-
     fillable = (scene.phi < 0) & (bodies == 0) & (scene.winding < LEVEL) & (scene.distance > scene.cell)
-    holes, n = label(fillable, output=np.int32)
+    holes, n = scipy.ndimage.label(fillable, output=np.int32)
     if n == 0 or len(present) == 1:
         return
     areas, owners = completion_areas(
@@ -316,7 +260,7 @@ def _fill_missing_sides(
     )
     budget = present * scene.trust
     large = (owners > 0) & (areas[:, 0] > MISSING_SIDE * present[owners])
-    boxes = find_objects(holes)
+    boxes = scipy.ndimage.find_objects(holes)
     for body in np.unique(owners[large]):
         own = np.flatnonzero(large & (owners == body))
         affordable = np.flatnonzero(areas[own].sum(axis=0) <= budget[body])
@@ -325,7 +269,7 @@ def _fill_missing_sides(
         level = LEVELS[affordable[0]]
         for hole in own:
             box = tuple(slice(max(0, part.start - 2), part.stop + 2) for part in boxes[hole - 1])
-            near = binary_dilation(holes[box] == hole, np.ones((3, 3, 3)), iterations=2)
+            near = scipy.ndimage.binary_dilation(holes[box] == hole, np.ones((3, 3, 3)), iterations=2)
             refused = (scene.guarded(LEVEL, box) < 0) & (function[box] >= 0)
             np.copyto(function[box], scene.guarded(level, box), where=near & ~refused)
 
@@ -334,23 +278,16 @@ def _completed(
     scene: _Scene, inside: NDArray[np.bool_], function: NDArray[np.float64], origin: NDArray[np.float64]
 ) -> CompletedArea | None:
     """What of the zero set is farther than `FAR` cells from any face."""
-    from scipy.ndimage import binary_erosion, find_objects, label
-
     far = FAR * scene.cell
     total, completed = boundary_areas(inside.astype(np.int32), function, scene.distance, scene.steps, far)
     if completed.sum() == 0:
         return None
-    rim = inside & ~binary_erosion(inside, border_value=1) & (scene.distance > far)
-    patches, _ = label(rim, np.ones((3, 3, 3)), output=np.int32)
+    rim = inside & ~scipy.ndimage.binary_erosion(inside, border_value=1) & (scene.distance > far)
+    patches, _ = scipy.ndimage.label(rim, np.ones((3, 3, 3)), output=np.int32)
     areas = np.bincount(patches.ravel())[1:]
-    boxes = find_objects(patches)
+    boxes = scipy.ndimage.find_objects(patches)
     largest = np.argsort(-areas, kind="stable")[:MOST]
     where = np.array([[[part.start, part.stop - 1] for part in boxes[k]] for k in largest], dtype=float)
     where = where.reshape(-1, 3, 2).transpose(0, 2, 1)[..., 3 - len(origin) :]
     where = origin + where * scene.steps[3 - len(origin) :]
     return CompletedArea(float(completed.sum()), float(completed.sum() / total.sum()), where)
-
-
-def _between(box: NDArray[np.float64]) -> str:
-    lower, upper = ("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in box)
-    return f"between {lower} and {upper}"
