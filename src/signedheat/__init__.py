@@ -31,7 +31,9 @@ from .extensions.orientation import Orientation, orient, orientation
 from .extensions.piecewise import piecewise_distance
 from .extensions.sharpening import sharpen
 from .extensions.sharpening_methods import Convex, Geodesic
+from .extensions.solid_distance import solid_distance
 from .extensions.tetrahedralize import tetrahedralize
+from .extensions.uniting import unite
 from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField
 from .fields.tet_field import TetField
@@ -107,8 +109,10 @@ __all__ = [
     "sharpen",
     "shell",
     "signed_distance",
+    "solid_distance",
     "tetrahedralize",
     "thicken",
+    "unite",
     "write_curves",
     "write_polylines",
 ]

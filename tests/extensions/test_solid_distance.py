@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from shapes.bodies import box, sheet, turned
 
+from shapes.bodies import box, sheet, turned
 from signedheat import Grid, PolygonMesh, SourceError, TriangleMesh, samples, signed_distance, solid_distance
-from signedheat.extensions.sides import BoundsNothing, CompletedArea, ReachesBox
+from signedheat.diagnostics import BoundsNothing, CompletedArea, LeftOut, OrientedFaces, ReachesBox
 
 
 def only(mesh, chosen):
@@ -47,7 +47,7 @@ def test_turned_faces_change_nothing(fraction):
     grid = Grid.around(ball.bounds, 32)
     field = solid_distance(samples.with_flipped_faces(ball, fraction), grid)
     assert np.array_equal(field.values, solid_distance(ball, grid).values)
-    assert field.diagnostics.notes["orientation"]["turned_faces"] > 0
+    assert field.diagnostics.note(OrientedFaces).turned_faces > 0
     kept = solid_distance(turned(ball), grid, as_oriented=True)
     assert (kept.values >= 0).mean() > 0.99
 
@@ -64,9 +64,9 @@ def test_bodies_unite():
     deep = np.abs(truth) > 2 * field.grid.spacing[0]
     assert np.array_equal((field.values < 0)[deep], (truth < 0)[deep])
     assert np.abs(field.values - truth)[truth > 0].max() < 0.5 * field.grid.spacing[0]
-    assert field.diagnostics.notes["left_out"].covered_faces == 24
+    assert field.diagnostics.note(LeftOut).covered_faces == 24
     kept = solid_distance(shape, field.grid, keep_overlaps=True)
-    assert "left_out" not in kept.diagnostics.notes
+    assert kept.diagnostics.note(LeftOut) is None
 
 
 def test_cavities_stay():
@@ -85,9 +85,8 @@ def test_half_a_sphere_is_carried_on():
     radius = np.linalg.norm(field.grid.points, axis=-1)
     flat = np.where(field.grid.points[..., 0] < 0, radius - 1, np.hypot(field.grid.points[..., 0], radius - 1))
     assert error(field, radius - 1) < 0.5 * 100 * np.sqrt(np.mean((flat - radius + 1) ** 2)) / np.ptp(radius)
-    told = field.diagnostics.notes["completed_area"]
-    assert isinstance(told, CompletedArea)
-    assert 0.25 < told.share < 0.6
+    told = field.diagnostics.note(CompletedArea)
+    assert 0.25 < told.completed_share < 0.6
     assert told.where[0, 1, 0] > 0.3  # it is where nothing is
 
 
@@ -126,7 +125,7 @@ def test_a_sheet_has_no_inside():
     x, y, z = np.moveaxis(np.abs(field.grid.points), -1, 0)
     away = np.linalg.norm([np.maximum(x - 1, 0), np.maximum(y - 1, 0), z], axis=0)
     assert np.abs(field.values - away).max() < 1e-6
-    assert field.diagnostics.notes["bounds_nothing"] == BoundsNothing(1.0)
+    assert field.diagnostics.note(BoundsNothing).open_area == 1.0
 
 
 def test_doubled_walls_have_no_inside():
@@ -158,8 +157,7 @@ def test_the_surface_may_reach_the_box():
     tube = samples.union(box((-1, -0.4, -0.4), (1, 0.4, 0.4)))
     walls = only(tube, np.ptp(tube.vertices[tube.faces][:, :, 0], axis=1) > 1)
     field = solid_distance(walls, Grid((-1.1, -0.8, -0.8), 0.05, (45, 33, 33)))
-    told = field.diagnostics.notes
-    assert isinstance(told.get("reaches_box"), ReachesBox) or field.values[0].min() > 0
+    assert (field.diagnostics.note(ReachesBox) is None) == (field.values[0].min() > 0)
     assert field([[0, 0, 0]])[0] == pytest.approx(-0.4, abs=0.01)
 
 

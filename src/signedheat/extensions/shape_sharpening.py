@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from typing import Literal
@@ -76,13 +76,23 @@ class Assembled:
     completed: float
 
 
-def assemble(parts: Sequence[Shape], grid: Grid, sides: NDArray[np.float64], fit: Fit) -> Assembled:
+def assemble(
+    parts: Sequence[Shape],
+    grid: Grid,
+    sides: NDArray[np.float64],
+    fit: Fit,
+    phi: NDArray[np.float64] | None = None,
+    tells: Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None = None,
+) -> Assembled:
     """Signed distance to shapes, and to the zero set of `sides` where they are missing.
 
     1. The zero set is fitted to the points of clouds (`fitted_to_points`).
     2. Faces that lie in layers are left out (`layered_faces`), as all are where the fit is to be smooth.
     3. Crossings of the zero set farther than `FAR` cells from the others stand in for what is missing.
     4. All nodes find the nearest of both (`sampled_surface`), and the sides from faces nearby or from `sides`.
+
+    Around layers `phi`, where given, takes the place of `sides`, which need not run in their middle. Faces tell no side
+    where `tells`, given (s, 3) places on them in cells from the first node, is False.
     """
     steps = np.array(grid.spacing)
     clouds = [part for part in parts if isinstance(part, PointCloud)]
@@ -96,8 +106,10 @@ def assemble(parts: Sequence[Shape], grid: Grid, sides: NDArray[np.float64], fit
     n_faces = len(features.rows)
     left_out = np.full(n_faces, fit == "smooth")
     if fit == "auto" and n_faces:
-        left_out = layered_faces(features, band, sides, steps)
+        left_out = layered_faces(features, band, sides if phi is None else phi, steps)
     if left_out.any():
+        if phi is not None:
+            sides = np.where(_around_faces(left_out, band), phi, sides)
         features = FaceFeatures.of(features.vertices, features.faces[~left_out].astype(np.int64))
         band = FaceBand.of(features, grid.shape, steps)
     edges = crossed_edges(sides[None])
@@ -110,10 +122,22 @@ def assemble(parts: Sequence[Shape], grid: Grid, sides: NDArray[np.float64], fit
     gaps = max((REACH * mean_gap(cloud.points) for cloud in clouds), default=0.0)
     trusted = confidence_at(points, evidence, gaps)
     nearby = sampled_surface(features, band, edges, crossings, steps)
-    values, confidence = signed_distances(nearby, sides < 0, trusted)
-    surface = ExactSurface(features, crossings, np.array(grid.origin), steps)
+    telling = telling_faces = None
+    if tells is not None:
+        telling = tells(band.feet[:, 1:] / steps)
+        votes = np.bincount(band.faces, np.where(telling, 1, -1), len(features.rows))
+        telling, telling_faces = np.concatenate([telling, np.zeros(len(crossings), dtype=bool)]), votes > 0
+    values, confidence = signed_distances(nearby, sides < 0, trusted, telling)
+    surface = ExactSurface(features, crossings, np.array(grid.origin), steps, telling_faces)
     share = float(left_out.mean()) if n_faces else 0.0
     return Assembled(values, confidence, surface, share, len(edges) / n_edges if n_edges else 0.0)
+
+
+def _around_faces(chosen: NDArray[np.bool_], band: FaceBand) -> NDArray[np.bool_]:
+    """Nodes near some faces, and the two layers around them."""
+    near = band.nearest >= 0
+    near[near] = chosen[band.faces[band.nearest[near]]]
+    return np.asarray(scipy.ndimage.binary_dilation(near, iterations=2))
 
 
 def confidence_at(points: NDArray[np.float64], evidence: NDArray[np.float64], gap: float = 0.0) -> NDArray[np.float32]:

@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 from typing import overload
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..constraints import ZeroSet
-from ..discretization import Diagnostics, discretize
+from ..diagnostics import Diagnostics, Note, OrientedFaces, OrientedPoints, SharpenedToShape
+from ..discretization import discretize
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -20,7 +22,7 @@ from ..domains.validation import positive_number
 from ..errors import CancellingNormalsError, SourceError
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
-from ..lowering.area_elements import AreaSamples, extent, sample_on_grid
+from ..lowering.area_elements import AreaSamples, bounds_around, sample_on_grid
 from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
 from ..operators.grid.boundary_areas import distances_to_samples
@@ -28,7 +30,8 @@ from ..operators.grid.face_values import values_at
 from ..progress import Progress, Stopwatch
 from ..solver import SignedHeatSolver, as_list
 from .orientation import orientation
-from .shape_sharpening import Assembled, Fit, assemble, triangles_of
+from .point_orientation import orient_points
+from .shape_sharpening import Assembled, Fit, assemble
 from .sharpening import sharpen
 from .sides import FAR, Sides, choose_sides, nothing_inside
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
@@ -60,7 +63,7 @@ class Steps:
 
 @overload
 def solid_distance(
-    shape: Shape | Sequence[Mesh],
+    shape: Shape | TetMesh | Sequence[Mesh],
     domain: Grid | None = None,
     *,
     resolution: int = 128,
@@ -74,7 +77,7 @@ def solid_distance(
 ) -> GridField: ...
 @overload
 def solid_distance(
-    shape: Shape | Sequence[Mesh],
+    shape: Shape | TetMesh | Sequence[Mesh],
     domain: TetMesh,
     *,
     diffusion: float = 1.0,
@@ -84,7 +87,7 @@ def solid_distance(
     progress: Progress | None = None,
 ) -> TetField: ...
 def solid_distance(
-    shape: Shape | Sequence[Mesh],
+    shape: Shape | TetMesh | Sequence[Mesh],
     domain: Grid | TetMesh | None = None,
     *,
     resolution: int = 128,
@@ -104,8 +107,8 @@ def solid_distance(
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh or PointCloud with normals; or several meshes
-        Broken or not.
+    shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh; or several meshes
+        Broken or not; points with normals or without.
     domain : Grid or TetMesh, optional
         Where to measure; by default a grid of cubic cells around the shape.
     resolution : int
@@ -128,9 +131,8 @@ def solid_distance(
     Returns
     -------
     GridField or TetField
-        φ < 0 inside. ``diagnostics.notes`` holds, each where there is something to tell: `orientation`
-        (`OrientationReport`), `left_out` (`LeftOut`), `completed_area` (`CompletedArea`), `reaches_box`
-        (`ReachesBox`) and `bounds_nothing` (`BoundsNothing`).
+        φ < 0 inside. ``diagnostics.notes`` tells what was done, where there is something to tell: `OrientedFaces` or
+        `OrientedPoints`, `LeftOut`, `CompletedArea`, `ReachesBox`, `BoundsNothing`.
 
     Raises
     ------
@@ -151,7 +153,7 @@ def solid_distance(
     """
     solid = _joined(shape)
     if domain is None:
-        bounds = extent(solid)
+        bounds = bounds_around([solid])
         domain = Grid.around(bounds, resolution, padding, spacing)
     steps = Steps(not as_oriented, not keep_overlaps, not plain)
     diffusion = positive_number(diffusion, "diffusion")
@@ -160,8 +162,10 @@ def solid_distance(
     return _elsewhere(solid, domain, steps, diffusion, progress)
 
 
-def _joined(shape: Shape | Sequence[Mesh]) -> Shape:
+def _joined(shape: Shape | TetMesh | Sequence[Mesh]) -> Shape:
     """One shape of several meshes."""
+    if isinstance(shape, TetMesh):
+        return shape.boundary
     if not isinstance(shape, Sequence):
         return shape
     shapes = as_list(shape)
@@ -176,12 +180,15 @@ def _joined(shape: Shape | Sequence[Mesh]) -> Shape:
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
-def _oriented(shape: Shape, notes: dict[str, object]) -> Merged:
-    """The shape as `orient` leaves it, which knows its duplicates; points keep the normals that they have."""
+def _oriented(shape: Shape, notes: list[Note]) -> Merged:
+    """The shape as `orient` leaves it, which knows its duplicates; points get normals."""
     if isinstance(shape, PointCloud):
-        return merge_duplicates(shape)
+        oriented = orient_points(shape)
+        notes.append(OrientedPoints(oriented.n_fitted, oriented.n_turned))
+        return merge_duplicates(oriented.cloud)
     found = orientation(shape)
-    notes["orientation"] = found.summary
+    told = {name: found.summary[name] for name in OrientedFaces.__dataclass_fields__}
+    notes.append(OrientedFaces(**told))
     return Merged(found.shape, found.walls, 0)
 
 
@@ -189,21 +196,22 @@ def _elsewhere(
     shape: Shape, domain: Grid | TetMesh, steps: Steps, diffusion: float, progress: Progress | None
 ) -> GridField | TetField:
     """On tets, and on grids with solid nodes: the method, and distance to φ's own zero set where that can be."""
-    notes: dict[str, object] = {}
+    notes: list[Note] = []
     if steps.orient:
         shape = _oriented(shape, notes).shape
     if steps.unite and not isinstance(domain, Grid):
         united = union_of(shape)
-        shape, notes["left_out"] = united.shape, united.left_out
+        shape = united.shape
+        notes.append(united.left_out)
     field = SignedHeatSolver(domain, diffusion, progress).distance(shape)
     if steps.sharpen and not (isinstance(domain, Grid) and domain.mask is not None):
         field = sharpen(field)
-    return replace(field, diagnostics=replace(field.diagnostics, notes={**field.diagnostics.notes, **notes}))
+    return replace(field, diagnostics=field.diagnostics.noting(*notes))
 
 
 def _on_grid(shape: Shape, grid: Grid, steps: Steps, diffusion: float, progress: Progress | None) -> GridField:
     """Each step, timed, on a grid in space."""
-    notes: dict[str, object] = {}
+    notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
     discretization = discretize(grid)  # refuses what cannot fit
     with stopwatch("orient"):
@@ -228,24 +236,22 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, diffusion: float, progress:
         sides = _sides(phi, winding, samples, grid)
     with stopwatch("sharpen"):
         sharpened = _sharpened(shape, phi, sides, winding, grid)
-    told = {
-        "completed_area": sides.completed,
-        "reaches_box": sides.reaches_box,
-        "bounds_nothing": sides.bounds_nothing,
-    }
-    notes.update({name: note for name, note in told.items() if note is not None})
+    notes.append(SharpenedToShape(sharpened.layered, sharpened.completed))
+    notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
     diagnostics = _diagnostics(notes, stopwatch, time)
     return GridField(grid, sharpened.values, diagnostics, sharpened.confidence, sharpened.surface)
 
 
-def _diagnostics(notes: dict[str, object], stopwatch: Stopwatch, time: float) -> Diagnostics:
-    return Diagnostics(timings=dict(stopwatch.seconds), time=time, notes=notes)
+def _diagnostics(notes: list[Note], stopwatch: Stopwatch, time: float) -> Diagnostics:
+    return Diagnostics(timings=dict(stopwatch.seconds), time=time, notes=tuple(notes))
 
 
 def _sharpened(
     shape: Shape, phi: NDArray[np.float64] | None, sides: Sides, winding: NDArray[np.float64], grid: Grid
 ) -> Assembled:
     """Distance to the shape; faces beside which nothing is solid do not tell sides."""
+    if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
+        return assemble([shape], grid, phi, "auto")
     refused = _widened(sides.refused)
     upper = np.array(grid.shape) - 1
 
@@ -256,18 +262,16 @@ def _sharpened(
     if phi is not None and refused.any():
         phi = np.where(refused, sides.function, phi)
     fit: Fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
-    return assemble(*triangles_of(shape), grid, sides.function, fit, phi, tells)
+    return assemble([shape], grid, sides.function, fit, phi, tells)
 
 
 def _widened(nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Nodes and the two layers around them."""
-    from scipy.ndimage import binary_dilation
-
-    return binary_dilation(nodes, iterations=2) if nodes.any() else nodes
+    return np.asarray(scipy.ndimage.binary_dilation(nodes, iterations=2)) if nodes.any() else nodes
 
 
 def _united(
-    merged: Merged, grid: Grid, steps: Steps, notes: dict[str, object]
+    merged: Merged, grid: Grid, steps: Steps, notes: list[Note]
 ) -> tuple[Shape, AreaSamples | None, NDArray[np.float64]]:
     """The shape, its samples and its winding numbers, without what lies inside other bodies."""
     samples, winding = _wound(merged.shape, grid)
@@ -275,7 +279,7 @@ def _united(
         return merged.shape, samples, winding
     united = without_covered(merged, winding, grid)
     if united.left_out.merged_faces or united.left_out.covered_faces:
-        notes["left_out"] = united.left_out
+        notes.append(united.left_out)
     if united.shape is merged.shape:
         return merged.shape, samples, winding
     return united.shape, *_wound(united.shape, grid)

@@ -35,12 +35,15 @@ class ExactSurface:
         See `crossings_at`; around `origin` likewise.
     origin, steps : (3,) float
         First node of the grid, and distance between its nodes.
+    telling : (m,) bool, optional
+        Faces that tell a side; those of open sheets do not.
     """
 
     features: FaceFeatures
     crossings: NDArray[np.float64]
     origin: NDArray[np.float64]
     steps: NDArray[np.float64]
+    telling: NDArray[np.bool_] | None = None
 
     @cached_property
     def _tree(self) -> BoxTree:
@@ -57,7 +60,8 @@ class ExactSurface:
             near, _ = nearest_on_triangles(self.features.corners.reshape(-1, 3, 3), self._tree, points)
             found = search_from(self.features, points, near.astype(np.int32)[:, None])
             distances = found.distances
-            signs = np.where(found.regular, np.where(found.cosines < 0, -1.0, 1.0), signs)
+            told = found.regular if self.telling is None else found.regular & self.telling[found.faces]
+            signs = np.where(told, np.where(found.cosines < 0, -1.0, 1.0), signs)
         if len(self.crossings):
             _, nearest = scipy.spatial.cKDTree(self.crossings[:, 1:4]).query(points)
             other = np.empty(len(points))

@@ -129,7 +129,10 @@ def sampled_surface(
 
 
 def signed_distances(
-    surface: SampledSurface, inside: NDArray[np.bool_], trusted: NDArray[np.float32]
+    surface: SampledSurface,
+    inside: NDArray[np.bool_],
+    trusted: NDArray[np.float32],
+    telling: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
     """Signed distance of every node to what is nearest to it or to nodes before; and how far that can be trusted.
 
@@ -143,6 +146,8 @@ def signed_distances(
         Sides where no face tells them.
     trusted : (c,) float
         From 0 to 1, for each crossing; faces have 1.
+    telling : (s,) bool, optional
+        Samples whose faces tell a side; those of open sheets do not.
     """
     shape = surface.nearest.shape
     values, confidence = np.empty(shape), np.empty(shape, dtype=np.float32)
@@ -159,6 +164,8 @@ def signed_distances(
             candidates[:, 1] = found.faces
             distances = found.distances
             told = found.regular & (distances < near)
+            if telling is not None:
+                told &= telling[surface.nearest[i].ravel()]
             certain = np.ones(size, dtype=np.float32)
             if len(surface.crossings):
                 np.subtract(-1, candidates[:, 0], out=chosen)
