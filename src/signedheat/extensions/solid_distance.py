@@ -19,7 +19,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
-from ..errors import CancellingNormalsError, SourceError
+from ..errors import CancellingNormalsError, SourceError, UnsupportedTypeError
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..lowering.area_elements import AreaSamples, bounds_around, sample_on_grid
@@ -28,7 +28,7 @@ from ..method import diffuse, integrate, normalize
 from ..operators.grid.boundary_areas import distances_to_samples
 from ..operators.grid.face_values import values_at
 from ..progress import Progress, Stopwatch
-from ..solver import SignedHeatSolver, as_list
+from ..solver import SignedHeatSolver
 from .orientation import orientation
 from .point_orientation import orient_points
 from .shape_sharpening import Assembled, Fit, assemble
@@ -168,13 +168,17 @@ def _joined(shape: Shape | TetMesh | Sequence[Mesh]) -> Shape:
         return shape.boundary
     if not isinstance(shape, Sequence):
         return shape
-    shapes = as_list(shape)
-    if len(shapes) == 1:
-        return shapes[0]  # type: ignore[no-any-return]  # sources are of any kind there
-    for index, each in enumerate(shapes):
+    if not shape:
+        raise SourceError("there is no shape", remedy="pass at least one")
+    if len(shape) == 1:
+        return shape[0]
+    for index, each in enumerate(shape):
         if not isinstance(each, TriangleMesh | PolygonMesh):
-            raise SourceError(f"several meshes make one solid, and shape {index} is a {type(each).__name__}")
-    meshes = [each.triangulation for each in shapes]
+            raise SourceError(
+                f"several meshes make one solid, and shape {index} is a {type(each).__name__}",
+                element=f"shape {index}",
+            )
+    meshes = [each.triangulation for each in shape]
     starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
@@ -187,8 +191,17 @@ def _oriented(shape: Shape, notes: list[Note]) -> Merged:
         notes.append(OrientedPoints(oriented.n_fitted, oriented.n_turned))
         return merge_duplicates(oriented.cloud)
     found = orientation(shape)
-    told = {name: found.summary[name] for name in OrientedFaces.__dataclass_fields__}
-    notes.append(OrientedFaces(**told))
+    notes.append(
+        OrientedFaces(
+            found.turned_parts,
+            found.turned_faces,
+            found.turned_area,
+            found.undecided_area,
+            found.merged_faces,
+            found.doubled_walls,
+            found.cavities,
+        )
+    )
     return Merged(found.shape, found.walls, 0)
 
 
@@ -204,6 +217,9 @@ def _elsewhere(
         shape = united.shape
         notes.append(united.left_out)
     field = SignedHeatSolver(domain, diffusion, progress).distance(shape)
+    if not isinstance(field, GridField | TetField):
+        kind = type(domain).__name__
+        raise UnsupportedTypeError(f"a solid is measured on a Grid or a TetMesh, not on a {kind}")
     if steps.sharpen and not (isinstance(domain, Grid) and domain.mask is not None):
         field = sharpen(field)
     return replace(field, diagnostics=field.diagnostics.noting(*notes))
@@ -257,7 +273,8 @@ def _sharpened(
 
     def tells(feet: NDArray[np.float64]) -> NDArray[np.bool_]:
         nodes = tuple(np.clip(np.rint(feet).astype(np.int64), 0, upper).T)
-        return np.logical_and(values_at(winding, feet) > BOUNDING, ~refused[nodes])
+        told: NDArray[np.bool_] = (values_at(winding, feet) > BOUNDING) & ~refused[nodes]
+        return told
 
     if phi is not None and refused.any():
         phi = np.where(refused, sides.function, phi)

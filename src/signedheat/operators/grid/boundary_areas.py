@@ -45,7 +45,9 @@ def boundary_areas(
     total, completed : (l + 1,) float
         By label.
     """
-    return _boundary_areas(labels, function, distance, steps, far, int(labels.max(initial=0)) + 1)
+    n_labels = int(labels.max(initial=0)) + 1
+    total, completed = _boundary_areas(labels, function, distance, steps, far, n_labels)
+    return total, completed
 
 
 def completion_areas(

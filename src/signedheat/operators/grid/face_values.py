@@ -16,7 +16,8 @@ def values_at(function: NDArray[np.float64], positions: NDArray[np.float64]) -> 
     >>> values_at(np.arange(8.0).reshape(2, 2, 2), np.array([[0.5, 0.0, 1.0], [2.0, 0.0, 0.0]]))
     array([3., 0.])
     """
-    return _values_at(np.ascontiguousarray(function), np.ascontiguousarray(positions))
+    values: NDArray[np.float64] = _values_at(np.ascontiguousarray(function), np.ascontiguousarray(positions))
+    return values
 
 
 def ranges_on_faces(
@@ -32,7 +33,8 @@ def ranges_on_faces(
     >>> ranges_on_faces(ramp, np.array([[[1.0, 0, 0], [7, 0, 0], [1, 6, 6]]]))
     (array([1.]), array([7.]))
     """
-    return _ranges_on_faces(np.ascontiguousarray(function), np.ascontiguousarray(corners))
+    low, high = _ranges_on_faces(np.ascontiguousarray(function), np.ascontiguousarray(corners))
+    return low, high
 
 
 @compiled(nogil=True)
