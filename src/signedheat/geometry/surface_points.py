@@ -64,7 +64,7 @@ def locate_points(
     if len(outside):
         raise SourceError(
             f"{name} {outside[0]} lies in face {faces[outside[0]]}, but face ids go from 0 to {triangles.n_faces - 1}",
-            remedy="make it for this mesh",
+            remedy="make it for this mesh, if it was made for another mesh",
             element=f"face {faces[outside[0]]}",
         )
     inside = np.where(barycentric < SNAP, 0.0, barycentric)

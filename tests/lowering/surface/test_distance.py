@@ -106,7 +106,7 @@ def test_nonorientable_surfaces_equal_their_double_cover(closed):
         source = SimpleNamespace(
             vectors=sparse.csr_array(vectors[None]),
             time=0.25,
-            rows=sparse.csr_matrix(samples),
+            interpolation=sparse.csr_matrix(samples),
             weights=np.ones(len(samples)),
         )
         directions = normalize(surface, diffuse(surface, source))
