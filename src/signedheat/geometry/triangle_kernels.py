@@ -115,3 +115,18 @@ def add_fluxes(corners, positions, directions, n):
             opposite = positions[f, (k + 2) % 3] - positions[f, (k + 1) % 3]
             sums[corners[f, k]] += 0.5 * (opposite.real * directions[f].imag - opposite.imag * directions[f].real)
     return sums
+
+
+@compiled(nogil=True)
+def areas_and_volumes(vertices, triangles, center):
+    """(m,) areas of triangles, and volumes of the tetrahedra they make with a center: positive if it is behind them."""
+    areas, volumes = np.empty(len(triangles)), np.empty(len(triangles))
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ux, uy, uz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
+        wx, wy, wz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        areas[t] = 0.5 * np.sqrt(nx * nx + ny * ny + nz * nz)
+        px, py, pz = vertices[a, 0] - center[0], vertices[a, 1] - center[1], vertices[a, 2] - center[2]
+        volumes[t] = (px * nx + py * ny + pz * nz) / 6.0
+    return areas, volumes

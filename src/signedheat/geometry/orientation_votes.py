@@ -1,0 +1,163 @@
+"""What lines through a shape tell about which way its parts face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+
+
+@dataclass(frozen=True, eq=False)
+class Votes:
+    """Counts over crossings of lines with the parts of a shape, (n_parts,) each; votes are positive for "as it is".
+
+    A line enters a solid where it meets it first and leaves it where it meets it last. Where that is the same
+    crossing, it is seen from both sides and has no vote, so that sheets that lie open to both sides get none. Of a line
+    with any other odd number of crossings something is missing, nobody knows where: it tells nothing.
+
+    Attributes
+    ----------
+    crossings : int
+        Crossings of any line.
+    seen, seen_votes : int
+        First and last crossings of lines, all parts together: the sides seen from outside; and their votes.
+    own, own_votes : int
+        The same, each part as if it were alone.
+    even, even_votes : int
+        Crossings of lines with an even number of them, all parts together; votes of entering and leaving in turn.
+    lines, balanced : int
+        Lines that meet the part, and those that enter it as often as they leave it.
+    """
+
+    crossings: NDArray[np.int64]
+    seen: NDArray[np.int64]
+    seen_votes: NDArray[np.int64]
+    own: NDArray[np.int64]
+    own_votes: NDArray[np.int64]
+    even: NDArray[np.int64]
+    even_votes: NDArray[np.int64]
+    lines: NDArray[np.int64]
+    balanced: NDArray[np.int64]
+
+
+def votes(starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int) -> Votes:
+    """Count the votes of all crossings.
+
+    Parameters
+    ----------
+    starts : (n_lines + 1,) int
+        Where the crossings of each line begin.
+    parts, entering : (k,) int, (k,) bool
+        Part that is crossed, and whether its normal points to where the line comes from.
+    n_parts : int
+        Number of parts.
+
+    Examples
+    --------
+    >>> found = votes(np.array([0, 2, 3]), np.array([0, 0, 1]), np.array([True, False, True]), 2)
+    >>> found.seen_votes.tolist(), found.seen.tolist(), found.balanced.tolist()
+    ([2, 0], [2, 2], [1, 0])
+    """
+    return Votes(*_votes(starts, parts, entering, n_parts))
+
+
+def containers(
+    starts: NDArray[np.int64],
+    parts: NDArray[np.int64],
+    entering: NDArray[np.bool_],
+    bounding: NDArray[np.bool_],
+) -> NDArray[np.int64]:
+    """(k,) part within which each crossing lies: of those that the line is in, the one it entered last; −1 for none.
+
+    Parameters
+    ----------
+    starts, parts, entering
+        As for `votes`, each part facing out of itself.
+    bounding : (n_parts,) bool
+        Parts that have an inside. They count on lines that enter them as often as they leave them.
+
+    Examples
+    --------
+    >>> bounding, entering = np.array([True, True]), np.array([True, True, False, False])
+    >>> containers(np.array([0, 4]), np.array([0, 1, 1, 0]), entering, bounding).tolist()
+    [-1, 0, 0, -1]
+    """
+    return np.asarray(_containers(starts, parts, entering, bounding))
+
+
+@compiled(nogil=True)
+def _votes(starts, parts, entering, n_parts):
+    crossings, seen, seen_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    own, own_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    even, even_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    lines, balanced = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
+    sums, latest = np.zeros(n_parts, np.int64), np.full(n_parts, -1, np.int64)
+    for line in range(len(starts) - 1):
+        begin, end = starts[line], starts[line + 1]
+        for k in range(begin, end):
+            part, vote = parts[k], 1 if entering[k] else -1
+            crossings[part] += 1
+            if (end - begin) % 2 == 0:
+                even[part] += 1
+                even_votes[part] += vote if (k - begin) % 2 == 0 else -vote
+                if k == begin or k == end - 1:
+                    seen[part] += 1
+                    seen_votes[part] += vote if k == begin else -vote
+            elif end - begin == 1:
+                seen[part] += 2
+            if latest[part] < begin:  # the first of the part on this line
+                lines[part] += 1
+                own[part] += 2
+                own_votes[part] += vote
+                sums[part] = 0
+            latest[part] = k
+            sums[part] += vote
+        for k in range(begin, end):
+            part = parts[k]
+            if latest[part] == k:
+                own_votes[part] -= 1 if entering[k] else -1
+                balanced[part] += sums[part] == 0
+    return crossings, seen, seen_votes, own, own_votes, even, even_votes, lines, balanced
+
+
+@compiled(nogil=True)
+def _containers(starts, parts, entering, bounding):
+    n_parts = len(bounding)
+    found = np.full(len(parts), -1, dtype=np.int64)
+    sums, latest = np.zeros(n_parts, np.int64), np.full(n_parts, -1, np.int64)
+    longest = 0
+    for line in range(len(starts) - 1):
+        longest = max(longest, starts[line + 1] - starts[line])
+    stack = np.empty(longest, np.int64)
+    for line in range(len(starts) - 1):
+        begin, end = starts[line], starts[line + 1]
+        for k in range(begin, end):
+            part = parts[k]
+            if latest[part] < begin:
+                sums[part] = 0
+            latest[part] = k
+            sums[part] += 1 if entering[k] else -1
+        depth = 0
+        for k in range(begin, end):
+            part = parts[k]
+            counts = bounding[part] and sums[part] == 0
+            if counts and not entering[k]:
+                at = depth - 1
+                while at >= 0 and stack[at] != part:
+                    at -= 1
+                if at >= 0:
+                    for above in range(at, depth - 1):
+                        stack[above] = stack[above + 1]
+                    depth -= 1
+            at = depth - 1
+            while at >= 0 and stack[at] == part:
+                at -= 1
+            if at >= 0:
+                found[k] = stack[at]
+            if counts and entering[k]:
+                stack[depth] = part
+                depth += 1
+    return found

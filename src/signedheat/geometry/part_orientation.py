@@ -1,0 +1,177 @@
+"""Which way the parts of a surface face: each out of the solid that all of them together bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .orientation_votes import Votes, containers, votes
+from .stabbing_lines import LineCrossings
+
+LEAST_VOTE = 0.1
+"""A surface that bounds nothing gets no votes; of one of area A that a surface of area D would close, (A − D) / (A + D)
+of the crossings vote. Below this share (D > .8 A) the surface counts as a sheet."""
+LEAST_CLOSED = 0.5
+"""From this share on (D < A / 3) a part with holes has an inside that others may lie in."""
+LEAST_AGREEMENT = 0.6
+"""From this share of its area on, that given the same way round, a part's own orientation is a hint."""
+CERTAIN = 20.0
+"""Logarithm of the odds of what is told by a closed part's own volume."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What is known of the parts of a surface before lines are laid through them, (n_parts,) each.
+
+    Attributes
+    ----------
+    areas : float
+        Areas.
+    volumes : float
+        Signed volumes, as the parts are oriented now.
+    closed : bool
+        Whether every edge has two faces.
+    agreement : float
+        Share of the area that was given as it is oriented now, at least one half.
+    fixed : bool
+        Parts that cannot be oriented, or need not be.
+    """
+
+    areas: NDArray[np.float64]
+    volumes: NDArray[np.float64]
+    closed: NDArray[np.bool_]
+    agreement: NDArray[np.float64]
+    fixed: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class PartOrientation:
+    """How parts are to face.
+
+    Attributes
+    ----------
+    odds : (n_parts,) float
+        Logarithms of the odds that a part faces the right way; negative for those that must turn.
+    decided : (n_parts,) bool
+        Whether lines told anything. The others have but the orientation they were given.
+    nested : (n_parts,) int
+        Part in which each lies that is hidden in another; −1 for none.
+    cavity : (n_parts,) bool
+        Which of the nested parts are walls of cavities.
+    votes : Votes
+        What the lines told of the parts as they were.
+    """
+
+    odds: NDArray[np.float64]
+    decided: NDArray[np.bool_]
+    nested: NDArray[np.int64]
+    cavity: NDArray[np.bool_]
+    votes: Votes
+
+
+def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64]) -> PartOrientation:
+    """Let each part face out of the solid.
+
+    Closed parts first face out of themselves, which their volume tells. Parts that are seen from outside, closed or
+    open, then face to where they are seen from: lines enter a solid where they first meet it. A part hidden in another
+    is a body inside a body if both were given the same way round, and the wall of a cavity if not, or if a part was
+    given without a clear majority; whatever lies in a cavity is a body. Open parts that cannot be seen face so that
+    lines enter and leave in turn. The orientation that was given is a hint as far as it is right for the other parts,
+    or wrong for all of them; what bounds nothing follows it alone.
+
+    Parameters
+    ----------
+    parts : Parts
+        The parts.
+    lines : LineCrossings
+        Lines through them.
+    crossed : (k,) int
+        Part of each crossing.
+    """
+    found = votes(lines.starts, crossed, lines.entering, len(parts.areas))
+    own, own_known = _outward(parts, found)
+    bounding = ~parts.fixed & (parts.closed | (own_known & (np.abs(found.own_votes) >= LEAST_CLOSED * found.own)))
+    within = containers(lines.starts, crossed, lines.entering == (own[crossed] > 0), bounding)
+    nested = _nested(parts, found, bounding, crossed, within)
+    cavity = _cavities(parts, own, nested)
+    odds, decided = _by_sight(found)
+    hint = _hint(parts, found)
+    odds = np.where(decided, odds, 0.0) + hint
+    alone = ~parts.fixed & (parts.closed | (nested >= 0) | (~decided & own_known))
+    odds = np.where(alone, CERTAIN * own * np.where(cavity, -1, 1), odds)
+    odds[parts.fixed] = 0
+    return PartOrientation(odds, (decided | alone) & ~parts.fixed, nested, cavity, found)
+
+
+def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Signs by which each part faces out of itself, and whether they are known."""
+    flat = np.abs(parts.volumes) <= 1e-12 * parts.areas**1.5
+    by_volume = parts.closed & ~flat
+    signs = np.where(by_volume, np.where(parts.volumes < 0, -1, 1), np.where(found.own_votes < 0, -1, 1))
+    return signs, by_volume | _clear(found.own_votes, found.own, LEAST_VOTE)
+
+
+def _clear(ballots: NDArray[np.int64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
+    """Whether a vote is no accident of few lines: beyond the share and two standard deviations of a coin's."""
+    return np.abs(ballots) > share * cast + 2.0 * np.sqrt(cast)
+
+
+def _by_sight(found: Votes) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """How clearly parts face to where they are seen from; hidden ones, so that lines enter and leave in turn.
+
+    As logarithms of odds: 6 at most, where all crossings vote and there are many. For hidden parts half of that, and
+    the less the fewer parts that are seen are entered and left in turn: overlapping and doubled ones are not.
+    """
+    seen = _clear(found.seen_votes, found.seen, LEAST_VOTE)
+    even = _clear(found.even_votes, found.even, 2 * LEAST_VOTE) & (3 * found.even > found.crossings)
+    in_turn = (np.sign(found.seen_votes) * found.even_votes)[seen].sum() / max(int(found.even[seen].sum()), 1)
+    by_seen, by_even = found.seen_votes / (found.seen + 16.0), found.even_votes / (found.even + 16.0)
+    return np.where(seen, 6.0 * by_seen, 3.0 * max(in_turn, 0.0) * by_even), seen | even
+
+
+def _hint(parts: Parts, found: Votes) -> NDArray[np.float64]:
+    """What the votes for all other parts tell of the orientation as it was given, as logarithms of odds: 3 at most.
+
+    Parts of which a tenth was given the other way round count less: so may a small part have been.
+    """
+    trust = np.where(parts.fixed, 0.0, 2 * parts.agreement - 1)
+    ballots = trust * found.seen_votes
+    total = max(float(np.abs(found.seen_votes).sum()), 1.0)
+    return 3.0 * np.where(parts.agreement >= LEAST_AGREEMENT, (ballots.sum() - ballots) / total, 0.0)
+
+
+def _nested(
+    parts: Parts,
+    found: Votes,
+    bounding: NDArray[np.bool_],
+    crossed: NDArray[np.int64],
+    within: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Part in which each lies that is hidden in another. Whole parts in whole parts must be hidden altogether."""
+    n = len(parts.areas)
+    inside = within >= 0
+    pairs, counts = np.unique(crossed[inside] * n + within[inside], return_counts=True)
+    order = np.argsort(counts, kind="stable")  # the last written is the most frequent
+    nested = np.full(n, -1, dtype=np.int64)
+    nested[pairs[order] // n] = pairs[order] % n
+    share = np.bincount(crossed[inside], minlength=n) / np.maximum(found.crossings, 1)
+    exposed = found.seen / np.maximum(found.crossings, 1)
+    whole = parts.closed & parts.closed[nested]
+    hidden = np.where(whole, (exposed <= 0.02) & (share >= 0.9), (share >= 0.5) & (share > 2 * exposed))
+    return np.where(hidden & bounding & (nested >= 0), nested, -1)
+
+
+def _cavities(parts: Parts, own: NDArray[np.int64], nested: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which nested parts are walls of cavities; from the outermost inwards."""
+    hinting = parts.agreement >= LEAST_AGREEMENT
+    alike = hinting & hinting[nested] & (own == own[nested])
+    cavity = np.zeros(len(nested), dtype=bool)
+    known = nested < 0
+    while True:
+        ready = ~known & known[nested]
+        if not ready.any():
+            return cavity
+        cavity[ready] = ~alike[ready] & ~cavity[nested[ready]]
+        known |= ready
