@@ -27,6 +27,7 @@ from .errors import (
 from .extensions.close_curves import close_curves
 from .extensions.common_subdivision import common_subdivision
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
+from .extensions.orientation import Orientation, orient, orientation
 from .extensions.piecewise import piecewise_distance
 from .extensions.sharpening import sharpen
 from .extensions.sharpening_methods import Convex, Geodesic
@@ -68,6 +69,7 @@ __all__ = [
     "LevelValues",
     "MemoryLimitError",
     "MissingPackageError",
+    "Orientation",
     "OutsideError",
     "PiecewiseField",
     "PointCloud",
@@ -93,6 +95,8 @@ __all__ = [
     "intrinsic_delaunay",
     "load_field",
     "opening",
+    "orient",
+    "orientation",
     "piecewise_distance",
     "read",
     "read_curves",

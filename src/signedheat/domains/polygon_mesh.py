@@ -16,7 +16,7 @@ from ..geometry.virtual_refinement import VirtualRefinement, virtual_refinement
 from .exchange import Exchangeable
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
-from .validation import finite_rows, frozen
+from .validation import finite_rows, frozen, used_bounds
 
 Polygons = Sequence[Sequence[int] | NDArray[np.int64]] | NDArray[np.int64]
 """Vertex ids of each polygon."""
@@ -94,8 +94,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) lower and upper corner of the bounding box of the polygons, without unreferenced vertices."""
-        corners = self.vertices[self.corners]
-        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+        return used_bounds(self.vertices, self.corners)
 
     @cached_property
     def corner_polygons(self) -> NDArray[np.int64]:

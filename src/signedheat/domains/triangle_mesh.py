@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry.edges import EdgeTable, edge_table
 from .exchange import Exchangeable
 from .surface import Surface
-from .validation import element_ids, finite_rows
+from .validation import element_ids, finite_rows, used_bounds
 
 if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
@@ -62,8 +62,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) lower and upper corner of the bounding box of the faces, without unreferenced vertices."""
-        corners = self.vertices[self.faces.ravel()]
-        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+        return used_bounds(self.vertices, self.faces)
 
     @cached_property
     def edges(self) -> EdgeTable:

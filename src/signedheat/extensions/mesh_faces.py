@@ -1,0 +1,79 @@
+"""Faces of triangle and polygon meshes alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..geometry.surface_parts import SurfaceParts
+from ..geometry.triangle_kernels import areas_and_volumes
+
+Mesh = TriangleMesh | PolygonMesh
+
+
+@dataclass(frozen=True, eq=False)
+class MeshFaces:
+    """Faces of triangle and polygon meshes alike, and the triangles that they are made of."""
+
+    positions: NDArray[np.float64]
+    corners: NDArray[np.int64]
+    offsets: NDArray[np.int64]
+    triangles: NDArray[np.int64]
+    triangle_faces: NDArray[np.int64]
+    bounds: NDArray[np.float64]
+    unit: float
+
+    @classmethod
+    def of(cls, shape: Mesh) -> MeshFaces:
+        bounds, exponent = shape.bounds, int(np.frexp(np.abs(shape.bounds).max())[1])
+        if isinstance(shape, TriangleMesh):
+            positions, triangles, count = shape.vertices, shape.faces, shape.n_faces
+            corners, offsets, owners = triangles.ravel(), np.arange(0, 3 * count + 1, 3), np.arange(count)
+        else:
+            cut = shape.refinement
+            positions = np.concatenate([shape.vertices, cut.virtual_vertices])
+            triangles, owners = cut.faces, cut.face_polygons
+            corners, offsets = shape.corners, shape.offsets
+        if abs(exponent) > 200:  # products of three lengths would leave the range of numbers
+            positions, bounds = np.ldexp(positions, -exponent), np.ldexp(bounds, -exponent)
+        else:
+            exponent = 0
+        return cls(positions, corners, offsets, triangles, owners, bounds, float(np.ldexp(1.0, exponent)))
+
+    @cached_property
+    def measures(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(p,) areas, and volumes of the cones to the center of the shape."""
+        areas, volumes = areas_and_volumes(self.positions, self.triangles, self.bounds.mean(axis=0))
+        if len(areas) == len(self.offsets) - 1:
+            return areas, volumes
+        n = len(self.offsets) - 1
+        return _sums(self.triangle_faces, areas, n), _sums(self.triangle_faces, volumes, n)
+
+    @cached_property
+    def surface(self) -> SurfaceParts:
+        """The faces' parts."""
+        return SurfaceParts(self.positions, self.corners, self.offsets, self.measures[0])
+
+    def normals(self, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(p, 3) unit normals of the faces, some of them turned; zero without area."""
+        a, b, c = (self.positions[self.triangles[:, k]] for k in range(3))
+        vectors = np.cross(b - a, c - a)
+        if len(vectors) != len(turned):
+            vectors = np.stack([_sums(self.triangle_faces, column, len(turned)) for column in vectors.T], axis=1)
+        lengths = np.linalg.norm(vectors, axis=1)
+        return vectors * (np.where(turned, -1, 1) / np.where(lengths > 0, lengths, 1))[:, None]
+
+    @property
+    def centroids(self) -> NDArray[np.float64]:
+        """(p, 3) means of the faces' corners."""
+        sums = np.add.reduceat(self.positions[self.corners], self.offsets[:-1], axis=0)
+        return sums / np.diff(self.offsets)[:, None]
+
+
+def _sums(owners: NDArray[np.int64], values: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+    return np.bincount(owners, values, n).astype(np.float64)

@@ -1,0 +1,359 @@
+"""Orientation of meshes: faces agree with their neighbours, and parts point outwards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError
+from ..geometry.orientation_votes import votes
+from ..geometry.part_orientation import PartOrientation, Parts, orient_parts
+from ..geometry.soup_orientation import disagreeing_with_neighbors, odds_at_corners
+from ..geometry.stabbing_lines import LineCrossings, aimed_lines, joined, stabbing_lines
+from ..geometry.surface_parts import SurfaceParts
+from .mesh_faces import Mesh, MeshFaces
+
+SoupSigns = Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.integer]]
+"""Signs (n,) that orient pieces from their centroids (n, 3), area vectors up to sign (n, 3) and areas (n,)."""
+
+N_LINES = 30_000
+"""Lines laid through a shape to see which way its parts face."""
+MANY = 500_000
+"""Triangles from which on lines have 8 directions only, not 16: each costs a look at all of them."""
+N_AIMED = 8
+"""Closed parts that fewer of them cross get lines of their own."""
+FEW = 0.75
+"""Logarithm of the odds from which parts turn that have but a hint: that all other parts must turn."""
+NEARLY_CLOSED = 0.8
+"""Share of votes (see `LEAST_VOTE`) from which a doubled part is a solid drawn from both sides, no wall."""
+CONTESTED = 0.5
+"""Share of pieces with contradicting neighbours from which pieces are oriented from scratch."""
+SMALL = 0.03
+"""Share of the area up to which a part that lines tell nothing of asks its neighbours."""
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """How a mesh was oriented, and what was found on the way.
+
+    Attributes
+    ----------
+    shape : TriangleMesh or PolygonMesh
+        The oriented mesh, on the same vertices.
+    faces : (k,) int
+        Which faces of the mesh that was given are still there, in order.
+    turned : (k,) bool
+        Which of them were turned.
+    parts : (k,) int
+        Which of them hang together across edges of two faces; −1 for faces on fewer than three places.
+    walls : (k,) bool
+        Faces of doubled walls.
+    undecided : (k,) bool
+        Faces of sheets and other parts for which no side is outside: they agree with their neighbours, and most of each
+        part's area is as it was given.
+    n_parts, closed_parts : int
+        Parts, and those of which every edge has two faces.
+    turned_parts, turned_faces, turned_area : int, int, float
+        Parts given facing inwards; faces turned, and their share of the area.
+    inconsistent_edges : int
+        Edges across which two faces disagreed.
+    nonmanifold_edges : int
+        Edges of three or more faces, across which orientation is not carried on.
+    nonorientable_parts : int
+        Parts whose faces cannot agree, such as Möbius bands: left as they are.
+    undecided_parts, undecided_area : int, float
+        Parts without outside, doubled walls left out, and their share of the area.
+    merged_faces : int
+        Duplicates left out.
+    doubled_walls, wall_area : int, float
+        Parts there twice, once facing each way; share of the area, both sides counted.
+    nested_bodies, cavities : int
+        Parts hidden in others: those that are bodies as well, and those that are walls of cavities.
+    """
+
+    shape: Mesh
+    faces: NDArray[np.int64]
+    turned: NDArray[np.bool_]
+    parts: NDArray[np.int64]
+    walls: NDArray[np.bool_]
+    undecided: NDArray[np.bool_]
+    n_parts: int
+    closed_parts: int
+    turned_parts: int
+    turned_faces: int
+    turned_area: float
+    inconsistent_edges: int
+    nonmanifold_edges: int
+    nonorientable_parts: int
+    undecided_parts: int
+    undecided_area: float
+    merged_faces: int
+    doubled_walls: int
+    wall_area: float
+    nested_bodies: int
+    cavities: int
+
+    @property
+    def summary(self) -> dict[str, int | float]:
+        """The counts and shares by name."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, (int, float))}
+
+
+def orient(shape: Mesh) -> Mesh:
+    """The mesh with its faces turned so that neighbours agree and every part points outwards.
+
+    See `orientation`, which also tells what was turned.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> sphere = samples.with_flipped_faces(samples.sphere(3), 0.4)
+    >>> bool((orient(sphere).faces == samples.sphere(3).faces).all())
+    True
+    """
+    return orientation(shape).shape
+
+
+def orientation(shape: Mesh, soup_signs: SoupSigns | None = None) -> Orientation:
+    """Orient a mesh, and tell what was turned, merged and left.
+
+    Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Across edges of two faces
+    orientation is carried on, and each part so found takes that of the most of its area. Lines laid through the whole
+    shape then tell which way each part faces (`orient_parts`). Small pieces that touch other parts at corners face as
+    they do; of those that touch nothing, each turns only if its neighbours clearly disagree with it.
+
+    A part that is there twice, once facing each way, is a doubled wall: both its sides stay. If it is closed, or holes
+    make up less than a ninth of its area, it is a solid drawn from both sides, and one side goes.
+
+    Takes O(n) time, and O(k log k) for k pieces that touch nothing.
+
+    Parameters
+    ----------
+    shape : TriangleMesh or PolygonMesh
+        Any mesh, however broken.
+    soup_signs : callable, optional
+        Orients pieces that touch nothing where their own orientation is no hint, from centroids, area vectors up to
+        sign, and areas. By default such pieces stay as they are.
+
+    Raises
+    ------
+    GeometryError
+        If the shape is no mesh.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> outer, cavity = samples.sphere(3), samples.sphere(3, radius=0.5)
+    >>> inside_out = TriangleMesh(cavity.vertices, cavity.faces[:, ::-1])
+    >>> found = orientation(samples.union(outer, inside_out))
+    >>> found.turned_parts, found.cavities, found.nested_bodies
+    (0, 1, 0)
+    >>> orientation(samples.union(outer, cavity)).nested_bodies
+    1
+    """
+    if not isinstance(shape, TriangleMesh | PolygonMesh):
+        kind = type(shape).__name__
+        raise GeometryError(f"faces are oriented here, and a {kind} has none: pass a TriangleMesh or PolygonMesh")
+    faces = MeshFaces.of(shape)
+    surface = faces.surface
+    lines, crossed = _crossings(faces)
+    walls = _doubled_walls(surface, lines, crossed)
+    parts = _table(faces, walls)
+    if walls.any():
+        lines, crossed = _without(lines, crossed, walls)
+    found = orient_parts(parts, lines, crossed)
+    undecided = surface.is_part & ~found.decided & ~parts.fixed
+    odds, undecided = _ask_neighbors(
+        faces, found.odds, undecided, surface.is_part & ~parts.closed & ~parts.fixed & (found.nested < 0)
+    )
+    wrong = odds < np.where(undecided, -FEW, 0.0)
+    turned = surface.orientation.turned != wrong[surface.orientation.parts]
+    alone = (
+        surface.is_first
+        & undecided[surface.orientation.parts]
+        & (parts.areas <= SMALL * parts.areas.sum())[surface.orientation.parts]
+    )
+    if alone.any():
+        turned = _orient_soup(faces, turned, alone, soup_signs)
+    return _oriented(shape, surface, found, turned, wrong, walls, undecided)
+
+
+def _crossings(faces: MeshFaces) -> tuple[LineCrossings, NDArray[np.int64]]:
+    """Lines through first faces as they agree with their neighbours, and the parts they cross."""
+    surface = faces.surface
+    parts, turned = surface.orientation.parts, surface.orientation.turned
+    drawn = np.flatnonzero(surface.is_first[faces.triangle_faces])
+    triangles, owners = faces.triangles[drawn], faces.triangle_faces[drawn]
+    lines = stabbing_lines(faces.positions, triangles, faces.bounds, N_LINES, 16 if len(triangles) < MANY else 8)
+    counts = np.bincount(parts[owners[lines.triangles]], minlength=surface.n_parts)
+    missed = np.flatnonzero(surface.orientation.closed & surface.is_part & (counts < N_AIMED))
+    if len(missed):
+        aims = _middles_of_largest(faces, missed)
+        lines = joined(lines, aimed_lines(faces.positions, triangles, faces.bounds, aims))
+    crossed = owners[lines.triangles]
+    return replace(lines, entering=lines.entering != turned[crossed]), parts[crossed]
+
+
+def _middles_of_largest(faces: MeshFaces, parts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Middles of the largest triangle of each of some parts."""
+    areas = np.where(faces.surface.is_first, faces.surface.areas, -1.0)
+    of_part = faces.surface.orientation.parts
+    order = np.argsort(areas, kind="stable")
+    largest = np.zeros(faces.surface.n_parts, dtype=np.int64)
+    largest[of_part[order]] = order  # the last written
+    of_face = np.zeros(len(areas), dtype=np.int64)
+    of_face[faces.triangle_faces[::-1]] = np.arange(len(faces.triangles))[::-1]
+    return np.mean(faces.positions[faces.triangles[of_face[largest[parts]]]], axis=1)
+
+
+def _doubled_walls(surface: SurfaceParts, lines: LineCrossings, crossed: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n_parts,) parts there twice, once facing each way, that do not all but close."""
+    alike, opposite = surface.copies
+    doubled = (alike > 0) & (opposite > 0)
+    if not doubled.any():
+        return np.zeros(surface.n_parts, dtype=bool)
+    mostly = surface.part_sums(surface.areas * doubled) > 0.5 * surface.part_sums(surface.areas)
+    found = votes(lines.starts, crossed, lines.entering, surface.n_parts)
+    encloses = surface.orientation.closed | (np.abs(found.own_votes) > NEARLY_CLOSED * np.maximum(found.own, 1))
+    return mostly & ~encloses
+
+
+def _table(faces: MeshFaces, walls: NDArray[np.bool_]) -> Parts:
+    surface, (areas, volumes) = faces.surface, faces.measures
+    turned = surface.orientation.turned
+    alike, opposite = surface.copies
+    totals = surface.part_sums(areas * (alike + opposite))
+    as_given = surface.part_sums(areas * np.where(turned, opposite, alike))
+    return Parts(
+        areas=surface.part_sums(areas),
+        volumes=surface.part_sums(np.where(turned, -volumes, volumes)),
+        closed=surface.orientation.closed & surface.is_part,
+        agreement=as_given / np.where(totals > 0, totals, 1),
+        fixed=walls | ~surface.orientation.orientable | ~surface.is_part,
+    )
+
+
+def _without(
+    lines: LineCrossings, crossed: NDArray[np.int64], parts: NDArray[np.bool_]
+) -> tuple[LineCrossings, NDArray[np.int64]]:
+    """Crossings without those of some parts."""
+    kept = ~parts[crossed]
+    counts = np.concatenate([[0], np.cumsum(kept)])
+    return replace(
+        lines,
+        starts=counts[lines.starts],
+        triangles=lines.triangles[kept],
+        entering=lines.entering[kept],
+        depths=lines.depths[kept],
+        cosines=lines.cosines[kept],
+    ), crossed[kept]
+
+
+def _ask_neighbors(
+    faces: MeshFaces, odds: NDArray[np.float64], undecided: NDArray[np.bool_], small: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Odds of small parts with what they touch at corners, and the parts of which still nothing is known."""
+    surface = faces.surface
+    areas = surface.part_sums(surface.areas)
+    small = small & (areas <= SMALL * areas.sum())
+    if not small.any():
+        return odds, undecided
+    normals = faces.normals(surface.orientation.turned)[surface.owners]
+    told = odds_at_corners(surface.tails, surface.orientation.parts[surface.owners], normals, odds, small)
+    return told, undecided & (np.abs(told - odds) < 1.0)
+
+
+def _orient_soup(
+    faces: MeshFaces, turned: NDArray[np.bool_], alone: NDArray[np.bool_], soup_signs: SoupSigns | None
+) -> NDArray[np.bool_]:
+    """Orient small pieces that touch nothing: as their neighbours are, or from scratch where those contradict."""
+    surface, normals = faces.surface, faces.normals(turned)
+    normals[~surface.is_first] = 0
+    wrong, contested = disagreeing_with_neighbors(faces.centroids, normals, alone)
+    if soup_signs is not None and contested > CONTESTED:
+        areas = surface.areas[alone]
+        wrong = np.zeros_like(wrong)
+        wrong[alone] = soup_signs(faces.centroids[alone], normals[alone] * areas[:, None], areas) < 0
+    return np.not_equal(turned, wrong)
+
+
+def _oriented(
+    shape: Mesh,
+    surface: SurfaceParts,
+    found: PartOrientation,
+    turned: NDArray[np.bool_],
+    wrong: NDArray[np.bool_],
+    walls: NDArray[np.bool_],
+    undecided: NDArray[np.bool_],
+) -> Orientation:
+    """Of the copies of each face, keep one, or one facing each way in doubled walls; and count."""
+    first = np.where(surface.first >= 0, surface.first, np.arange(surface.n_faces))
+    parts = np.where(surface.first >= 0, surface.orientation.parts[first], -1)
+    flipped = turned[first] != surface.reversed  # a copy that runs the other way must turn where the first must not
+    if surface.is_first.all():
+        kept = np.arange(surface.n_faces)
+        two_sided = np.zeros(surface.n_faces, dtype=bool)
+    else:
+        kept, two_sided = _kept(surface, first, flipped, walls[parts] & (parts >= 0))
+    flipped = (flipped & ~two_sided)[kept]
+    two_sided, parts = two_sided[kept], parts[kept]
+    areas = surface.areas[kept]
+    total = max(float(areas.sum()), np.finfo(float).tiny)
+    sheet = undecided[parts] & (parts >= 0)
+    return Orientation(
+        shape=_turned_mesh(shape, kept, flipped),
+        faces=kept,
+        turned=flipped,
+        parts=parts,
+        walls=two_sided,
+        undecided=sheet,
+        n_parts=int(surface.is_part.sum()),
+        closed_parts=int((surface.is_part & surface.orientation.closed).sum()),
+        turned_parts=int(wrong.sum()),
+        turned_faces=int(flipped.sum()),
+        turned_area=float(areas[flipped].sum()) / total,
+        inconsistent_edges=surface.orientation.disagreeing,
+        nonmanifold_edges=int((surface.pairs.counts > 2).sum()),
+        nonorientable_parts=int((surface.is_part & ~surface.orientation.orientable).sum()),
+        undecided_parts=int(undecided.sum()),
+        undecided_area=float(areas[sheet].sum()) / total,
+        merged_faces=surface.n_faces - len(kept),
+        doubled_walls=int(walls.sum()),
+        wall_area=float(areas[two_sided].sum()) / total,
+        nested_bodies=int(((found.nested >= 0) & ~found.cavity).sum()),
+        cavities=int(found.cavity.sum()),
+    )
+
+
+def _kept(
+    surface: SurfaceParts, first: NDArray[np.int64], flipped: NDArray[np.bool_], in_wall: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Faces to keep: of the copies on the same corners one that need not turn, if any, and in walls one of each way."""
+    alike, opposite = surface.copies
+    two_sided = in_wall & (alike[first] > 0) & (opposite[first] > 0)
+    group = 2 * first + (two_sided & surface.reversed)
+    order = np.lexsort((flipped, group))
+    begins = np.ones(len(order), dtype=bool)
+    begins[1:] = group[order[1:]] != group[order[:-1]]
+    return np.sort(order[begins]), two_sided
+
+
+def _turned_mesh(shape: Mesh, kept: NDArray[np.int64], flipped: NDArray[np.bool_]) -> Mesh:
+    """Some faces of a mesh, some of them turned; the mesh itself where nothing changes."""
+    if not flipped.any() and len(kept) == (shape.n_faces if isinstance(shape, TriangleMesh) else shape.n_polygons):
+        return shape
+    if isinstance(shape, TriangleMesh):
+        faces = shape.faces[kept] if len(kept) < shape.n_faces else shape.faces.copy()
+        faces[flipped] = faces[flipped][:, ::-1]
+        return TriangleMesh(shape.vertices, faces)
+    polygons = shape.polygons
+    return PolygonMesh(
+        shape.vertices,
+        [polygons[k][::-1] if turn else polygons[k] for k, turn in zip(kept.tolist(), flipped.tolist(), strict=True)],
+    )
