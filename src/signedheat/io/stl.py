@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..domains.point_cloud import PointCloud
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
+from ..geometry.welding import distinct_rows
 from .elements import SurfaceShape, refuse
 from .files import PathLike, contents, numbers
 
@@ -32,7 +33,7 @@ def read_stl(path: PathLike) -> TriangleMesh:
             path=path,
         )
     else:
-        corners = np.frombuffer(data, _FACET, announced, _HEADER)["corners"].astype(np.float64)
+        corners = np.frombuffer(data, _FACET, announced, _HEADER)["corners"].astype(np.float32)
     return _indexed(corners.reshape(-1, 3))
 
 
@@ -73,11 +74,9 @@ def _text_corners(data: bytes, path: PathLike) -> NDArray[np.float64]:
     return numbers([words[k + 1 : k + 4] for k in at], path, "vertices").reshape(-1, 3)
 
 
-def _indexed(corners: NDArray[np.float64]) -> TriangleMesh:
+def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
     if not len(corners):
         return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
-    bits = (corners + 0.0).view(np.dtype((np.void, 24))).ravel()  # adding zero turns −0 into 0
-    _, first, vertex = np.unique(bits, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return TriangleMesh(corners[np.sort(first)], rank[vertex].reshape(-1, 3))
+    corners = corners + corners.dtype.type(0)  # adding zero turns −0 into 0
+    ids, firsts = distinct_rows(corners.view(f"u{corners.itemsize}"))
+    return TriangleMesh(corners[firsts].astype(np.float64), ids.reshape(-1, 3))
