@@ -131,6 +131,34 @@ def test_info_of_shapes_and_fields(tmp_path, ball, capsys):
     assert json.loads(succeed(capsys, "info", cloud, "--json"))["has_normals"] is True
 
 
+def test_info_tells_which_way_parts_face(tmp_path, capsys):
+    outer, inner = samples.sphere(3), samples.sphere(2, radius=0.8)
+    flat = sh.TriangleMesh([[2, 0, 0], [3, 0, 0], [2, 1, 0]], [[0, 1, 2]])
+    wall = sh.TriangleMesh([[0, 0, 3], [1, 0, 3], [0, 1, 3]], [[0, 1, 2], [0, 2, 1]])
+    shapes = {
+        "outwards.ply": (outer, "facing outwards"),
+        "inwards.ply": (sh.TriangleMesh(outer.vertices, outer.faces[:, ::-1]), "all facing inwards"),
+        "turned.ply": (samples.with_flipped_faces(outer, 0.1), "faces disagree at"),
+        "within.ply": (samples.union(outer, inner), "1 body hidden in another"),
+        "cavity.ply": (
+            samples.union(outer, sh.TriangleMesh(inner.vertices, inner.faces[:, ::-1])),
+            "1 cavity",
+        ),
+        "sheet.ply": (samples.union(outer, flat), "in 1 sheet without an inside"),
+        "wall.ply": (samples.union(outer, wall), "1 doubled wall"),
+    }
+    for name, (shape, said) in shapes.items():
+        path = str(tmp_path / name)
+        shape.save(path)
+        assert said in succeed(capsys, "info", path)
+        told = json.loads(succeed(capsys, "info", path, "--json"))
+        assert told["orientation"] == sh.orientation(sh.read(path)).summary
+        assert told["least_spacing"] > 0
+    told = json.loads(succeed(capsys, "info", str(tmp_path / "cavity.ply"), "--json"))
+    assert told["thickness"]["wall"] == pytest.approx(0.2, rel=0.15)
+    assert told["thickness"]["spacing"] == told["thickness"]["wall"] / 2
+
+
 def test_pictures(tmp_path, ball, capsys):
     import matplotlib.image
 

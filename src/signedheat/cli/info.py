@@ -8,12 +8,17 @@ from typing import Any
 
 from ..domains.grid import Grid
 from ..domains.inspection import inspect
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
+from ..extensions.orientation import Orientation, orientation
+from ..extensions.thickness import Thickness, thickness
 from ..io import FIELD_FORMATS, load_field, read, read_curves, read_polylines
 from ..io.files import extension
 from ..io.obj import read_obj_lines
 from ..lowering.area_elements import bounds_around
-from ..lowering.grid.discretization import memory_estimate
+from ..lowering.grid.discretization import fitting_spacing, memory_estimate
+from ..memory import available_memory
 from .computing import describe, is_planar
 from .curve_report import as_text, curve_reports
 from .options import Summary, add_command, whole_number
@@ -27,6 +32,7 @@ def add_to(commands: Any) -> None:
         run=run,
         help="what a file holds and what is wrong with it",
         description="Counts, open, nonmanifold and inconsistent edges, degenerate and duplicate elements, bounds; "
+        "which way the parts of a mesh face, doubled walls, bodies within others, sheets, the thinnest wall and gap; "
         "the memory that grids around a shape take. Of a field: its grid and range.",
     )
     parser.add_argument("file", metavar="FILE", help="a shape, polylines in the plane or a field")
@@ -54,8 +60,17 @@ def run(arguments: Namespace) -> Summary:
     summary = {"file": arguments.file, "kind": type(shape).__name__, **asdict(inspect(shape))}
     if extension(arguments.file) == ".obj":
         summary["line_elements"] = len(read_obj_lines(arguments.file)[1])
-    summary["memory_bytes"] = {str(n): _memory(shape, n) for n in arguments.resolution}
-    text = _table(summary)
+    rows = dict(summary)
+    if isinstance(shape, TriangleMesh | PolygonMesh):
+        found = orientation(shape)
+        widths = thickness(found.shape)
+        summary["orientation"] = found.summary
+        summary["thickness"] = {**asdict(widths), "spacing": widths.spacing}
+        rows |= {"orientation": orientation_text(found), **_widths_text(widths)}
+    extra: dict[str, object] = {"memory_bytes": {str(n): _memory(shape, n) for n in arguments.resolution}}
+    extra["least_spacing"] = _least_spacing(shape)
+    summary |= extra
+    text = _table(rows | extra)
     if arguments.curves:
         if not hasattr(shape, "triangulation"):
             raise SourceError(
@@ -84,6 +99,65 @@ def lines_report(arguments: Namespace) -> Summary:
     return summary, _table(summary)
 
 
+def orientation_text(found: Orientation) -> str:
+    """Which way a mesh faces, in a line.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> orientation_text(orientation(samples.with_flipped_faces(samples.sphere(2), 0.1)))
+    '1 part, closed; faces disagree at 89 edges: 33 faces to turn (10.2 % of the area)'
+    """
+    closed = "closed" if found.closed_parts == found.n_parts else f"{found.closed_parts} closed"
+    said = [f"{_count(found.n_parts, 'part')}, {closed}"]
+    if found.inconsistent_edges:
+        edges, faces = _count(found.inconsistent_edges, "edge"), _count(found.turned_faces, "face")
+        said.append(f"faces disagree at {edges}: {faces} to turn ({100 * found.turned_area:.3g} % of the area)")
+    elif found.turned_parts:
+        which = "all" if found.turned_area > 0.9999 else f"{_count(found.turned_parts, 'part')}"
+        said.append(f"{which} facing inwards ({100 * found.turned_area:.3g} % of the area to turn)")
+    elif found.undecided_area < 0.9999:
+        said.append("facing outwards")
+    kinds = (
+        (found.nonorientable_parts, "nonorientable part", "nonorientable parts"),
+        (found.doubled_walls, "doubled wall", "doubled walls"),
+        (found.nested_bodies, "body hidden in another", "bodies hidden in others"),
+        (found.cavities, "cavity", "cavities"),
+    )
+    said += [f"{number} {one if number == 1 else many}" for number, one, many in kinds if number]
+    if found.merged_faces:
+        said.append(f"{_count(found.merged_faces, 'duplicate face')} to merge")
+    if found.undecided_parts:
+        sheets = _count(found.undecided_parts, "sheet")
+        said.append(f"{100 * found.undecided_area:.3g} % of the area in {sheets} without an inside")
+    return "; ".join(said)
+
+
+def _count(number: int, name: str) -> str:
+    return f"{number} {name}" if number == 1 else f"{number} {name}s"
+
+
+def _widths_text(widths: Thickness) -> dict[str, str]:
+    rows = {}
+    for name, least, typical in (
+        ("thinnest wall", widths.wall, widths.typical_wall),
+        ("narrowest gap", widths.gap, widths.typical_gap),
+    ):
+        if least is not None:
+            rows[name] = f"{least:.4g}" + (f" (typical {typical:.4g})" if typical is not None else "")
+    if widths.spacing is not None:
+        rows["spacing they need"] = f"{widths.spacing:.4g}"
+    return rows
+
+
+def _least_spacing(shape: Any) -> float | None:
+    """Spacing of the finest grid around the shape that fits into the memory that is free."""
+    available = available_memory()
+    if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
+        return None
+    return float(fitting_spacing(Grid.around(shape.bounds, 128), available).max())
+
+
 def _memory(shape: Any, resolution: int) -> int | None:
     """Estimate for a grid around the shape; nothing where the shape is a single place."""
     if not (shape.bounds[1] > shape.bounds[0]).any():
@@ -94,6 +168,9 @@ def _memory(shape: Any, resolution: int) -> int | None:
 def _table(summary: dict[str, Any]) -> str:
     rows = []
     for key, value in summary.items():
+        if key == "least_spacing":
+            rows.append(("spacing that fits", "–" if value is None else f"{value:.3g}"))
+            continue
         if key == "memory_bytes":
             for resolution, size in value.items():
                 rows.append((f"memory at {resolution}", "–" if size is None else f"{size / 1e9:.2f} GB"))

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.components import connected_components
+from ..geometry.coincident_faces import coincident_faces
+from ..geometry.halfedges import following_corners, may_coincide, pair_halfedges
+from ..geometry.inspection_kernels import (
+    count_components,
+    count_edges,
+    count_nonmanifold_vertices,
+    inspect_faces,
+)
+from ..geometry.welding import distinct_rows
 from ..operators.tetrahedral import FLAT
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
@@ -35,7 +42,8 @@ class SurfaceReport:
     inconsistent_edges : int
         Edges whose two faces run along them in the same direction, so that one of the faces is flipped.
     degenerate_faces, duplicate_faces : int
-        Faces without area, or with a repeated vertex; faces with the same vertices as an earlier one.
+        Faces without area, or with a repeated vertex; faces with the same vertices as an earlier one, in the same or in
+        the opposite order.
     duplicate_vertices, unreferenced_vertices : int
         Vertices at exactly the position of an earlier one; vertices without a face.
     area : float
@@ -132,7 +140,7 @@ class TetReport:
 
 
 def inspect(shape: TriangleMesh | PolygonMesh | PointCloud | TetMesh) -> SurfaceReport | CloudReport | TetReport:
-    """Count the elements and defects of a shape, in O(n log n) time.
+    """Count the elements and defects of a shape, in O(n) time.
 
     Parameters
     ----------
@@ -178,101 +186,49 @@ def _inspect_tets(mesh: TetMesh) -> TetReport:
 
 
 def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
-    polygons = mesh if isinstance(mesh, PolygonMesh) else PolygonMesh(mesh.vertices, mesh.faces)
-    tail, head, face = polygons.corners, polygons.next_corners, polygons.corner_polygons
-    sides = np.diff(polygons.offsets)
-    n_vertices = polygons.n_vertices
-
-    proper = np.flatnonzero(tail != head)
-    low, high = np.minimum(tail, head)[proper], np.maximum(tail, head)[proper]
-    order = np.argsort(low * n_vertices + high, kind="stable")
-    proper, low, high = proper[order], low[order], high[order]
-    is_first = np.ones(len(proper), dtype=bool)
-    is_first[1:] = (low[1:] != low[:-1]) | (high[1:] != high[:-1])
-    edge = np.cumsum(is_first) - 1
-    n_edges = int(edge[-1]) + 1 if len(edge) else 0
-    faces_of_edge = np.bincount(edge, minlength=n_edges)
-    along = np.bincount(edge, weights=tail[proper] == low, minlength=n_edges)
-    of_single_face = faces_of_edge[edge] == 1
-
-    referenced = np.unique(tail)
-    areas = np.linalg.norm(polygons.polygon_area_vectors, axis=1)
-    by_face = np.lexsort((tail, face))
-    repeats = np.zeros(len(tail), dtype=bool)
-    repeats[1:] = (tail[by_face][1:] == tail[by_face][:-1]) & (face[by_face][1:] == face[by_face][:-1])
-    degenerate = areas <= _roundoff(polygons)
-    degenerate[face[by_face][repeats]] = True
+    if isinstance(mesh, TriangleMesh):
+        corners, offsets = mesh.faces.ravel(), np.arange(0, 3 * mesh.n_faces + 1, 3)
+    else:
+        corners, offsets = mesh.corners, mesh.offsets
+    following = following_corners(offsets)
+    heads, sides = corners[following], np.diff(offsets)
+    pairs = pair_halfedges(corners, heads, mesh.n_vertices)
+    table = pairs.edges, pairs.counts, pairs.first, pairs.second
+    open_edges, nonmanifold_edges, inconsistent_edges, lonely = count_edges(corners, *table)
+    nonmanifold_vertices = count_nonmanifold_vertices(mesh.n_vertices, corners, following, *table)
+    duplicates = 0
+    if nonmanifold_edges or may_coincide(pairs, corners, following):
+        first, _ = coincident_faces(corners, offsets)
+        duplicates = int(((first >= 0) & (first != np.arange(len(sides)))).sum())
+    area, degenerate, box = inspect_faces(mesh.vertices, corners, offsets)
+    referenced = np.zeros(mesh.n_vertices, dtype=bool)
+    referenced[corners] = True
     return SurfaceReport(
-        n_vertices=n_vertices,
-        n_faces=polygons.n_polygons,
-        n_edges=n_edges,
+        n_vertices=mesh.n_vertices,
+        n_faces=len(sides),
+        n_edges=len(pairs.counts),
         corners_per_face=(int(sides.min()), int(sides.max())),
-        components=_n_components(n_vertices, tail, head, referenced),
-        open_edges=int((faces_of_edge == 1).sum()),
-        borders=_n_components(n_vertices, low[of_single_face], high[of_single_face]),
-        nonmanifold_edges=int((faces_of_edge > 2).sum()),
-        nonmanifold_vertices=_n_nonmanifold_vertices(polygons, proper, edge, faces_of_edge),
-        inconsistent_edges=int(((faces_of_edge == 2) & (along != 1)).sum()),
-        degenerate_faces=int(degenerate.sum()),
-        duplicate_faces=_n_repeated_faces(tail[by_face], polygons.offsets),
-        duplicate_vertices=_n_repeated(polygons.vertices),
-        unreferenced_vertices=n_vertices - len(referenced),
-        area=float(areas.sum()),
-        lower=_tuple(mesh.bounds[0]),
-        upper=_tuple(mesh.bounds[1]),
+        components=int(count_components(mesh.n_vertices, corners, heads, lonely[:0])),
+        open_edges=int(open_edges),
+        borders=int(count_components(mesh.n_vertices, corners, heads, lonely)) if open_edges else 0,
+        nonmanifold_edges=int(nonmanifold_edges),
+        nonmanifold_vertices=int(nonmanifold_vertices),
+        inconsistent_edges=int(inconsistent_edges),
+        degenerate_faces=int(degenerate),
+        duplicate_faces=duplicates,
+        duplicate_vertices=_n_repeated(mesh.vertices),
+        unreferenced_vertices=int(mesh.n_vertices - referenced.sum()),
+        area=float(area),
+        lower=_tuple(box[0]),
+        upper=_tuple(box[1]),
     )
 
 
-def _roundoff(polygons: PolygonMesh) -> NDArray[np.float64]:
-    """(p,) areas up to which a polygon counts as degenerate, for the rounding of its coordinates."""
-    corners = np.abs(polygons.vertices[polygons.corners] - polygons.polygon_centroids[polygons.corner_polygons])
-    radius = np.maximum.reduceat(corners.max(axis=1), polygons.offsets[:-1])
-    coordinates = np.abs(polygons.vertices[polygons.corners]).max(axis=1)
-    return 4 * np.finfo(float).eps * radius * np.maximum.reduceat(coordinates, polygons.offsets[:-1])
-
-
-def _n_nonmanifold_vertices(
-    polygons: PolygonMesh, halfedges: NDArray[np.int64], edge: NDArray[np.int64], faces_of_edge: NDArray[np.int64]
-) -> int:
-    """Number of vertices whose faces form more than one fan; corners that meet along an edge belong to one fan.
-
-    `halfedges` are sorted by `edge`.
-    """
-    tail = polygons.corners
-    following = np.arange(1, len(tail) + 1)
-    following[polygons.offsets[1:] - 1] = polygons.offsets[:-1]
-    ends = np.stack([halfedges, following[halfedges]], axis=1)  # the corners at tail and head
-    flipped = tail[ends[:, 0]] > tail[ends[:, 1]]
-    ends[flipped] = ends[flipped, ::-1]
-    same = edge[1:] == edge[:-1]
-    one, other = ends[:-1][same].ravel(), ends[1:][same].ravel()
-    fans = connected_components(len(tail), one, other)
-    pairs = np.unique(np.stack([tail, fans], axis=1), axis=0)
-    crowded = faces_of_edge[edge] > 2
-    bad = np.bincount(pairs[:, 0], minlength=polygons.n_vertices) > 1
-    bad[tail[ends[crowded].ravel()]] = True
-    return int(bad.sum())
-
-
-def _n_repeated_faces(sorted_corners: NDArray[np.int64], offsets: NDArray[np.int64]) -> int:
-    sides = np.diff(offsets)
-    repeated = 0
-    for count in np.unique(sides):
-        which = np.flatnonzero(sides == count)
-        rows = sorted_corners[offsets[which][:, None] + np.arange(count)]
-        repeated += _n_repeated(rows)
-    return repeated
-
-
-def _n_repeated(rows: NDArray[Any]) -> int:
-    """Number of rows that equal an earlier one."""
-    ordered = rows[np.lexsort(rows.T)]
-    return int((ordered[1:] == ordered[:-1]).all(axis=1).sum())
-
-
-def _n_components(n_nodes: int, one: NDArray[Any], other: NDArray[Any], nodes: NDArray[Any] | None = None) -> int:
-    """Components of a graph, counted over some nodes: those of its edges by default."""
-    return len(np.unique(connected_components(n_nodes, one, other)[one if nodes is None else nodes]))
+def _n_repeated(points: NDArray[np.float64]) -> int:
+    """How many points are at exactly the place of an earlier one."""
+    if points.shape[1] != 3:
+        return len(points) - len(np.unique(points, axis=0))
+    return len(points) - len(distinct_rows((points + 0.0).view(np.uint64))[1])  # −0 and 0 are the same place
 
 
 def _tuple(values: NDArray[np.float64]) -> tuple[float, ...]:
