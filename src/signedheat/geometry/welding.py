@@ -66,7 +66,7 @@ def distinct_rows(rows: NDArray[np.unsignedinteger]) -> tuple[NDArray[np.int64],
 
 @compiled(nogil=True)
 def mixed(a, b, c):
-    """Hash of three integers, not negative: halves times primes, so that no product leaves 64 bits, shifted together."""
+    """Hash of three integers, not negative: halves times odd numbers, so that no product leaves 64 bits."""
     x = ((a & _HALF) * 0x1E3779B1) ^ ((b & _HALF) * 0x2545F491) ^ ((c & _HALF) * 0x165667B1)
     x ^= (((a >> 32) & _HALF) * 0x27D4EB2F) ^ (((b >> 32) & _HALF) * 0x1B873593) ^ (((c >> 32) & _HALF) * 0x0CC9E2D5)
     x = ((x ^ (x >> 29)) & _HALF) * 0x3C6EF373
