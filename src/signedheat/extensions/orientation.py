@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..diagnostics import ShapeOriented
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
@@ -103,6 +104,11 @@ class Orientation:
         """The counts and shares by name."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, (int, float))}
+
+    @property
+    def note(self) -> ShapeOriented:
+        """What is told of it in diagnostics."""
+        return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
 
 
 def orient(shape: Mesh) -> Mesh:
