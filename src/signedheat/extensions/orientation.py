@@ -325,7 +325,7 @@ def _oriented(
         turned_parts=int(wrong.sum()),
         turned_faces=int(flipped.sum()),
         turned_area=float(areas[flipped].sum()) / total,
-        inconsistent_edges=surface.orientation.disagreeing,
+        inconsistent_edges=int(surface.orientation.disagreeing),
         nonmanifold_edges=int((surface.pairs.counts > 2).sum()),
         nonorientable_parts=int((surface.is_part & ~surface.orientation.orientable).sum()),
         undecided_parts=int(undecided.sum()),
