@@ -192,7 +192,6 @@ def _oriented(shape: Shape, notes: list[Note]) -> Merged:
         return merge_duplicates(oriented.cloud)
     found = orientation(shape)
     notes.append(found.note)
-    )
     return Merged(found.shape, found.walls, 0)
 
 
