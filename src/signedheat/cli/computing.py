@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,13 +12,25 @@ from typing import Any
 import numpy as np
 
 from .. import sharpen
-from ..diagnostics import SampledSource
+from ..diagnostics import (
+    BoundsNothing,
+    CompletedArea,
+    LeftOut,
+    OrientedFaces,
+    OrientedPoints,
+    ReachesBox,
+    SampledSource,
+)
 from ..domains.grid import Grid, room_around
+from ..domains.tet_mesh import TetMesh
 from ..errors import SignedHeatError
+from ..extensions.solid_distance import solid_distance
 from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
 from ..io import POLYLINE_FORMATS, read, read_mask, read_polylines
 from ..io.files import extension
 from ..lowering.area_elements import bounds_around
+from ..progress import Progress
 from ..solver import SignedHeatSolver, as_list
 from .options import Parser
 from .progress import ProgressBar
@@ -24,6 +38,8 @@ from .progress import ProgressBar
 RESOLUTION = 128
 MOST = 0.9
 """Fraction of the area that may cancel without a warning."""
+TOLD = 0.005
+"""Fraction of the surface that may be completed, or bound nothing, without a word."""
 
 
 @contextmanager
@@ -85,17 +101,58 @@ def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
     return Grid.around(bounds, padding=padding, **options)
 
 
-def compute(shape: Any, grid: Grid, arguments: Namespace) -> GridField:
-    """The field, sharpened unless ``--plain`` is given or the grid has walls."""
-    plain = arguments.plain or grid.mask is not None
+def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField:
+    """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
+    field: GridField | TetField
     with ProgressBar(arguments.quiet or arguments.json) as progress:
-        share = 1.0 if plain else 0.8
-        solver = SignedHeatSolver(grid, arguments.diffusion, lambda done, step: progress(share * done, step))
-        field = solver.distance(shape, arguments.constraint)
-        if plain:
-            return field
-        progress(share, "sharpen")
-        return sharpen(field)
+        if isinstance(domain, TetMesh) or domain.dimension == 3:
+            field = solid_distance(
+                shape,
+                domain,
+                constraint=arguments.constraint,
+                diffusion=arguments.diffusion,
+                as_oriented=arguments.as_oriented,
+                keep_overlaps=arguments.keep_overlaps,
+                plain=arguments.plain,
+                progress=progress,
+            )
+        else:
+            field = planar_distance(shape, domain, arguments, progress)
+    if not arguments.quiet:
+        for line in told(field):
+            print(f"signedheat: {line}", file=sys.stderr)
+    return field
+
+
+def planar_distance(lines: Any, grid: Grid, arguments: Namespace, progress: Progress) -> GridField:
+    """Distance to polylines, sharpened unless ``--plain`` is given or the grid has walls."""
+    plain = arguments.plain or grid.mask is not None
+    share = 1.0 if plain else 0.8
+    solver = SignedHeatSolver(grid, arguments.diffusion, lambda done, step: progress(share * done, step))
+    field: GridField = solver.distance(lines, arguments.constraint)
+    if plain:
+        return field
+    progress(share, "sharpen")
+    return sharpen(field)
+
+
+def told(field: GridField | TetField) -> list[str]:
+    """What to know about a field before trusting it, a line for each thing."""
+    lines = []
+    for note in field.diagnostics.notes:
+        if isinstance(note, OrientedFaces) and (note.turned_faces or note.merged_faces):
+            lines.append(str(note))
+        elif isinstance(note, OrientedPoints) and (note.normals_fitted or note.normals_turned):
+            lines.append(str(note))
+        elif isinstance(note, LeftOut) and note.covered_faces:
+            lines.append(str(note))
+        elif isinstance(note, CompletedArea) and note.completed_share > TOLD:
+            lines.append(str(note))
+        elif isinstance(note, BoundsNothing) and note.open_area > TOLD:
+            lines.append(str(note))
+        elif isinstance(note, ReachesBox):
+            lines.append(str(note))
+    return lines
 
 
 def hint(field: GridField) -> str:
@@ -127,5 +184,17 @@ def describe(field: Any) -> dict[str, Any]:
         **where,
         "minimum": float(np.nanmin(field.values)),
         "maximum": float(np.nanmax(field.values)),
+        "notes": {snake(type(note).__name__): note.as_dict() for note in field.diagnostics.notes},
         "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
     }
+
+
+def snake(name: str) -> str:
+    """A class name as a key of JSON.
+
+    Examples
+    --------
+    >>> snake("ReachesBox")
+    'reaches_box'
+    """
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

@@ -19,6 +19,15 @@ from .options import Summary, add_command, whole_number
 
 DISTANCE = 0.15
 
+DEFAULTS = {
+    "as_oriented": False,
+    "keep_overlaps": False,
+    "plain": False,
+    "constraint": ZeroSet(),
+    "diffusion": 1.0,
+}
+"""What `compute` reads, where the demo has no options."""
+
 
 def add_to(commands: Any) -> None:
     """Register the command."""
@@ -53,7 +62,7 @@ def run(arguments: Namespace) -> Summary:
     shape = broken_duck()
     save(shape, files["duck.stl"])
     grid = Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)
-    options = Namespace(**vars(arguments), plain=False, constraint=ZeroSet(), diffusion=1.0)
+    options = Namespace(**vars(arguments), **DEFAULTS)
     field = compute(shape, grid, options)
     surface = field.offset(DISTANCE)
     save_field(field, files["distance.vti"])

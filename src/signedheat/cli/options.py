@@ -62,8 +62,8 @@ def add_grid_options(parser: Parser) -> None:
         help="a grid with walls, which distance goes around (it is not sharpened then): .npy .nrrd .vti, solid where "
         "not 0; in the plane also .png .bmp .tif, solid where dark",
     )
+    add_step_options(parser)
     method = parser.add_argument_group("method")
-    method.add_argument("--plain", action="store_true", help="the paper's field, not sharpened")
     method.add_argument(
         "--constraint",
         type=constraint,
@@ -75,6 +75,18 @@ def add_grid_options(parser: Parser) -> None:
         "--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"
     )
     parser.add_argument("--preview", metavar="PNG", help="draw the result: in space, three slices")
+
+
+def add_step_options(parser: Parser) -> None:
+    """Which of the steps that are taken by default are left out."""
+    steps = parser.add_argument_group("steps (all taken by default)")
+    steps.add_argument("--as-oriented", action="store_true", help="turn no face and no normal: take them as given")
+    steps.add_argument("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface")
+    steps.add_argument(
+        "--plain",
+        action="store_true",
+        help="the method's own field, not measured to the shape itself",
+    )
 
 
 def constraint(word: str, with_numbers: str = "soft:WEIGHT") -> Constraint:

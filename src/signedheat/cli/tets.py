@@ -8,18 +8,15 @@ from typing import Any
 from ..domains.grid import Grid
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
-from ..extensions.sharpening import sharpen
 from ..extensions.tetrahedralize import tetrahedralize
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import ensure_writable, read
 from ..io.tets import TET_FIELD_FORMATS
 from ..packages import require
-from ..solver import SignedHeatSolver
 from ..visualization import ensure_picture_writable, save_slices
-from .computing import describe, prefix_errors
+from .computing import compute, describe, prefix_errors
 from .options import Parser, Summary
-from .progress import ProgressBar
 
 RESOLUTION = 32
 PREVIEW_NODES = 64
@@ -46,10 +43,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     with prefix_errors(arguments.shape):
         if mesh is None:
             mesh = tetrahedralize(shape, resolution=arguments.resolution or RESOLUTION, padding=arguments.padding)
-        with ProgressBar(arguments.quiet or arguments.json) as progress:
-            field = SignedHeatSolver(mesh, arguments.diffusion, progress).distance(shape, arguments.constraint)
-            if not arguments.plain:
-                field = sharpen(field)
+        field = compute(shape, mesh, arguments)
     field.save(arguments.output)
     if arguments.preview:
         save_slices(on_grid(field), arguments.preview, shape)
@@ -58,10 +52,9 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
         "output": arguments.output,
         **describe(field),
         "n_tets": mesh.n_tets,
-        "notes": {name: v for note in field.diagnostics.notes for name, v in note.as_dict().items()},
     }
     text = f"{arguments.output}: {mesh.n_tets} tets, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
-    return summary, "; ".join([text, *map(str, field.diagnostics.notes)])
+    return summary, text
 
 
 def on_grid(field: TetField) -> GridField:

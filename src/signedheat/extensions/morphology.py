@@ -29,6 +29,7 @@ from ..lowering.area_elements import area_elements, bounds_around
 from ..packages import lazy_module
 from ..solver import as_list, signed_distance
 from .sharpening import sharpen
+from .solid_distance import solid_distance
 
 remesh = lazy_module("trimesh.remesh", "walls around sheets")
 
@@ -214,13 +215,20 @@ def thicken(
     grid = _grid(_room(sheet, reach, resolution) if domain is None else domain)
     depth = _unsigned_distance(sheet, grid, reach) - reach
     if above != below:
-        phi = _field(grid, sheet).values
+        phi = _sided(grid, sheet).values
         depth = np.maximum(depth, np.maximum(phi - above, -below - phi))
     return _wall(grid, depth, above + below)
 
 
 def _field(domain: Domain, shape: Sources) -> Field:
-    """The signed distance to a shape, whose level sets are the offsets; on grids sharpened."""
+    """The distance whose level sets are the offsets: that to a solid, where the domain is a grid in space."""
+    if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
+        return solid_distance(shape, domain)
+    return _sided(domain, shape)
+
+
+def _sided(domain: Domain, shape: Sources) -> Field:
+    """The signed distance to a shape that may have two sides and no inside; on grids sharpened."""
     field = signed_distance(shape, domain)
     return sharpen(field) if isinstance(field, GridField) else field
 
