@@ -142,7 +142,7 @@ def heat_system(mesh: sh.TetMesh, spacings: float = 1.0) -> tuple[sparse.csr_mat
 
     discretization = discretize(mesh)
     source = discretization.lower([sphere(2, 0.4)], spacings)
-    return discretization._heat_matrix(source.time), source.vectors, mesh.faces.tet_faces
+    return discretization._heat_system(source.time).matrix, source.vectors, mesh.faces.tet_faces
 
 
 def test_conjugate_gradients_keep_the_far_field():

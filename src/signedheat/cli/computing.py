@@ -16,10 +16,10 @@ from ..diagnostics import (
     BoundsNothing,
     CompletedArea,
     LeftOut,
-    OrientedFaces,
     OrientedPoints,
     ReachesBox,
     SampledSource,
+    ShapeOriented,
 )
 from ..domains.grid import Grid, room_around
 from ..domains.tet_mesh import TetMesh
@@ -140,7 +140,7 @@ def told(field: GridField | TetField) -> list[str]:
     """What to know about a field before trusting it, a line for each thing."""
     lines = []
     for note in field.diagnostics.notes:
-        if isinstance(note, OrientedFaces) and (note.turned_faces or note.merged_faces):
+        if isinstance(note, ShapeOriented) and (note.turned_faces or note.merged_faces):
             lines.append(str(note))
         elif isinstance(note, OrientedPoints) and (note.normals_fitted or note.normals_turned):
             lines.append(str(note))

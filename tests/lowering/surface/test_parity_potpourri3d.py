@@ -86,7 +86,9 @@ def test_curves_along_edges(name, constraint):
     curves = [c for c in curves if c.n_points > 8][:2]
     theirs = peer(mesh, curves, constraint)
     ours = sh.SignedHeatSolver(mesh).distance(curves, CONSTRAINTS[constraint])
-    shift = ours.source.weights @ (ours.source.rows @ theirs) / ours.source.weights.sum()  # theirs is centred otherwise
+    shift = (
+        ours.source.weights @ (ours.source.interpolation @ theirs) / ours.source.weights.sum()
+    )  # theirs is centred otherwise
     if constraint == "Multiple":
         theirs = theirs - shift
     np.testing.assert_allclose(ours.values, theirs, atol=1e-9 * np.ptp(theirs))
@@ -99,7 +101,7 @@ def test_soft_constraint_of_the_published_code_from_our_matrices(name):
     surface = sh.SignedHeatSolver(mesh).discretization
     source = surface.lower(surface.adapt(curves[:1])[1], 1.0)
     load = surface.divergence(normalize(surface, diffuse(surface, source)))
-    to_first = source.rows[1:] - source.rows[np.zeros(source.rows.shape[0] - 1, dtype=int)]
+    to_first = source.interpolation[1:] - source.interpolation[np.zeros(source.interpolation.shape[0] - 1, dtype=int)]
     ground = sparse.csr_matrix(([1.0], ([0], [0])), shape=surface.stiffness.shape)
     for weight in (0.5, 50.0):
         theirs = peer(mesh, curves[:1], "ZeroSet", soft_level_set_weight=weight)

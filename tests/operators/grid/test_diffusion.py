@@ -122,7 +122,7 @@ def test_far_field_points_the_right_way_in_the_farthest_corner():
     assert np.isfinite(directions).all()
     lengths = np.linalg.norm(directions, axis=-1)
     assert lengths.min() > 0.5  # interpolated unit vectors; nothing is lost on the way
-    spread = (source.rows.T @ source.samples.vectors).reshape(n, n, n, 3)
+    spread = (source.interpolation.T @ source.samples.vectors).reshape(n, n, n, 3)
     walls = np.isin(np.arange(-1, n + 1), [0, n - 1]).astype(float)
     degrees = 6 - walls[:, None, None] - walls[:, None] - walls
     exact = unit(sweep_to_convergence(np.pad(spread, [(1, 1)] * 3 + [(0, 0)]), degrees, source.time, rounds=12))
