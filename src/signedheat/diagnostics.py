@@ -50,6 +50,33 @@ class OutsideMesh(Note):
 
 
 @dataclass(frozen=True, eq=False)
+class ShapeOriented(Note):
+    """How the faces of a shape were oriented; fractions are of its area. The values are those of `Orientation`."""
+
+    turned_faces: int
+    turned_area: float
+    turned_parts: int
+    merged_faces: int
+    nonorientable_parts: int
+    undecided_area: float
+    doubled_walls: int
+    nested_bodies: int
+    cavities: int
+
+    def __str__(self) -> str:
+        told = [
+            (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.3g} of the area"),
+            (self.merged_faces, f"duplicate faces merged: {self.merged_faces}"),
+            (self.nonorientable_parts, f"parts that cannot be oriented: {self.nonorientable_parts}"),
+            (self.doubled_walls, f"doubled walls: {self.doubled_walls}"),
+            (self.nested_bodies, f"bodies hidden in others: {self.nested_bodies}"),
+            (self.cavities, f"cavities: {self.cavities}"),
+            (self.undecided_area, f"sheets without an inside: {self.undecided_area:.3g} of the area"),
+        ]
+        return "; ".join(text for value, text in told if value) or "faces are oriented as they were given"
+
+
+@dataclass(frozen=True, eq=False)
 class TetsTurned(Note):
     """Number of tets given with negative volume, which have been turned."""
 
@@ -131,25 +158,6 @@ class SharpenedToShape(Note):
     def __str__(self) -> str:
         return (
             f"{self.completed_zero_set:.1%} of the zero set completed, {self.layered_faces:.1%} of the faces in layers"
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class OrientedFaces(Note):
-    """Which faces were turned, as `Orientation` counts them: number and fraction of the area, and what was found."""
-
-    turned_parts: int
-    turned_faces: int
-    turned_area: float
-    undecided_area: float
-    merged_faces: int
-    doubled_walls: int
-    cavities: int
-
-    def __str__(self) -> str:
-        return (
-            f"{self.turned_faces} faces turned, {self.turned_area:.1%} of the area; "
-            f"{self.merged_faces} duplicates merged; {self.undecided_area:.1%} of the area has no side that is outside"
         )
 
 

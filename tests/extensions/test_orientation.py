@@ -327,3 +327,11 @@ def test_awkward_faces_do_no_harm():
 def test_only_meshes_have_faces():
     with pytest.raises(sh.GeometryError, match="PointCloud has none"):
         sh.orientation(sh.PointCloud([[0, 0, 0], [1, 0, 0]]))
+
+
+def test_the_note_tells_what_was_done():
+    found = sh.orientation(samples.broken_duck())
+    assert f"faces turned: {found.turned_faces}," in str(found.note)
+    assert f"merged: {found.merged_faces}" in str(found.note)
+    assert found.note.as_dict()["turned_area"] == found.turned_area
+    assert str(sh.orientation(samples.sphere(2)).note) == "faces are oriented as they were given"

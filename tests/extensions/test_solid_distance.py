@@ -5,7 +5,7 @@ import pytest
 
 from shapes.bodies import box, sheet, turned
 from signedheat import Grid, PolygonMesh, SourceError, TriangleMesh, samples, signed_distance, solid_distance
-from signedheat.diagnostics import BoundsNothing, CompletedArea, LeftOut, OrientedFaces, ReachesBox
+from signedheat.diagnostics import BoundsNothing, CompletedArea, LeftOut, ReachesBox, ShapeOriented
 
 
 def only(mesh, chosen):
@@ -47,7 +47,7 @@ def test_turned_faces_change_nothing(fraction):
     grid = Grid.around(ball.bounds, 32)
     field = solid_distance(samples.with_flipped_faces(ball, fraction), grid)
     assert np.array_equal(field.values, solid_distance(ball, grid).values)
-    assert field.diagnostics.note(OrientedFaces).turned_faces > 0
+    assert field.diagnostics.note(ShapeOriented).turned_faces > 0
     kept = solid_distance(turned(ball), grid, as_oriented=True)
     assert (kept.values >= 0).mean() > 0.99
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..diagnostics import ShapeOriented
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
@@ -103,6 +104,11 @@ class Orientation:
         """The counts and shares by name."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, (int, float))}
+
+    @property
+    def note(self) -> ShapeOriented:
+        """What is told of it in diagnostics."""
+        return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
 
 
 def orient(shape: Mesh) -> Mesh:
@@ -209,7 +215,8 @@ def _middles_of_largest(faces: MeshFaces, parts: NDArray[np.int64]) -> NDArray[n
     largest[of_part[order]] = order  # the last written
     of_face = np.zeros(len(areas), dtype=np.int64)
     of_face[faces.triangle_faces[::-1]] = np.arange(len(faces.triangles))[::-1]
-    return np.mean(faces.positions[faces.triangles[of_face[largest[parts]]]], axis=1)
+    middles: NDArray[np.float64] = faces.positions[faces.triangles[of_face[largest[parts]]]].mean(axis=1)
+    return middles
 
 
 def _doubled_walls(surface: SurfaceParts, lines: LineCrossings, crossed: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -318,7 +325,7 @@ def _oriented(
         turned_parts=int(wrong.sum()),
         turned_faces=int(flipped.sum()),
         turned_area=float(areas[flipped].sum()) / total,
-        inconsistent_edges=surface.orientation.disagreeing,
+        inconsistent_edges=int(surface.orientation.disagreeing),
         nonmanifold_edges=int((surface.pairs.counts > 2).sum()),
         nonorientable_parts=int((surface.is_part & ~surface.orientation.orientable).sum()),
         undecided_parts=int(undecided.sum()),

@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..constraints import ZeroSet
-from ..diagnostics import Diagnostics, Note, OrientedFaces, OrientedPoints, SharpenedToShape
+from ..diagnostics import Diagnostics, Note, OrientedPoints, SharpenedToShape
 from ..discretization import discretize
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
@@ -131,7 +131,7 @@ def solid_distance(
     Returns
     -------
     GridField or TetField
-        φ < 0 inside. ``diagnostics.notes`` tells what was done, where there is something to tell: `OrientedFaces` or
+        φ < 0 inside. ``diagnostics.notes`` tells what was done, where there is something to tell: `ShapeOriented` or
         `OrientedPoints`, `LeftOut`, `CompletedArea`, `ReachesBox`, `BoundsNothing`.
 
     Raises
@@ -191,17 +191,7 @@ def _oriented(shape: Shape, notes: list[Note]) -> Merged:
         notes.append(OrientedPoints(oriented.n_fitted, oriented.n_turned))
         return merge_duplicates(oriented.cloud)
     found = orientation(shape)
-    notes.append(
-        OrientedFaces(
-            found.turned_parts,
-            found.turned_faces,
-            found.turned_area,
-            found.undecided_area,
-            found.merged_faces,
-            found.doubled_walls,
-            found.cavities,
-        )
-    )
+    notes.append(found.note)
     return Merged(found.shape, found.walls, 0)
 
 

@@ -95,7 +95,8 @@ def _widths(faces: MeshFaces, lines: LineCrossings, wall: bool) -> tuple[NDArray
 def _normals(faces: MeshFaces, triangles: NDArray[np.int32]) -> NDArray[np.float64]:
     a, b, c = (faces.positions[faces.triangles[triangles, k]] for k in range(3))
     vectors = np.cross(b - a, c - a)
-    return np.divide(vectors, np.maximum(np.linalg.norm(vectors, axis=1), np.finfo(float).tiny)[:, None])
+    lengths = np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny)
+    return np.asarray(vectors / lengths, dtype=np.float64)
 
 
 def _quantile(widths: NDArray[np.float64], rank: float) -> float | None:

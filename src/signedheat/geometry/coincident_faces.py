@@ -37,7 +37,9 @@ def coincident_faces(
 
 
 @compiled(nogil=True)
-def _coincident(corners, offsets, n_vertices):
+def _coincident(
+    corners: NDArray[np.int64], offsets: NDArray[np.int64], n_vertices: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     n = len(offsets) - 1
     bits = 4
     while (1 << bits) < 2 * n:
@@ -76,7 +78,7 @@ def _coincident(corners, offsets, n_vertices):
 
 
 @compiled(nogil=True)
-def _compare(corners, other, other_end, least, begin, size):
+def _compare(corners: NDArray[np.int64], other: int, other_end: int, least: int, begin: int, size: int) -> int:
     """1 for the same cycle, −1 for the opposite, 0 for another one; `least` is the place of the least corner."""
     if other_end - other != size:
         return 0

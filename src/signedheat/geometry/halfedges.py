@@ -131,7 +131,13 @@ def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDAr
 
 
 @compiled(nogil=True)
-def _may_coincide(counts, first, second, tails, following):
+def _may_coincide(
+    counts: NDArray[np.int32],
+    first: NDArray[np.int32],
+    second: NDArray[np.int32],
+    tails: NDArray[np.int64],
+    following: NDArray[np.int32],
+) -> bool:
     for edge in range(len(counts)):
         if counts[edge] > 2:
             return True
@@ -151,7 +157,9 @@ def _may_coincide(counts, first, second, tails, following):
 
 
 @compiled(nogil=True)
-def _pair(tails, heads, n_vertices, used):
+def _pair(
+    tails: NDArray[np.int64], heads: NDArray[np.int64], n_vertices: int, used: NDArray[np.bool_]
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
     """Bucket halfedges by their lesser vertex; in a bucket, the last edge to each greater vertex is marked there."""
     n = len(tails)
     starts = np.zeros(n_vertices + 1, dtype=np.int32)
@@ -191,7 +199,7 @@ def _pair(tails, heads, n_vertices, used):
 
 
 @compiled(nogil=True)
-def _root(parents, ways, face):
+def _root(parents: NDArray[np.int64], ways: NDArray[np.bool_], face: int) -> tuple[int, bool]:
     """Root of a face's tree, and whether the face is turned against it; paths are halved on the way."""
     way = False
     while parents[face] != face:
@@ -204,7 +212,15 @@ def _root(parents, ways, face):
 
 
 @compiled(nogil=True)
-def _orient(edges, counts, first, second, tails, owners, weights):
+def _orient(
+    edges: NDArray[np.int32],
+    counts: NDArray[np.int32],
+    first: NDArray[np.int32],
+    second: NDArray[np.int32],
+    tails: NDArray[np.int64],
+    owners: NDArray[np.int32],
+    weights: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], int]:
     n_faces, disagreeing = len(weights), 0
     parents = np.arange(n_faces)
     ways = np.zeros(n_faces, dtype=np.bool_)  # whether a face is turned against its parent; never at roots

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled import compiled
 
 
 @compiled(nogil=True)
-def inspect_faces(vertices, corners, offsets):
+def inspect_faces(
+    vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
+) -> tuple[float, int, NDArray[np.float64]]:
     """Total area; faces without area, to roundoff, or that name a vertex twice; corners of the box around all faces.
 
     An area is none if it is below what moving the corners by a few units in the last place of the coordinates makes.
@@ -46,7 +49,7 @@ def inspect_faces(vertices, corners, offsets):
 
 
 @compiled(nogil=True)
-def find_root(parents, node):
+def find_root(parents: NDArray[np.integer], node: int) -> int:
     """The root of a node's tree; paths are halved on the way."""
     while parents[node] != node:
         parents[node] = parents[parents[node]]
@@ -55,7 +58,9 @@ def find_root(parents, node):
 
 
 @compiled(nogil=True)
-def count_components(n_vertices, tails, heads, chosen):
+def count_components(
+    n_vertices: int, tails: NDArray[np.int64], heads: NDArray[np.int64], chosen: NDArray[np.bool_]
+) -> int:
     """How many connected sets the chosen halfedges make, all where none are named; vertices of no halfedge are none."""
     parents = np.arange(n_vertices).astype(np.int32)
     used = np.zeros(n_vertices, dtype=np.bool_)
@@ -73,7 +78,15 @@ def count_components(n_vertices, tails, heads, chosen):
 
 
 @compiled(nogil=True)
-def count_nonmanifold_vertices(n_vertices, tails, following, edges, counts, first, second):
+def count_nonmanifold_vertices(
+    n_vertices: int,
+    tails: NDArray[np.int64],
+    following: NDArray[np.int32],
+    edges: NDArray[np.int32],
+    counts: NDArray[np.int32],
+    first: NDArray[np.int32],
+    second: NDArray[np.int32],
+) -> int:
     """Vertices at which the faces are no single fan, or that end an edge of more than two faces."""
     parents = np.arange(len(tails)).astype(np.int32)
     for edge in range(len(counts)):
@@ -94,11 +107,20 @@ def count_nonmanifold_vertices(n_vertices, tails, following, edges, counts, firs
         bad[v] = bad[v] or fans[v] != root
         if edges[c] >= 0 and counts[edges[c]] > 2:
             bad[v] = bad[tails[following[c]]] = True
-    return bad.sum()
+    total = 0
+    for v in range(n_vertices):
+        total += bad[v]
+    return total
 
 
 @compiled(nogil=True)
-def count_edges(tails, edges, counts, first, second):
+def count_edges(
+    tails: NDArray[np.int64],
+    edges: NDArray[np.int32],
+    counts: NDArray[np.int32],
+    first: NDArray[np.int32],
+    second: NDArray[np.int32],
+) -> tuple[int, int, int, NDArray[np.bool_]]:
     """Edges of one face, of more than two, and of two that run along them the same way; halfedges of the first kind."""
     single, crowded, inconsistent = 0, 0, 0
     for edge in range(len(counts)):

@@ -89,7 +89,19 @@ def containers(
 
 
 @compiled(nogil=True)
-def _votes(starts, parts, entering, n_parts):
+def _votes(
+    starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int
+) -> tuple[
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+]:
     crossings, seen, seen_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
     own, own_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
     even, even_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
@@ -124,7 +136,9 @@ def _votes(starts, parts, entering, n_parts):
 
 
 @compiled(nogil=True)
-def _containers(starts, parts, entering, bounding):
+def _containers(
+    starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], bounding: NDArray[np.bool_]
+) -> NDArray[np.int64]:
     n_parts = len(bounding)
     found = np.full(len(parts), -1, dtype=np.int64)
     sums, latest = np.zeros(n_parts, np.int64), np.full(n_parts, -1, np.int64)

@@ -93,7 +93,10 @@ def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64])
     found = votes(lines.starts, crossed, lines.entering, len(parts.areas))
     own, own_known = _outward(parts, found)
     bounding = ~parts.fixed & (parts.closed | (own_known & (np.abs(found.own_votes) >= LEAST_CLOSED * found.own)))
-    within = containers(lines.starts, crossed, lines.entering == (own[crossed] > 0), bounding)
+    if np.count_nonzero(found.crossings) > 1:
+        within = containers(lines.starts, crossed, lines.entering == (own[crossed] > 0), bounding)
+    else:
+        within = np.full(len(crossed), -1)
     nested = _nested(parts, found, bounding, crossed, within)
     cavity = _cavities(parts, own, nested)
     odds, decided = _by_sight(found)

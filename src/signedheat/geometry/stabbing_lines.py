@@ -162,7 +162,16 @@ def line_frames(n: int) -> NDArray[np.float64]:
 
 
 @compiled(nogil=True)
-def _draw(vertices, triangles, frame, center, pixel, shift, shape, first_line):
+def _draw(
+    vertices: NDArray[np.float64],
+    triangles: NDArray[np.int64],
+    frame: NDArray[np.float64],
+    center: NDArray[np.float64],
+    pixel: float,
+    shift: NDArray[np.float64],
+    shape: NDArray[np.int64],
+    first_line: int,
+) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.float64]]:
     """Crossings of the lines through a picture's pixels; a row's pixels from one side on to before the next."""
     n = len(vertices)
     at, cells = np.empty((n, 3)), np.empty((n, 2), dtype=np.int32)
@@ -216,7 +225,18 @@ def _draw(vertices, triangles, frame, center, pixel, shift, shape, first_line):
 
 
 @compiled(nogil=True)
-def _aim(vertices, triangles, frame, center, points, order, starts, scale, n_cells, first_line):
+def _aim(
+    vertices: NDArray[np.float64],
+    triangles: NDArray[np.int64],
+    frame: NDArray[np.float64],
+    center: NDArray[np.float64],
+    points: NDArray[np.float64],
+    order: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    scale: float,
+    n_cells: int,
+    first_line: int,
+) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.float64]]:
     """Crossings of lines through points, which are sorted into the cells of a picture."""
     capacity, count = 8 * len(points) + 1024, 0
     ids, entering, places = np.empty((capacity, 2), np.int32), np.empty(capacity, np.bool_), np.empty((capacity, 2))
@@ -260,7 +280,7 @@ def _aim(vertices, triangles, frame, center, points, order, starts, scale, n_cel
 
 
 @compiled(nogil=True)
-def _crossed(ax, ay, bx, by, y):
+def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
     """Where a row crosses a side: the same number whichever way round the side is given."""
     if ay > by:
         ax, ay, bx, by = bx, by, ax, ay
@@ -268,7 +288,9 @@ def _crossed(ax, ay, bx, by, y):
 
 
 @compiled(nogil=True)
-def _doubled(ids, entering, places):
+def _doubled(
+    ids: NDArray[np.int32], entering: NDArray[np.bool_], places: NDArray[np.float64]
+) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.float64]]:
     """The same rows with room for as many more."""
     n = len(ids)
     more = np.empty((2 * n, 2), np.int32), np.empty(2 * n, np.bool_), np.empty((2 * n, 2))
@@ -280,7 +302,9 @@ def _doubled(ids, entering, places):
 
 
 @compiled(nogil=True)
-def _by_line(ids, order, n_lines):
+def _by_line(
+    ids: NDArray[np.int32], order: NDArray[np.int64], n_lines: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Stable counting sort, by line, of crossings already in order of depth."""
     line = ids[:, 0]
     starts = np.zeros(n_lines + 1, dtype=np.int64)

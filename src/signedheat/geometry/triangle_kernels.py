@@ -1,6 +1,7 @@
 """Kernels on triangles: edges, assembly of sparse matrices, fluxes, connected components."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled import compiled
 
@@ -118,7 +119,9 @@ def add_fluxes(corners, positions, directions, n):
 
 
 @compiled(nogil=True)
-def areas_and_volumes(vertices, triangles, center):
+def areas_and_volumes(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64], center: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(m,) areas of triangles, and volumes of the tetrahedra they make with a center: positive if it is behind them."""
     areas, volumes = np.empty(len(triangles)), np.empty(len(triangles))
     for t in range(len(triangles)):

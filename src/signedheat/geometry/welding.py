@@ -65,8 +65,8 @@ def distinct_rows(rows: NDArray[np.unsignedinteger]) -> tuple[NDArray[np.int64],
 
 
 @compiled(nogil=True)
-def mixed(a, b, c):
-    """Hash of three integers, not negative: halves times primes, so that no product leaves 64 bits, shifted together."""
+def mixed(a: int, b: int, c: int) -> int:
+    """Hash of three integers, not negative: halves times odd numbers, so that no product leaves 64 bits."""
     x = ((a & _HALF) * 0x1E3779B1) ^ ((b & _HALF) * 0x2545F491) ^ ((c & _HALF) * 0x165667B1)
     x ^= (((a >> 32) & _HALF) * 0x27D4EB2F) ^ (((b >> 32) & _HALF) * 0x1B873593) ^ (((c >> 32) & _HALF) * 0x0CC9E2D5)
     x = ((x ^ (x >> 29)) & _HALF) * 0x3C6EF373
@@ -74,7 +74,7 @@ def mixed(a, b, c):
 
 
 @compiled(nogil=True)
-def _weld(points, tolerance):
+def _weld(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     n = len(points)
     bits = 4
     while (1 << bits) < 2 * n:
@@ -108,7 +108,7 @@ def _weld(points, tolerance):
 
 
 @compiled(nogil=True)
-def _distinct(rows):
+def _distinct(rows: NDArray[np.unsignedinteger]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     n = len(rows)
     bits = 4
     while (1 << bits) < 2 * n:
