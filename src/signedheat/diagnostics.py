@@ -122,6 +122,17 @@ class SlopeErrors(Note):
 
 
 @dataclass(frozen=True, eq=False)
+class SharpenedToShape(Note):
+    """Fraction of the faces left out because they lie in layers, and of the zero set that stands in for missing ones."""
+
+    layered_faces: float
+    completed_zero_set: float
+
+    def __str__(self) -> str:
+        return f"{self.completed_zero_set:.1%} of the zero set completed, {self.layered_faces:.1%} of the faces in layers"
+
+
+@dataclass(frozen=True, eq=False)
 class GeodesicWindows(Note):
     """Number of windows in the exact polyhedral distance."""
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import singledispatch
 from typing import Protocol, TypeVar, overload, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics, Note, SlopeErrors
 from ..discretization import Discretization, SourceTerm
@@ -20,6 +21,7 @@ from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
+from .shape_sharpening import Fit, Shape
 from .sharpening_methods import Geodesic
 
 
@@ -42,15 +44,28 @@ AnyField = TypeVar("AnyField", bound=VertexField | TetField)
 
 
 @overload
-def sharpen(field: GridField[Dimension], *, progress: Progress | None = None) -> GridField[Dimension]: ...
+def sharpen(
+    field: GridField[Dimension],
+    shape: Shape | Sequence[Shape] | None = None,
+    *,
+    fit: Fit = "auto",
+    sides: ArrayLike | None = None,
+    progress: Progress | None = None,
+) -> GridField[Dimension]: ...
 @overload
 def sharpen(field: AnyField, method: Method | None = None, progress: Progress | None = None) -> AnyField: ...
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
 def sharpen(field: Field, *arguments: object, **options: object) -> Field:
-    """Replace a field by the distance to its own zero set, with the signs of the field (Sec. 7.3).
+    """Replace a field by the distance to its own zero set, or to the shape that it was computed from (Sec. 7.3).
 
-    On grids: the distance of every node to the zero set, second order.
+    On grids: the distance of every node to the zero set, second order, with the signs of the field. With a ``shape``:
+    exact distance to the faces of the shape where they are, and to the zero set where it is farther than 1.5 cells from
+    any, since there it stands in for what is missing. Within two cells of a face the face tells the side, where the
+    surface around the nearest place is closed and consistent, so that edges stay sharp and plates thinner than a cell
+    stay thin; elsewhere the field does. Where faces lie in layers that face the same way (scattered faces, sheets given
+    twice), none of them is the surface, and the zero set, which runs in their middle, takes their place. Points are
+    fitted: the zero set is moved onto a smooth surface through them.
 
     On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
     smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. On tets:
@@ -64,6 +79,12 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     ----------
     field : GridField, VertexField or TetField
         From `signed_distance` or `SignedHeatSolver.distance`.
+    shape : TriangleMesh, PolygonMesh or PointCloud with normals, or a sequence of them, optional
+        On grids in space: what the field was computed from, oriented, and without parts inside others.
+    fit : "auto", "exact" or "smooth"
+        With a shape: whether to tell layers from shape, to measure to every face, or to the zero set alone.
+    sides : (*grid.shape) float, optional
+        With a shape: values whose signs and zero set take the place of the field's.
     method : Geodesic or Convex, optional
         On surfaces and tets only.
     progress : callable, optional
@@ -72,17 +93,21 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     Returns
     -------
     GridField, VertexField or TetField
-        The same kind of field. On surfaces and tets ``diagnostics`` has a note `diagnostics.SlopeErrors`, the root mean
-        squares of ``|∇φ| − 1`` over the domain before and after, and notes of the method.
+        The same kind of field. Sharpened to a shape, it has a `confidence`, contours whose vertices lie on the level
+        exactly, and ``diagnostics`` with a note `diagnostics.SharpenedToShape`. On surfaces and tets ``diagnostics``
+        has a note `diagnostics.SlopeErrors`, the root mean squares of ``|∇φ| − 1`` over the domain before and after,
+        and notes of the method.
 
     Raises
     ------
     UnsupportedTypeError
         If this kind of field cannot be sharpened, or not by this method.
     OutsideError
-        If the field has the same sign everywhere, or is NaN everywhere.
+        If the field has the same sign everywhere, or is NaN everywhere; with a shape, if that has no faces besides.
     GeometryError
         If a value is infinite, or there is not one value for each vertex.
+    SourceError
+        If the shape is none that the field can be sharpened to, or a cloud without normals.
 
     Examples
     --------
@@ -92,6 +117,13 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     >>> radius = np.linalg.norm(grid.points, axis=-1)
     >>> sharpened = sharpen(GridField(grid, radius**2 - 0.25))
     >>> bool(np.abs(sharpened.values - (radius - 0.5)).max() < 0.01)
+    True
+
+    >>> from signedheat import TriangleMesh, signed_distance
+    >>> faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    >>> tetrahedron = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces)
+    >>> exact = sharpen(signed_distance(tetrahedron, resolution=24), tetrahedron)
+    >>> bool(np.isclose(exact.values[2, 12, 10], -exact.grid.origin[0] - 2 * exact.grid.spacing[0]))
     True
     """
     return sharpen_field(field, *arguments, **options)

@@ -17,6 +17,7 @@ from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
 from ..geometry.marching import closed_surface, level_lines
+from ..operators.grid.exact_surface import ExactSurface
 from .files import save_field
 
 
@@ -34,6 +35,11 @@ class GridField(Generic[Dimension]):
         on parts of the grid that solid nodes separate from every source.
     diagnostics : Diagnostics
         Timings, diffusion time, and notes on the computation.
+    confidence : (*grid.shape) float, optional
+        From 0 to 1: how far the surface that is nearest to each node was there (1), or had to be completed (less, the
+        farther from any face), where the field was sharpened to a shape.
+    surface : ExactSurface, optional
+        What the values are distances to, where that is known exactly: contours then lie on it exactly.
 
     Raises
     ------
@@ -55,6 +61,8 @@ class GridField(Generic[Dimension]):
     grid: Grid[Dimension]
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+    confidence: NDArray[np.float32] | None = field(default=None, repr=False)
+    surface: ExactSurface | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float64)
@@ -147,7 +155,9 @@ class GridField(Generic[Dimension]):
         if grid.dimension == 2:
             lines = level_lines(self.values, grid.origin, grid.spacing, level)
             return [Polyline(points, closed) for points, closed in lines]
-        return TriangleMesh(*closed_surface(self.values, grid.origin, grid.spacing, level))
+        surface = self.surface
+        refine = None if surface is None else lambda points: surface.on_level(points, self.values, level)
+        return TriangleMesh(*closed_surface(self.values, grid.origin, grid.spacing, level, refine))
 
     @overload
     def offset(self: GridField[Literal[3]], distance: float) -> TriangleMesh: ...
@@ -233,4 +243,4 @@ class GridField(Generic[Dimension]):
         return f"GridField({self.grid!r}, values from {low:g} to {high:g})"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.grid, self.values, self.diagnostics)
+        return type(self), (self.grid, self.values, self.diagnostics, self.confidence, self.surface)

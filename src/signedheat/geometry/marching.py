@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,11 @@ CAP = 0.01
 
 
 def closed_surface(
-    values: NDArray[np.float64], origin: NDArray[np.float64], spacing: NDArray[np.float64], level: float
+    values: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    spacing: NDArray[np.float64],
+    level: float,
+    refine: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Marching cubes (Lewiner et al. 2003), with closed, manifold, outward-oriented output for every input.
 
@@ -29,6 +35,8 @@ def closed_surface(
         Of the grid.
     level : float
         The level.
+    refine : callable, optional
+        Moves (n, 3) points of the level set along the edges of the grid that they lie on.
 
     Returns
     -------
@@ -46,7 +54,8 @@ def closed_surface(
     if wall_signs(height) == {True, False}:
         height, shift = capped(height), 1
     vertices, faces, _, _ = measure.marching_cubes(height, 0.0, gradient_direction="descent")
-    return origin + (vertices.astype(np.float64) - shift) * spacing, faces
+    positions = origin + (vertices.astype(np.float64) - shift) * spacing
+    return positions if refine is None else refine(positions), faces
 
 
 def level_lines(

@@ -32,15 +32,15 @@ def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float6
     steps = np.ones(4)
     steps[4 - values.ndim :] = spacing
     field = np.ascontiguousarray(values).reshape(shape)
-    edges = _crossed_edges(field)
+    edges = crossed_edges(field)
     if not len(edges):
         raise OutsideError("the field has one sign everywhere, so there is no zero set to measure distance to")
-    crossings = _crossings(field, edges, steps)
+    crossings = crossings_at(field, edges, steps)
     nearest = np.full(shape, -1, dtype=np.int32)
     squares = np.full(shape, np.inf, dtype=np.float32)
     points = crossings[:, :4].astype(np.float32)
-    _seed(nearest, squares, edges, points, steps)
-    sweep_lines(_nearest_tiles, shape, 1, nearest, squares, points, steps)
+    seed_edge_ends(nearest, squares, edges, points, steps, 0)
+    sweep_lines(nearest_tiles, shape, 1, nearest, squares, points, steps)
     del squares
     result = np.empty(shape)
     reach = float(np.linalg.norm(spacing))  # no point of the zero set is farther from its nearest crossing
@@ -49,7 +49,7 @@ def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float6
 
 
 @compiled(nogil=True)
-def _crossed_edges(field):
+def crossed_edges(field):
     """(e, 5) node (4 indices) and axis of each edge whose two ends have different signs; zero counts as positive."""
     n0, n1, n2, n3 = field.shape
     capacity, count = 4096, 0
@@ -136,7 +136,7 @@ def _cubic(field, place, weights, gradient):
 
 
 @compiled(nogil=True)
-def _crossings(field, edges, steps):
+def crossings_at(field, edges, steps):
     """(e, 18) position, unit normal and shape operator (symmetric, ten numbers) of the zero set at crossed edges."""
     result = np.zeros((len(edges), 18))
     weights = np.empty((2, 4, 4))
@@ -205,23 +205,24 @@ def _crossings(field, edges, steps):
 
 
 @compiled(nogil=True)
-def _seed(nearest, squares, edges, points, steps):
-    """Give both ends of each crossed edge its crossing as the first candidate."""
+def seed_edge_ends(nearest, squares, edges, points, steps, first):
+    """Give both ends of each crossed edge its crossing as a candidate: a point from `first` on."""
     for e in range(len(edges)):
+        p = first + e
         for end in range(2):
             i, j, k, m = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
             axis = edges[e, 4]
             if end == 1:
                 i, j, k, m = i + (axis == 0), j + (axis == 1), k + (axis == 2), m + (axis == 3)
-            square = (points[e, 0] - i * steps[0]) ** 2 + (points[e, 1] - j * steps[1]) ** 2
-            square += (points[e, 2] - k * steps[2]) ** 2 + (points[e, 3] - m * steps[3]) ** 2
+            square = (points[p, 0] - i * steps[0]) ** 2 + (points[p, 1] - j * steps[1]) ** 2
+            square += (points[p, 2] - k * steps[2]) ** 2 + (points[p, 3] - m * steps[3]) ** 2
             if square < squares[i, j, k, m]:
                 squares[i, j, k, m] = square
-                nearest[i, j, k, m] = e
+                nearest[i, j, k, m] = p
 
 
 @compiled(nogil=True)
-def _nearest_tiles(nearest, squares, points, steps, tiles):
+def nearest_tiles(nearest, squares, points, steps, tiles):
     """Take over nearer crossings from neighbouring lines already visited, and along each line in both directions."""
     n0, n1, n2, n = nearest.shape
     step = np.float32(steps[3])
@@ -258,12 +259,39 @@ def _nearest_tiles(nearest, squares, points, steps, tiles):
 
 
 @compiled(nogil=True)
-def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
-    """Distance to the osculating circle in the plane of node, crossing and normal.
+def circle_distance(crossing, away, across, reach):
+    """Distance to the touching circle in the plane of a point, `away` from a crossing, and the normal there.
 
-    For an offset from the crossing of s along the normal and r across it, and curvature k in the direction of r, the
-    distance to the circle of radius 1/k is ``(√((1 + ks)² + k²r²) − 1) / k``, here without cancellation.
+    With s along the normal, r across it and bending k in the direction of r, the distance to the circle of radius 1/k
+    is ``(√((1 + ks)² + k²r²) − 1) / k``, here without the cancellation. `across` is room to work in.
     """
+    s, square = 0.0, 0.0
+    for d in range(4):
+        s += away[d] * crossing[4 + d]
+        square += away[d] ** 2
+    side = 0.0
+    for d in range(4):
+        across[d] = away[d] - s * crossing[4 + d]
+        side += across[d] ** 2
+    distance = np.sqrt(square)
+    if side > 1e-12 * square:
+        bend, at = 0.0, 8
+        for d in range(4):
+            for f in range(d):
+                bend += 2.0 * across[d] * crossing[at] * across[f]
+                at += 1
+            bend += across[d] ** 2 * crossing[at]
+            at += 1
+        bend /= side
+        root = np.sqrt(max(0.0, 1.0 + 2.0 * bend * s + bend * bend * square))
+        circle = abs(2.0 * s + bend * square) / (1.0 + root)
+        distance = min(distance, max(circle, distance - reach))
+    return distance
+
+
+@compiled(nogil=True)
+def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
+    """Distance of nodes to the circle that touches at their nearest crossing, with the sign of their values."""
     n0, n1, n2, n = nearest.shape
     away, across = np.empty(4), np.empty(4)
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
@@ -273,25 +301,17 @@ def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
                     crossing = crossings[nearest[i, j, k, m]]
                     away[0], away[1] = i * steps[0] - crossing[0], j * steps[1] - crossing[1]
                     away[2], away[3] = k * steps[2] - crossing[2], m * steps[3] - crossing[3]
-                    s, square = 0.0, 0.0
-                    for d in range(4):
-                        s += away[d] * crossing[4 + d]
-                        square += away[d] ** 2
-                    side = 0.0
-                    for d in range(4):
-                        across[d] = away[d] - s * crossing[4 + d]
-                        side += across[d] ** 2
-                    distance = np.sqrt(square)
-                    if side > 1e-12 * square:
-                        bend, at = 0.0, 8
-                        for d in range(4):
-                            for f in range(d):
-                                bend += 2.0 * across[d] * crossing[at] * across[f]
-                                at += 1
-                            bend += across[d] ** 2 * crossing[at]
-                            at += 1
-                        bend /= side
-                        root = np.sqrt(max(0.0, 1.0 + 2.0 * bend * s + bend * bend * square))
-                        circle = abs(2.0 * s + bend * square) / (1.0 + root)
-                        distance = min(distance, max(circle, distance - reach))
+                    distance = circle_distance(crossing, away, across, reach)
                     out[i, j, k, m] = distance if field[i, j, k, m] >= 0 else -distance
+
+
+@compiled(nogil=True)
+def distances_to_crossings(points, chosen, crossings, reach, out):
+    """Distance of (n, 3) points to the circle that touches at the crossing chosen for each; −1 is none, and inf."""
+    away, across = np.zeros(4), np.empty(4)
+    for p in range(len(points)):
+        out[p] = np.inf
+        if chosen[p] >= 0:
+            for d in range(3):
+                away[1 + d] = points[p, d] - crossings[chosen[p], 1 + d]
+            out[p] = circle_distance(crossings[chosen[p]], away, across, reach)

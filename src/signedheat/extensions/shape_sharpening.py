@@ -1,0 +1,137 @@
+"""Sharpening to a shape: exact distance where it is there, a zero set where it is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import singledispatch
+from typing import Literal
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..domains.grid import Grid
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import SourceError
+from ..geometry.face_features import FaceFeatures
+from ..operators.grid.closest_points import crossed_edges, crossings_at
+from ..operators.grid.exact_surface import ExactSurface
+from ..operators.grid.fitted_points import REACH, fitted_to_points, mean_gap
+from ..operators.grid.layering import layered_faces
+from ..operators.grid.sampled_surface import FaceBand, sampled_surface, signed_distances
+
+Fit = Literal["auto", "exact", "smooth"]
+"""Which faces distance is measured to: all but those that lie in layers, all, or none."""
+Shape = TriangleMesh | PolygonMesh | PointCloud
+
+FAR = 1.5
+"""Cells: what the zero set has farther from any face stands in for missing surface."""
+DOUBT = 0.05
+"""Distance from the shape, over its diagonal, at which confidence in a completed surface has fallen to a half."""
+
+
+@singledispatch
+def triangles_of(shape: object) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and triangles that a shape in space consists of."""
+    raise SourceError(
+        f"a field on a grid in space is sharpened to a TriangleMesh, PolygonMesh or PointCloud, "
+        f"not to a {type(shape).__name__}"
+    )
+
+
+@triangles_of.register
+def _(shape: TriangleMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    return shape.vertices, shape.faces
+
+
+@triangles_of.register
+def _(shape: PolygonMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Triangles as they are, other polygons as fans around their centroids."""
+    centres = shape.n_vertices + shape.corner_polygons
+    fans = np.stack([shape.corners, shape.next_corners, centres], axis=1)
+    return np.concatenate([shape.vertices, shape.polygon_centroids]), fans
+
+
+@dataclass(frozen=True, eq=False)
+class Assembled:
+    """Distance put together from a shape and a zero set.
+
+    Attributes
+    ----------
+    values, confidence : (*shape) float
+        At the nodes.
+    surface : ExactSurface
+        What distance is measured to.
+    layered, completed : float
+        Share of the faces that were left out as layers, and of the zero set that stands in for missing surface.
+    """
+
+    values: NDArray[np.float64]
+    confidence: NDArray[np.float32]
+    surface: ExactSurface
+    layered: float
+    completed: float
+
+
+def assemble(parts: Sequence[Shape], grid: Grid, sides: NDArray[np.float64], fit: Fit) -> Assembled:
+    """Signed distance to shapes, and to the zero set of `sides` where they are missing.
+
+    1. The zero set is fitted to the points of clouds (`fitted_to_points`).
+    2. Faces that lie in layers are left out (`layered_faces`), as all are where the fit is to be smooth.
+    3. Crossings of the zero set farther than `FAR` cells from the others stand in for what is missing.
+    4. All nodes find the nearest of both (`sampled_surface`), and the sides from faces nearby or from `sides`.
+    """
+    steps = np.array(grid.spacing)
+    clouds = [part for part in parts if isinstance(part, PointCloud)]
+    for cloud in clouds if fit != "smooth" else []:
+        if cloud.normals is None:
+            raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
+        sides = fitted_to_points(sides, steps, cloud.points - grid.origin, cloud.normals)
+    features = FaceFeatures.of(*_joined([part for part in parts if not isinstance(part, PointCloud)], grid.origin))
+    band = FaceBand.of(features, grid.shape, steps)
+    evidence = np.concatenate([band.feet[:, 1:], *(cloud.points - grid.origin for cloud in clouds)])
+    n_faces = len(features.rows)
+    left_out = np.full(n_faces, fit == "smooth")
+    if fit == "auto" and n_faces:
+        left_out = layered_faces(features, band, sides, steps)
+    if left_out.any():
+        features = FaceFeatures.of(features.vertices, features.faces[~left_out].astype(np.int64))
+        band = FaceBand.of(features, grid.shape, steps)
+    edges = crossed_edges(sides[None])
+    n_edges = len(edges)
+    edges = edges[band.leave(edges, sides[None])]
+    crossings = crossings_at(sides[None], edges, np.array([1.0, *steps]))
+    points = np.ascontiguousarray(crossings[:, 1:4])
+    completed = band.search(features, points, steps).distances > FAR * float(steps.max())
+    edges, crossings, points = edges[completed], crossings[completed], points[completed]
+    gaps = max((REACH * mean_gap(cloud.points) for cloud in clouds), default=0.0)
+    trusted = confidence_at(points, evidence, gaps)
+    nearby = sampled_surface(features, band, edges, crossings, steps)
+    values, confidence = signed_distances(nearby, sides < 0, trusted)
+    surface = ExactSurface(features, crossings, np.array(grid.origin), steps)
+    share = float(left_out.mean()) if n_faces else 0.0
+    return Assembled(values, confidence, surface, share, len(edges) / n_edges if n_edges else 0.0)
+
+
+def confidence_at(points: NDArray[np.float64], evidence: NDArray[np.float64], gap: float = 0.0) -> NDArray[np.float32]:
+    """(n,) from 1 at the shape to 0 far from it: ``1 / (1 + excess / (DOUBT · diagonal))``, excess beyond a gap."""
+    if not len(points) or not len(evidence):
+        return np.zeros(len(points), dtype=np.float32)
+    diagonal = float(np.linalg.norm(np.ptp(evidence, axis=0)))
+    distances, _ = scipy.spatial.cKDTree(evidence).query(points, workers=-1)
+    excess = np.maximum(distances - gap, 0.0)
+    return np.asarray(DOUBT * diagonal / (DOUBT * diagonal + excess), dtype=np.float32)
+
+
+def _joined(parts: Sequence[Shape], origin: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices around `origin` and triangles of shapes with faces."""
+    vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
+    for part in parts:
+        positions, corners = triangles_of(part)
+        vertices.append(positions - origin)
+        faces.append(corners + count)
+        count += len(positions)
+    return np.concatenate(vertices), np.concatenate(faces)

@@ -1,0 +1,197 @@
+"""What lies around each feature of triangles: normals of edges and vertices, and faces on their other side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from .box_tree import morton_codes
+from .components import same_positions
+from .edges import EdgeTable, edge_table
+from .point_triangle import triangle_rows
+
+FOLD = 0.02
+"""Where unit normals of two faces add up to less than this, the edge between them is a fold and tells no side."""
+
+
+@dataclass(frozen=True, eq=False)
+class FaceFeatures:
+    """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
+
+    An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
+    a vertex is, if all edges around it are. There the sign of ``(x − foot) · normal`` tells the side of a point x whose
+    nearest place the foot is.
+
+    Attributes
+    ----------
+    corners : (m, 9) float
+        Corners of the faces, each face once, in the order of a space-filling curve.
+    rows : (m, 16) float
+        The same as `foot_on_triangle` wants it.
+    vertices : (n, 3) float
+        Their positions.
+    faces, edges : (m, 3) int
+        Vertices, which are different where positions are; and edges, corner k to corner k + 1.
+    face_normals, edge_normals, vertex_normals : (·, 3) float
+        Unit normals of the faces, their sums at edges, and angle-weighted at vertices.
+    edge_regular, vertex_regular : (·,) bool
+        Whether the surface is closed and consistent there.
+    across : (m, 3) int
+        The face on the other side of each edge; −1 where it is not regular.
+    vertex_starts, vertex_corners : (n + 1,), (3 m,) int
+        Corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2.
+    """
+
+    corners: NDArray[np.float64]
+    rows: NDArray[np.float64]
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    face_normals: NDArray[np.float64]
+    edge_normals: NDArray[np.float64]
+    vertex_normals: NDArray[np.float64]
+    edge_regular: NDArray[np.bool_]
+    vertex_regular: NDArray[np.bool_]
+    across: NDArray[np.int32]
+    vertex_starts: NDArray[np.int64]
+    vertex_corners: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceFeatures:
+        """Features of (m, 3) faces. Vertices at one position are one; faces without extent and copies are left out.
+
+        Examples
+        --------
+        >>> faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]])
+        >>> features = FaceFeatures.of(np.eye(4)[:, :3], faces)
+        >>> len(features.corners), bool(features.edge_regular.all())
+        (4, True)
+        """
+        faces = same_positions(vertices)[faces]
+        a, b, c = faces.T
+        proper = (a != b) & (b != c) & (c != a)
+        if not proper.all():
+            faces = faces[proper]
+        if len(faces):  # what is near in space had better be near in memory
+            faces = faces[np.argsort(morton_codes(vertices[faces].mean(axis=1)), kind="stable")]
+            order, faces = _by_first_use(faces, len(vertices))
+            vertices = vertices[order]
+        table = edge_table(faces)
+        copies = _copies(faces, table)
+        if copies.any():
+            faces = faces[~copies]
+            table = edge_table(faces)
+        corners = np.ascontiguousarray(vertices[faces].reshape(-1, 9))
+        starts = np.zeros(len(vertices) + 1, dtype=np.int64)
+        np.cumsum(np.bincount(faces.ravel(), minlength=len(vertices)), out=starts[1:])
+        return cls(
+            corners,
+            triangle_rows(corners),
+            vertices,
+            faces.astype(np.int32),
+            table.face_edges.astype(np.int32),
+            *_normals(corners, faces, table.face_edges, table.forward, len(table.vertices), len(vertices)),
+            starts,
+            _corners_around(faces, starts),
+        )
+
+
+def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
+    """Which faces are there before, with the same corners in the same order of rotation."""
+    copies = np.zeros(len(faces), dtype=bool)
+    crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges].all(axis=1))
+    if len(crowded):
+        some = faces[crowded]
+        turn = (some.argmin(axis=1)[:, None] + np.arange(3)) % 3
+        _, first = np.unique(np.take_along_axis(some, turn, axis=1), axis=0, return_index=True)
+        copies[crowded] = True
+        copies[crowded[first]] = False
+    return copies
+
+
+@compiled(nogil=True)
+def _by_first_use(faces, n_vertices):
+    """Used vertices in the order in which faces name them first, and the faces with their numbers in that order."""
+    number = np.full(n_vertices, -1, dtype=np.int64)
+    order = np.empty(n_vertices, dtype=np.int64)
+    result = np.empty_like(faces)
+    count = 0
+    for f in range(len(faces)):
+        for c in range(3):
+            v = faces[f, c]
+            if number[v] < 0:
+                number[v] = count
+                order[count] = v
+                count += 1
+            result[f, c] = number[v]
+    return order[:count], result
+
+
+@compiled(nogil=True)
+def _corners_around(faces, starts):
+    fill = starts.copy()
+    result = np.empty(3 * len(faces), dtype=np.int32)
+    for f in range(len(faces)):
+        for c in range(3):
+            v = faces[f, c]
+            result[fill[v]] = 3 * f + c
+            fill[v] += 1
+    return result
+
+
+@compiled(nogil=True, error_model="numpy")
+def _normals(corners, faces, edges, forward, n_edges, n_vertices):
+    face_normals = np.zeros((len(faces), 3))
+    edge_normals = np.zeros((n_edges, 3))
+    vertex_normals = np.zeros((n_vertices, 3))
+    counts, balance = np.zeros(n_edges, dtype=np.int32), np.zeros(n_edges, dtype=np.int32)
+    edge_faces = np.full((n_edges, 2), -1, dtype=np.int64)
+    side, lengths, normal = np.empty((3, 3)), np.empty(3), np.empty(3)
+    for f in range(len(faces)):
+        for c in range(3):
+            lengths[c] = 0.0
+            for d in range(3):
+                side[c, d] = corners[f, 3 * ((c + 1) % 3) + d] - corners[f, 3 * c + d]
+                lengths[c] += side[c, d] ** 2
+            lengths[c] = np.sqrt(lengths[c])
+        square = 0.0
+        for d in range(3):
+            p, q = (d + 1) % 3, (d + 2) % 3
+            normal[d] = side[0, p] * side[1, q] - side[0, q] * side[1, p]
+            square += normal[d] ** 2
+        if square > 0.0:
+            for d in range(3):
+                face_normals[f, d] = normal[d] / np.sqrt(square)
+        for c in range(3):
+            e = edges[f, c]
+            if counts[e] < 2:
+                edge_faces[e, counts[e]] = f
+            counts[e] += 1
+            balance[e] += 1 if forward[f, c] else -1
+            p = (c + 2) % 3
+            cosine = 0.0
+            for d in range(3):
+                edge_normals[e, d] += face_normals[f, d]
+                cosine -= side[c, d] * side[p, d]
+            cosine /= lengths[c] * lengths[p] if lengths[c] * lengths[p] > 0.0 else 1.0
+            angle = np.arccos(min(max(cosine, -1.0), 1.0))
+            for d in range(3):
+                vertex_normals[faces[f, c], d] += angle * face_normals[f, d]
+    edge_regular = np.zeros(n_edges, dtype=np.bool_)
+    vertex_regular = np.ones(n_vertices, dtype=np.bool_)
+    for e in range(n_edges):
+        square = edge_normals[e, 0] ** 2 + edge_normals[e, 1] ** 2 + edge_normals[e, 2] ** 2
+        edge_regular[e] = counts[e] == 2 and balance[e] == 0 and square > FOLD * FOLD
+    across = np.full((len(faces), 3), -1, dtype=np.int32)
+    for f in range(len(faces)):
+        for c in range(3):
+            e = edges[f, c]
+            if edge_regular[e]:
+                across[f, c] = edge_faces[e, 0] if edge_faces[e, 0] != f else edge_faces[e, 1]
+            else:
+                vertex_regular[faces[f, c]] = False
+                vertex_regular[faces[f, (c + 1) % 3]] = False
+    return face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular, across

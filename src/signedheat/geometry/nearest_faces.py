@@ -1,0 +1,215 @@
+"""Kernels: distance to faces and their sides, from candidates nearby.
+
+A candidate is a face that is near, not always the nearest. Over a surface without gaps it leads there: as long as the
+foot lies on the rim of a face, faces on the other side of that rim may be nearer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from .face_features import FaceFeatures
+from .point_triangle import foot_on_triangle
+
+STEPS = 24
+"""Faces that a search goes on to at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class NearestFaces:
+    """The nearest face of each of some points.
+
+    Attributes
+    ----------
+    faces : (n,) int
+        Which one.
+    distances : (n,) float
+        To it.
+    feet : (n, 3) float
+        The nearest place.
+    features : (n,) int
+        What it lies on, in the code of `foot_on_triangle`.
+    cosines : (n,) float
+        Of the angle between the way from the foot to the point and the normal there: positive in front of the face.
+    regular : (n,) bool
+        Whether that tells the side: the foot is inside a face, or on a regular edge or vertex.
+    """
+
+    faces: NDArray[np.int32]
+    distances: NDArray[np.float64]
+    feet: NDArray[np.float64]
+    features: NDArray[np.int8]
+    cosines: NDArray[np.float32]
+    regular: NDArray[np.bool_]
+
+
+def search_from(
+    features: FaceFeatures,
+    points: NDArray[np.float64],
+    candidates: NDArray[np.int32],
+    width: int = 1,
+    patience: float = np.inf,
+) -> NearestFaces:
+    """The nearest of (n, c) candidate faces of each of (n, 3) points, or one that leads on from it; −1 is none.
+
+    What is nearest to the point before is a candidate, too, and to that `width` points before: where points are in
+    order, it is often the right one. As long as there is no candidate, there is no face, and distance is infinite.
+
+    Points farther than `patience` from all candidates look at one more face only: a wrong one near the right one makes
+    less of a difference, the farther both are.
+    """
+    n = len(points)
+    found = NearestFaces(
+        np.empty(n, dtype=np.int32),
+        np.empty(n),
+        np.empty((n, 3)),
+        np.empty(n, dtype=np.int8),
+        np.empty(n, dtype=np.float32),
+        np.empty(n, dtype=np.bool_),
+    )
+    _search(
+        features.rows,
+        features.vertices,
+        features.faces,
+        features.across,
+        features.vertex_starts,
+        features.vertex_corners,
+        features.edges,
+        features.face_normals,
+        features.edge_normals,
+        features.vertex_normals,
+        features.edge_regular,
+        features.vertex_regular,
+        points,
+        candidates,
+        width,
+        patience * patience,
+        found.faces,
+        found.distances,
+        found.feet,
+        found.features,
+        found.cosines,
+        found.regular,
+    )
+    return found
+
+
+@compiled(nogil=True, error_model="numpy")
+def _search(
+    rows,
+    places,
+    faces,
+    across,
+    starts,
+    around,
+    edges,
+    face_normals,
+    edge_normals,
+    vertex_normals,
+    edge_regular,
+    vertex_regular,
+    points,
+    candidates,
+    width,
+    patience,
+    out_faces,
+    out_distances,
+    out_feet,
+    out_features,
+    out_cosines,
+    out_regular,
+):
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        face, square, feature, fx, fy, fz = -1, np.inf, 0, x, y, z
+        for c in range(-2, candidates.shape[1]):
+            if c >= 0:
+                other = candidates[p, c]
+            elif c == -1:
+                other = out_faces[p - 1] if p > 0 else -1
+            else:
+                other = out_faces[p - width] if p >= width > 1 else -1
+            if other >= 0 and other != face and (c <= 0 or other != candidates[p, c - 1]):
+                s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
+                if s < square:
+                    face, square, feature, fx, fy, fz = other, s, which, u, v, w
+        for _ in range(STEPS if square < patience else 1):
+            before = face
+            if feature == 0:
+                break
+            if feature <= 3:
+                other = across[face, feature - 1]
+                if other >= 0:
+                    s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
+                    if s < square:
+                        face, square, feature, fx, fy, fz = other, s, which, u, v, w
+            else:
+                vertex = faces[face, feature - 4]
+                vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
+                dx, dy, dz = x - vx, y - vy, z - vz
+                steepest, other = 0.0, -1  # the side along which distance shrinks fastest; if none, no place is nearer
+                turns = (
+                    2 if vertex_regular[vertex] else 3
+                )  # around a whole vertex every side is the first of one corner
+                for k in range(starts[vertex], starts[vertex + 1]):
+                    for turn in range(1, turns):
+                        a = faces[around[k] // 3, (around[k] + turn) % 3]
+                        ex, ey, ez = places[a, 0] - vx, places[a, 1] - vy, places[a, 2] - vz
+                        gain = dx * ex + dy * ey + dz * ez
+                        if gain > 0.0:
+                            gain *= gain / (ex * ex + ey * ey + ez * ez)
+                            if gain > steepest:
+                                steepest, other = gain, around[k] // 3
+                if other >= 0:
+                    s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
+                    if s < square:
+                        face, square, feature, fx, fy, fz = other, s, which, u, v, w
+            if face == before:
+                break
+        out_faces[p], out_features[p], out_distances[p] = face, feature, np.sqrt(square)
+        out_feet[p, 0], out_feet[p, 1], out_feet[p, 2] = fx, fy, fz
+        nx = ny = nz = 0.0
+        regular = face >= 0
+        if face >= 0 and feature == 0:
+            nx, ny, nz = face_normals[face, 0], face_normals[face, 1], face_normals[face, 2]
+        elif face >= 0 and feature <= 3:
+            e = edges[face, feature - 1]
+            nx, ny, nz = edge_normals[e, 0], edge_normals[e, 1], edge_normals[e, 2]
+            regular = edge_regular[e]
+        elif face >= 0:
+            e = faces[face, feature - 4]
+            nx, ny, nz = vertex_normals[e, 0], vertex_normals[e, 1], vertex_normals[e, 2]
+            regular = vertex_regular[e]
+        cosine = nx * (x - fx) + ny * (y - fy) + nz * (z - fz)
+        lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * square)
+        out_cosines[p] = cosine / lengths if lengths > 0.0 else 0.0
+        out_regular[p] = regular
+
+
+@compiled(nogil=True)
+def feet_of_nodes(rows, nearest, steps):
+    """Turn the nearest face of each node, in place, into the nearest of (s, 4) feet, 0 in front; and their faces."""
+    n0, n1, n2 = nearest.shape
+    count = 0
+    for i in range(n0):
+        for j in range(n1):
+            for k in range(n2):
+                count += nearest[i, j, k] >= 0
+    feet = np.zeros((count, 4), dtype=np.float32)
+    faces = np.empty(count, dtype=np.int32)
+    count = 0
+    for i in range(n0):
+        for j in range(n1):
+            for k in range(n2):
+                f = nearest[i, j, k]
+                if f >= 0:
+                    _, _, x, y, z = foot_on_triangle(rows, f, i * steps[0], j * steps[1], k * steps[2])
+                    feet[count, 1], feet[count, 2], feet[count, 3] = x, y, z
+                    faces[count] = f
+                    nearest[i, j, k] = count
+                    count += 1
+    return feet, faces

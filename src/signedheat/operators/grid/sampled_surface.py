@@ -1,0 +1,208 @@
+"""A surface near the nodes of a grid: faces where they are there, crossings of a zero set where they are missing.
+
+Positions are in units of length from the grid's first node. Grids have three axes.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import compiled
+from ...errors import OutsideError
+from ...geometry.face_band import nearest_in_band
+from ...geometry.face_features import FaceFeatures
+from ...geometry.nearest_faces import NearestFaces, feet_of_nodes, search_from
+from ...parallel import n_threads
+from .closest_points import distances_to_crossings, nearest_tiles, seed_edge_ends
+from .wavefront import SMALL, sweep_lines
+
+BAND = 1.0
+"""Half width, in cells, of the band in which every face near a node is looked at: at least half a cell's diagonal."""
+NEAR = 2.0
+"""Cells from a face within which it tells the side."""
+PATIENCE = 8.0
+"""Cells from a face beyond which nodes do not search on until nothing nearer is found."""
+PLANES = 16
+"""Planes of nodes that one thread goes through, each after the one before."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampledSurface:
+    """What is nearest to each node.
+
+    Attributes
+    ----------
+    features : FaceFeatures
+        The faces.
+    crossings : (c, 18) float
+        Points of a zero set where there are no faces; see `crossings_at`.
+    steps : (3,) float
+        Distance between nodes along each axis.
+    owners : (s,) int
+        Which face each sample lies on, or −1 minus which crossing it is.
+    nearest : (*shape) int
+        The sample that is nearest to each node, or nearly.
+    """
+
+    features: FaceFeatures
+    crossings: NDArray[np.float64]
+    steps: NDArray[np.float64]
+    owners: NDArray[np.int32]
+    nearest: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class FaceBand:
+    """Feet of the nodes near faces.
+
+    Attributes
+    ----------
+    nearest, squares : (*shape)
+        Nearest foot of each node that has a face near it, −1 elsewhere; and the square of its distance.
+    feet : (s, 4) float
+        Positions, 0 in front.
+    faces : (s,) int
+        Where they lie.
+    """
+
+    nearest: NDArray[np.int32]
+    squares: NDArray[np.float32]
+    feet: NDArray[np.float32]
+    faces: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, features: FaceFeatures, shape: tuple[int, ...], steps: NDArray[np.float64]) -> FaceBand:
+        """The band of `BAND` cells around faces."""
+        nearest, squares = nearest_in_band(features.rows, shape, steps, BAND * float(steps.max()))
+        feet, faces = feet_of_nodes(features.rows, nearest, steps)
+        return cls(nearest, squares, feet, faces)
+
+    def leave(self, edges: NDArray[np.int32], field: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of some crossed edges of the grid may be crossed farther than half a cell outside the band.
+
+        (e, 5) edges as `crossed_edges` gives them, of a field with four axes. A crossing lies at most half a cell from
+        the nearer end of its edge; where that is in the band, so nearly is the crossing.
+        """
+        near, far = edges[:, :4], edges[:, :4].copy()
+        far[np.arange(len(edges)), edges[:, 4]] += 1
+        swap = np.abs(field[tuple(near.T)]) > np.abs(field[tuple(far.T)])
+        return self.nearest[tuple(np.where(swap[:, None], far, near)[:, 1:].T)] < 0
+
+    def search(self, features: FaceFeatures, points: NDArray[np.float64], steps: NDArray[np.float64]) -> NearestFaces:
+        """Nearest face of each of (n, 3) points, among those near the nodes of its cell and one layer around; or −1."""
+        candidates = np.empty((len(points), 64), dtype=np.int32)
+        _faces_around_cells(points, steps, self.nearest, self.faces, candidates)
+        return search_from(features, points, candidates)
+
+
+def sampled_surface(
+    features: FaceFeatures,
+    band: FaceBand,
+    edges: NDArray[np.int32],
+    crossings: NDArray[np.float64],
+    steps: NDArray[np.float64],
+) -> SampledSurface:
+    """Carry the feet of a band, which is used up, and crossings of edges to all nodes (Danielsson 1980).
+
+    Raises
+    ------
+    OutsideError
+        If there is nothing to carry.
+    """
+    if not len(band.faces) and not len(crossings):
+        raise OutsideError(
+            "there is nothing to measure distance to: the shape has no faces, and the field one sign everywhere"
+        )
+    nearest, squares = band.nearest[None], band.squares[None]
+    owners = np.concatenate([band.faces, -1 - np.arange(len(crossings), dtype=np.int32)])
+    samples = np.concatenate([band.feet, crossings[:, :4].astype(np.float32)])
+    padded = np.array([1.0, *steps])
+    if len(crossings):
+        seed_edge_ends(nearest, squares, edges, samples, padded, len(band.feet))
+    sweep_lines(nearest_tiles, nearest.shape, 1, nearest, squares, samples, padded)
+    return SampledSurface(features, crossings, steps, owners, nearest[0])
+
+
+def signed_distances(
+    surface: SampledSurface, inside: NDArray[np.bool_], trusted: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    """Signed distance of every node to what is nearest to it or to nodes before; and how far that can be trusted.
+
+    Near a face the face tells the side, where the surface is closed and consistent around the foot; elsewhere `inside`.
+
+    Parameters
+    ----------
+    surface : SampledSurface
+        What is near.
+    inside : (*shape) bool
+        Sides where no face tells them.
+    trusted : (c,) float
+        From 0 to 1, for each crossing; faces have 1.
+    """
+    shape = surface.nearest.shape
+    values, confidence = np.empty(shape), np.empty(shape, dtype=np.float32)
+    cell, reach = float(surface.steps.max()), float(np.linalg.norm(surface.steps))
+    near, patience = NEAR * cell, PATIENCE * cell
+    size = shape[1] * shape[2]
+
+    def planes(which: range) -> None:
+        points, candidates = np.empty((size, 3)), np.full((size, 2), -1, dtype=np.int32)
+        chosen, other = np.empty(size, dtype=np.int32), np.empty(size)
+        for i in which:
+            _candidates_of_plane(surface.owners, surface.nearest, i, surface.steps, points, candidates)
+            found = search_from(surface.features, points, candidates, shape[2], patience)
+            candidates[:, 1] = found.faces
+            distances = found.distances
+            told = found.regular & (distances < near)
+            certain = np.ones(size, dtype=np.float32)
+            if len(surface.crossings):
+                np.subtract(-1, candidates[:, 0], out=chosen)
+                distances_to_crossings(points, chosen, surface.crossings, reach, other)
+                nearer = other < distances
+                told &= ~nearer
+                certain[nearer] = trusted[chosen[nearer]]
+                distances = np.minimum(distances, other)
+            behind = np.where(told, found.cosines < 0, inside[i].ravel())
+            values[i] = np.where(behind, -distances, distances).reshape(shape[1:])
+            confidence[i] = certain.reshape(shape[1:])
+
+    threads = n_threads() if surface.nearest.size >= SMALL else 1
+    with ThreadPoolExecutor(threads) as pool:
+        jobs = [pool.submit(planes, range(k, min(k + PLANES, shape[0]))) for k in range(0, shape[0], PLANES)]
+        for job in jobs:
+            job.result()
+    return values, confidence
+
+
+@compiled(nogil=True)
+def _candidates_of_plane(owners, nearest, i, steps, points, candidates):
+    """Positions of the nodes of one plane, and what owns the sample nearest to each."""
+    n1, n2 = nearest.shape[1:]
+    at = 0
+    for j in range(n1):
+        for k in range(n2):
+            points[at, 0], points[at, 1], points[at, 2] = i * steps[0], j * steps[1], k * steps[2]
+            candidates[at, 0] = owners[nearest[i, j, k]]
+            at += 1
+
+
+@compiled(nogil=True)
+def _faces_around_cells(points, steps, nearest, faces, candidates):
+    """Faces near the 4³ nodes around each point; −1 where a node has none, or the one before has the same."""
+    n0, n1, n2 = nearest.shape
+    for p in range(len(points)):
+        i0 = np.int64(np.floor(points[p, 0] / steps[0])) - 1
+        j0 = np.int64(np.floor(points[p, 1] / steps[1])) - 1
+        k0 = np.int64(np.floor(points[p, 2] / steps[2])) - 1
+        at = 0
+        for i in range(i0, i0 + 4):
+            for j in range(j0, j0 + 4):
+                for k in range(k0, k0 + 4):
+                    candidates[p, at] = -1
+                    if 0 <= i < n0 and 0 <= j < n1 and 0 <= k < n2 and nearest[i, j, k] >= 0:
+                        candidates[p, at] = faces[nearest[i, j, k]]
+                    at += 1

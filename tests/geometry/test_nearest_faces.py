@@ -1,0 +1,122 @@
+"""Distance to triangles: feet, features, bands of nodes, and searches from candidates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from signedheat import samples
+from signedheat.geometry.box_tree import BoxTree
+from signedheat.geometry.face_band import nearest_in_band
+from signedheat.geometry.face_features import FaceFeatures
+from signedheat.geometry.nearest import nearest_on_triangles
+from signedheat.geometry.nearest_faces import search_from
+from signedheat.geometry.point_triangle import foot_on_triangle, triangle_rows
+
+UNIT = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("point", "square", "feature", "foot"),
+    [
+        ((0.2, 0.3, 2.0), 4.0, 0, (0.2, 0.3, 0.0)),
+        ((0.4, -1.0, 0.0), 1.0, 1, (0.4, 0.0, 0.0)),
+        ((1.0, 1.0, 0.0), 0.5, 2, (0.5, 0.5, 0.0)),
+        ((-2.0, 0.25, 0.0), 4.0, 3, (0.0, 0.25, 0.0)),
+        ((-1.0, -1.0, 1.0), 3.0, 4, (0.0, 0.0, 0.0)),
+        ((3.0, 0.0, 0.0), 4.0, 5, (1.0, 0.0, 0.0)),
+        ((0.0, 3.0, 0.0), 4.0, 6, (0.0, 1.0, 0.0)),
+    ],
+)
+def test_feet_on_every_feature(point, square, feature, foot):
+    found = foot_on_triangle(triangle_rows(UNIT), 0, *point)
+    assert found[1] == feature
+    np.testing.assert_allclose([found[0], *found[2:]], [square, *foot], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "corners", [np.zeros(9), np.array([0, 0, 0, 1, 0, 0, 1, 0, 0]), np.array([0, 0, 0, 2, 0, 0, 1, 0, 0])]
+)
+def test_triangles_without_area_are_segments_or_points(corners):
+    points = np.random.default_rng(0).normal(size=(40, 3))
+    rows = triangle_rows(np.ascontiguousarray(corners, dtype=float)[None])
+    ends = corners.reshape(3, 3)[:, 0]
+    feet = np.zeros((40, 3))
+    feet[:, 0] = np.clip(points[:, 0], ends.min(), ends.max())
+    for point, foot in zip(points, feet, strict=True):
+        assert foot_on_triangle(rows, 0, *point)[0] == pytest.approx(((point - foot) ** 2).sum(), rel=1e-12)
+
+
+def test_needles_and_specks_keep_their_distance():
+    """A triangle and the same one cut into slivers are one set of points."""
+    whole = np.array([[0.0, 0, 0], [1, 0, 0], [0.3, 1e-4, 0]])
+    middle = whole.mean(axis=0)
+    parts = np.array([[whole[k], whole[(k + 1) % 3], middle] for k in range(3)]).reshape(3, 9)
+    for point in np.random.default_rng(1).normal(size=(50, 3)):
+        one = foot_on_triangle(triangle_rows(whole.reshape(1, 9)), 0, *point)[0]
+        rows = triangle_rows(parts)
+        assert min(foot_on_triangle(rows, f, *point)[0] for f in range(3)) == pytest.approx(one, rel=1e-9)
+
+
+@pytest.mark.parametrize("subdivisions", [0, 2, 4])
+def test_bands_are_exact(subdivisions):
+    """Faces larger and smaller than a cell; the tree of boxes is the other route."""
+    mesh = samples.sphere(subdivisions)
+    corners = mesh.vertices[mesh.faces] + 1.5
+    steps = np.array([0.21, 0.17, 0.19])
+    shape = tuple(np.ceil(3.0 / steps).astype(int) + 1)
+    _, squares = nearest_in_band(triangle_rows(corners.reshape(-1, 9)), shape, steps, 0.21)
+    nodes = np.argwhere(np.isfinite(squares))
+    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+    everywhere = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3) * steps
+    faces, weights = nearest_on_triangles(corners, tree, everywhere)
+    distance = np.linalg.norm(np.einsum("pk,pki->pi", weights, corners[faces]) - everywhere, axis=1).reshape(shape)
+    assert (np.isfinite(squares) == (distance <= 0.21)).mean() > 0.9999
+    np.testing.assert_allclose(np.sqrt(squares[tuple(nodes.T)]), distance[tuple(nodes.T)], atol=1e-6)
+
+
+def test_a_search_leads_to_the_nearest_face():
+    """Outside a convex shape, where no other place is nearer than all around it."""
+    mesh = samples.sphere(3)
+    features = FaceFeatures.of(mesh.vertices, mesh.faces)
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(300, 3))
+    points *= rng.uniform(1.0, 3.0, size=(300, 1)) / np.linalg.norm(points, axis=1, keepdims=True)
+    corners = features.corners.reshape(-1, 3, 3)
+    nearest = np.linalg.norm(corners.mean(axis=1)[None] - points[:, None], axis=2).argsort(axis=1)
+    start = nearest[:, 12].astype(np.int32)  # a dozen others are nearer
+    found = search_from(features, points, start[:, None])
+    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+    faces, weights = nearest_on_triangles(corners, tree, points)
+    distance = np.linalg.norm(np.einsum("pk,pki->pi", weights, corners[faces]) - points, axis=1)
+    np.testing.assert_allclose(found.distances, distance, rtol=1e-12)
+    assert found.regular.all()
+    assert (found.cosines > 0).all()
+
+
+def test_features_know_open_and_turned_edges():
+    mesh = samples.sphere(2)
+    whole = FaceFeatures.of(mesh.vertices, mesh.faces)
+    assert whole.edge_regular.all() and whole.vertex_regular.all()
+    assert np.einsum("ij,ij->i", whole.vertex_normals, whole.vertices).min() > 0
+    holed = FaceFeatures.of(mesh.vertices, mesh.faces[1:])
+    assert (~holed.edge_regular).sum() == 3 and (~holed.vertex_regular).sum() == 3
+    turned = np.concatenate([mesh.faces[:1, ::-1], mesh.faces[1:]])
+    assert (~FaceFeatures.of(mesh.vertices, turned).edge_regular).sum() == 3
+
+
+def test_copies_and_faces_without_extent_do_not_count():
+    mesh = samples.sphere(2)
+    apart = samples.soup(mesh)
+    again = np.roll(apart.faces[:50], 1, axis=1)
+    flat = np.array([[0, 0, 1], [2, 2, 2]])
+    features = FaceFeatures.of(apart.vertices, np.concatenate([apart.faces, again, flat]))
+    assert len(features.rows) == mesh.n_faces
+    assert features.edge_regular.all()
+
+
+def test_a_folded_sheet_tells_no_side():
+    """Two faces on each other, back to back: a wall without thickness."""
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    features = FaceFeatures.of(vertices, np.array([[0, 1, 2], [0, 2, 1]]))
+    assert not features.edge_regular.any()
