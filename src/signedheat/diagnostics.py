@@ -123,13 +123,15 @@ class SlopeErrors(Note):
 
 @dataclass(frozen=True, eq=False)
 class SharpenedToShape(Note):
-    """Fraction of the faces left out because they lie in layers, and of the zero set that stands in for missing ones."""
+    """Fraction of the faces left out because they lie in layers, and of the zero set that stands in for faces."""
 
     layered_faces: float
     completed_zero_set: float
 
     def __str__(self) -> str:
-        return f"{self.completed_zero_set:.1%} of the zero set completed, {self.layered_faces:.1%} of the faces in layers"
+        return (
+            f"{self.completed_zero_set:.1%} of the zero set completed, {self.layered_faces:.1%} of the faces in layers"
+        )
 
 
 @dataclass(frozen=True, eq=False)

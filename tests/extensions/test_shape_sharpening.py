@@ -214,7 +214,7 @@ def test_a_shape_that_leaves_the_grid():
 
 
 def test_points_are_fitted():
-    """A wavy ball of a thousand points: the fit is nearer the truth than φ's own zero set, and thin walls stay apart."""
+    """The fit is nearer the truth than φ's own zero set."""
     for mesh in (samples.torus(), samples.sphere(4)):
         cloud = samples.oriented_points(mesh, 1000, seed=3)
         grid = sh.Grid.around(mesh.bounds, resolution=40)

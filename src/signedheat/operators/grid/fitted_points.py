@@ -69,7 +69,9 @@ def fitted_to_points(
 
 def mean_gap(points: NDArray[np.float64]) -> float:
     """Side of a square that each of (n, 3) points would have on a plane, from the disks that hold their six nearest."""
-    return float(np.median(scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0])) * np.sqrt(np.pi / 7.0)
+    return float(np.median(scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0])) * np.sqrt(
+        np.pi / 7.0
+    )
 
 
 def _fit(
