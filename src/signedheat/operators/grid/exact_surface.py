@@ -96,7 +96,7 @@ class ExactSurface:
         movable = np.flatnonzero(inside & ((fraction > 0).sum(axis=1) == 1))
         base, upper, axis = base[movable], upper[movable], axis[movable]
         low, high = (values[tuple(at.T)] - level for at in (base, upper))
-        moved = points.copy()
+        moved = np.array(points, dtype=np.float64)
         if not len(movable):
             return moved
         start, stop, last = np.zeros(len(movable)), np.ones(len(movable)), np.zeros(len(movable), dtype=np.int8)

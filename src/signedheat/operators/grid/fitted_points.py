@@ -53,9 +53,9 @@ def fitted_to_points(
     tree = scipy.spatial.cKDTree(points)
     n_neighbours = min(NEIGHBOURS, len(points))
     gap = mean_gap(points)
-    result = phi.copy()
+    result = np.array(phi, dtype=np.float64)
     nodes = np.argwhere(np.abs(phi) < WIDTH * float(steps.max()))
-    slopes = np.gradient(phi, *steps)
+    slopes: list[NDArray[np.float64]] = list(np.gradient(phi, *steps))
     for begin in range(0, len(nodes), CHUNK):
         some = tuple(nodes[begin : begin + CHUNK].T)
         places = np.stack(some, axis=1) * steps
@@ -69,9 +69,8 @@ def fitted_to_points(
 
 def mean_gap(points: NDArray[np.float64]) -> float:
     """Side of a square that each of (n, 3) points would have on a plane, from the disks that hold their six nearest."""
-    return float(np.median(scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0])) * np.sqrt(
-        np.pi / 7.0
-    )
+    reach = scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0]
+    return float(np.median(reach) * np.sqrt(np.pi / 7.0))
 
 
 def _fit(

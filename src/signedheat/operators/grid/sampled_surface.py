@@ -90,7 +90,8 @@ class FaceBand:
         near, far = edges[:, :4], edges[:, :4].copy()
         far[np.arange(len(edges)), edges[:, 4]] += 1
         swap = np.abs(field[tuple(near.T)]) > np.abs(field[tuple(far.T)])
-        return self.nearest[tuple(np.where(swap[:, None], far, near)[:, 1:].T)] < 0
+        ends = np.where(swap[:, None], far, near)[:, 1:]
+        return np.less(self.nearest[tuple(ends.T)], 0)
 
     def search(self, features: FaceFeatures, points: NDArray[np.float64], steps: NDArray[np.float64]) -> NearestFaces:
         """Nearest face of each of (n, 3) points, among those near the nodes of its cell and one layer around; or −1."""
