@@ -21,6 +21,7 @@ def runs() -> dict[str, np.ndarray]:
     grid = sh.signed_distance(broken, resolution=9)
     found["grid"] = grid.values
     found["sharpened grid"] = sh.sharpen(grid).values
+    found["grid sharpened to its shape"] = sh.sharpen(grid, broken).values
     curve = ball.polyline([[1.0, 0.1, 0.2], [0.0, 1.0, -0.1], [-1.0, 0.0, 0.3]])
     surface = sh.SignedHeatSolver(ball).distance(curve)
     found["surface"] = surface.values

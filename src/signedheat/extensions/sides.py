@@ -255,7 +255,7 @@ def _fill_missing_sides(
     holes, n = scipy.ndimage.label(fillable, output=np.int32)
     if n == 0 or len(present) == 1:
         return
-    areas, owners = completion_areas(
+    areas, owners, at_walls = completion_areas(
         holes, bodies, present, scene.phi, scene.winding, scene.distance, scene.steps, FAR * scene.cell, LEVELS
     )
     budget = present * scene.trust
@@ -266,7 +266,11 @@ def _fill_missing_sides(
         affordable = np.flatnonzero(areas[own].sum(axis=0) <= budget[body])
         if not len(affordable):
             continue
-        level = LEVELS[affordable[0]]
+        touching, close = at_walls[own].max(axis=0)
+        first = int(affordable[0])
+        if touching <= first < close:  # leave room for offsets
+            first = min(int(close), len(LEVELS) - 1)
+        level = LEVELS[first]
         for hole in own:
             box = tuple(slice(max(0, part.start - 2), part.stop + 2) for part in boxes[hole - 1])
             near = scipy.ndimage.binary_dilation(holes[box] == hole, np.ones((3, 3, 3)), iterations=2)

@@ -51,7 +51,9 @@ def nearest_in_band(
 
 
 @compiled(nogil=True)
-def _visit_walls(rows, steps, nearest, squares):
+def _visit_walls(
+    rows: NDArray[np.float64], steps: NDArray[np.float64], nearest: NDArray[np.int32], squares: NDArray[np.float32]
+) -> None:
     """Faces that lie beyond a wall of the grid visit the nodes of that wall in front of them, however far."""
     first, last = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for f in range(len(rows)):
@@ -75,7 +77,15 @@ def _visit_walls(rows, steps, nearest, squares):
 
 
 @compiled(nogil=True, error_model="numpy")
-def _visit_nodes(rows, steps, reach, nearest, squares, start, stop):
+def _visit_nodes(
+    rows: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    reach: float,
+    nearest: NDArray[np.int32],
+    squares: NDArray[np.float32],
+    start: int,
+    stop: int,
+) -> None:
     n1, n2 = nearest.shape[1], nearest.shape[2]
     h0, h1, h2 = steps
     limit = np.float32(reach * reach)

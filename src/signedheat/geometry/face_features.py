@@ -87,13 +87,21 @@ class FaceFeatures:
         corners = np.ascontiguousarray(vertices[faces].reshape(-1, 9))
         starts = np.zeros(len(vertices) + 1, dtype=np.int64)
         np.cumsum(np.bincount(faces.ravel(), minlength=len(vertices)), out=starts[1:])
+        n_edges = len(table.vertices)
+        normals = _normals(corners, faces, table.face_edges, table.forward, n_edges, len(vertices))
+        face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular, across = normals
         return cls(
             corners,
             triangle_rows(corners),
             vertices,
             faces.astype(np.int32),
             table.face_edges.astype(np.int32),
-            *_normals(corners, faces, table.face_edges, table.forward, len(table.vertices), len(vertices)),
+            face_normals,
+            edge_normals,
+            vertex_normals,
+            edge_regular,
+            vertex_regular,
+            across,
             starts,
             _corners_around(faces, starts),
         )
@@ -113,7 +121,7 @@ def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
 
 
 @compiled(nogil=True)
-def _by_first_use(faces, n_vertices):
+def _by_first_use(faces: NDArray[np.int64], n_vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Used vertices in the order in which faces name them first, and the faces with their numbers in that order."""
     number = np.full(n_vertices, -1, dtype=np.int64)
     order = np.empty(n_vertices, dtype=np.int64)
@@ -131,7 +139,7 @@ def _by_first_use(faces, n_vertices):
 
 
 @compiled(nogil=True)
-def _corners_around(faces, starts):
+def _corners_around(faces: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.int32]:
     fill = starts.copy()
     result = np.empty(3 * len(faces), dtype=np.int32)
     for f in range(len(faces)):
@@ -143,7 +151,21 @@ def _corners_around(faces, starts):
 
 
 @compiled(nogil=True, error_model="numpy")
-def _normals(corners, faces, edges, forward, n_edges, n_vertices):
+def _normals(
+    corners: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    edges: NDArray[np.int64],
+    forward: NDArray[np.bool_],
+    n_edges: int,
+    n_vertices: int,
+) -> tuple[
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.bool_],
+    NDArray[np.bool_],
+    NDArray[np.int32],
+]:
     face_normals = np.zeros((len(faces), 3))
     edge_normals = np.zeros((n_edges, 3))
     vertex_normals = np.zeros((n_vertices, 3))

@@ -100,29 +100,29 @@ def search_from(
 
 @compiled(nogil=True, error_model="numpy")
 def _search(
-    rows,
-    places,
-    faces,
-    across,
-    starts,
-    around,
-    edges,
-    face_normals,
-    edge_normals,
-    vertex_normals,
-    edge_regular,
-    vertex_regular,
-    points,
-    candidates,
-    width,
-    patience,
-    out_faces,
-    out_distances,
-    out_feet,
-    out_features,
-    out_cosines,
-    out_regular,
-):
+    rows: NDArray[np.float64],
+    places: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    across: NDArray[np.int32],
+    starts: NDArray[np.int64],
+    around: NDArray[np.int32],
+    edges: NDArray[np.int32],
+    face_normals: NDArray[np.float64],
+    edge_normals: NDArray[np.float64],
+    vertex_normals: NDArray[np.float64],
+    edge_regular: NDArray[np.bool_],
+    vertex_regular: NDArray[np.bool_],
+    points: NDArray[np.float64],
+    candidates: NDArray[np.int32],
+    width: int,
+    patience: float,
+    out_faces: NDArray[np.int32],
+    out_distances: NDArray[np.float64],
+    out_feet: NDArray[np.float64],
+    out_features: NDArray[np.int8],
+    out_cosines: NDArray[np.float32],
+    out_regular: NDArray[np.bool_],
+) -> None:
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         face, square, feature, fx, fy, fz = -1, np.inf, 0, x, y, z
@@ -191,7 +191,9 @@ def _search(
 
 
 @compiled(nogil=True)
-def feet_of_nodes(rows, nearest, steps):
+def feet_of_nodes(
+    rows: NDArray[np.float64], nearest: NDArray[np.int32], steps: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Turn the nearest face of each node, in place, into the nearest of (s, 4) feet, 0 in front; and their faces."""
     n0, n1, n2 = nearest.shape
     count = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled import compiled
 
@@ -10,7 +11,7 @@ from ..compiled import compiled
 
 
 @compiled(nogil=True, error_model="numpy")
-def triangle_rows(corners):
+def triangle_rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m, 16) what `foot_on_triangle` needs of (m, 9) corners: a corner, two sides, their products and inverses.
 
     Triangles with no area, or so little that rounding hides it, get none: their feet are on their sides.
@@ -36,7 +37,9 @@ def triangle_rows(corners):
 
 
 @compiled(nogil=True, error_model="numpy")
-def foot_on_triangle(rows, f, x, y, z):
+def foot_on_triangle(
+    rows: NDArray[np.float64], f: int, x: float, y: float, z: float
+) -> tuple[float, int, float, float, float]:
     """Squared distance to triangle f, feature code, and the three coordinates of the foot.
 
     Inside, where the foot of the perpendicular is; else the nearest on three sides, each found as a fraction.

@@ -14,6 +14,8 @@ from ...compiled import compiled
 
 DISK = 0.6
 """Radius, in cells, of the disk that a sample stands for."""
+MARGIN = 0.05
+"""Share of the nodes along the longest axis that is close to a wall."""
 TOUCH = 3
 """Nodes between a hole and a body that still touch."""
 
@@ -60,7 +62,7 @@ def completion_areas(
     steps: NDArray[np.float64],
     far: float,
     levels: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Area that closes bodies across each hole, if what lies beyond is filled down to a level of the winding number.
 
     Parameters
@@ -80,10 +82,14 @@ def completion_areas(
         By hole and level.
     owners : (h + 1,) int
         Body that each hole belongs to, 0 for none.
+    walls : (h + 1, 2) int
+        Levels below which what fills a hole touches the walls of the box, and comes close to them (`MARGIN`).
     """
     n_holes = int(holes.max(initial=0)) + 1
-    changes, owners = _completion_areas(holes, bodies, present, phi, winding, distance, steps, far, levels, n_holes)
-    return np.cumsum(changes, axis=1)[:, : len(levels)], owners
+    changes, owners, walls = _completion_areas(
+        holes, bodies, present, phi, winding, distance, steps, far, levels, n_holes
+    )
+    return np.cumsum(changes, axis=1)[:, : len(levels)], owners, walls
 
 
 @compiled(nogil=True)
@@ -164,6 +170,8 @@ def _completion_areas(holes, bodies, present, phi, winding, distance, steps, far
     n0, n1, n2 = holes.shape
     changes = np.zeros((n_holes, len(levels) + 1))
     owners = np.zeros(n_holes, dtype=np.int64)
+    walls = np.zeros((n_holes, 2), dtype=np.int64)
+    longest = max(n0, n1, n2)
     for i in range(n0):
         for j in range(n1):
             for k in range(n2):
@@ -171,6 +179,14 @@ def _completion_areas(holes, bodies, present, phi, winding, distance, steps, far
                 if hole == 0:
                     continue
                 here = np.searchsorted(levels, winding[i, j, k])  # filled at the levels before this
+                room = longest
+                for n, at in ((n0, i), (n1, j), (n2, k)):
+                    if n > 1:
+                        room = min(room, at, n - 1 - at)
+                if room == 0:
+                    walls[hole, 0] = max(walls[hole, 0], here)
+                if room <= MARGIN * longest:
+                    walls[hole, 1] = max(walls[hole, 1], here)
                 if i == 0 or j == 0 or k == 0 or i == n0 - 1 or j == n1 - 1 or k == n2 - 1:
                     wall = _wall_area(holes.shape, i, j, k, steps)
                     changes[hole, 0] += wall
@@ -205,7 +221,7 @@ def _completion_areas(holes, bodies, present, phi, winding, distance, steps, far
                         area = _edge_area(field, i, j, k, a, b, c, axis, steps)
                         changes[hole, first] += area
                         changes[hole, last] -= area
-    return changes, owners
+    return changes, owners, walls
 
 
 def distances_to_samples(

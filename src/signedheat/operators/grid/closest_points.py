@@ -259,7 +259,9 @@ def nearest_tiles(nearest, squares, points, steps, tiles):
 
 
 @compiled(nogil=True)
-def circle_distance(crossing, away, across, reach):
+def circle_distance(
+    crossing: NDArray[np.float64], away: NDArray[np.float64], across: NDArray[np.float64], reach: float
+) -> float:
     """Distance to the touching circle in the plane of a point, `away` from a crossing, and the normal there.
 
     With s along the normal, r across it and bending k in the direction of r, the distance to the circle of radius 1/k
@@ -286,7 +288,7 @@ def circle_distance(crossing, away, across, reach):
         root = np.sqrt(max(0.0, 1.0 + 2.0 * bend * s + bend * bend * square))
         circle = abs(2.0 * s + bend * square) / (1.0 + root)
         distance = min(distance, max(circle, distance - reach))
-    return distance
+    return float(distance)
 
 
 @compiled(nogil=True)
@@ -306,7 +308,13 @@ def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
 
 
 @compiled(nogil=True)
-def distances_to_crossings(points, chosen, crossings, reach, out):
+def distances_to_crossings(
+    points: NDArray[np.float64],
+    chosen: NDArray[np.int32],
+    crossings: NDArray[np.float64],
+    reach: float,
+    out: NDArray[np.float64],
+) -> None:
     """Distance of (n, 3) points to the circle that touches at the crossing chosen for each; −1 is none, and inf."""
     away, across = np.zeros(4), np.empty(4)
     for p in range(len(points)):

@@ -91,7 +91,8 @@ class FaceBand:
         far[np.arange(len(edges)), edges[:, 4]] += 1
         swap = np.abs(field[tuple(near.T)]) > np.abs(field[tuple(far.T)])
         ends = np.where(swap[:, None], far, near)[:, 1:]
-        return np.less(self.nearest[tuple(ends.T)], 0)
+        feet: NDArray[np.int32] = self.nearest[tuple(ends.T)]
+        return feet < 0
 
     def search(self, features: FaceFeatures, points: NDArray[np.float64], steps: NDArray[np.float64]) -> NearestFaces:
         """Nearest face of each of (n, 3) points, among those near the nodes of its cell and one layer around; or −1."""
@@ -187,7 +188,14 @@ def signed_distances(
 
 
 @compiled(nogil=True)
-def _candidates_of_plane(owners, nearest, i, steps, points, candidates):
+def _candidates_of_plane(
+    owners: NDArray[np.int32],
+    nearest: NDArray[np.int32],
+    i: int,
+    steps: NDArray[np.float64],
+    points: NDArray[np.float64],
+    candidates: NDArray[np.int32],
+) -> None:
     """Positions of the nodes of one plane, and what owns the sample nearest to each."""
     n1, n2 = nearest.shape[1:]
     at = 0
@@ -199,7 +207,13 @@ def _candidates_of_plane(owners, nearest, i, steps, points, candidates):
 
 
 @compiled(nogil=True)
-def _faces_around_cells(points, steps, nearest, faces, candidates):
+def _faces_around_cells(
+    points: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    nearest: NDArray[np.int32],
+    faces: NDArray[np.int32],
+    candidates: NDArray[np.int32],
+) -> None:
     """Faces near the 4³ nodes around each point; −1 where a node has none, or the one before has the same."""
     n0, n1, n2 = nearest.shape
     for p in range(len(points)):
