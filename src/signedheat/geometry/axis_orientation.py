@@ -21,7 +21,7 @@ GIVEN_WEIGHT = 0.1
 """Weight of given signs, beside half of all that balls and neighbours tell about a point."""
 
 
-WORSE = 0.003
+WORSE = 0.0015
 """Coherence by which larger neighbourhoods must gain, and which, once lost, no larger ones win back."""
 
 
@@ -72,7 +72,8 @@ def outward_signs(
     axes : (n, 3) float
         Unit normals, up to sign.
     given : bool
-        Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out.
+        Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out. They
+        stay as they are, or are all inverted, where no more of them seem wrong than points contradict each other.
     groups : (n,) int, optional
         Points of the same group, counted from 0, share one sign.
     """
@@ -99,7 +100,10 @@ def outward_signs(
     if len(rest):
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
     agreed = float((weights * found[tails] * found[heads]).sum()) / max(float(np.abs(weights).sum()), 1e-300)
-    return OutwardSigns(signs if groups is None else _shared(signs, groups), sided, agreed)
+    signs = signs if groups is None else _shared(signs, groups)
+    if given and min((signs < 0).mean(), (signs > 0).mean()) <= 1 - agreed:  # no more than what is contradicted anyway
+        signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
+    return OutwardSigns(signs, sided, agreed)
 
 
 def _followed(

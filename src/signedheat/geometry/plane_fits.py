@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ..parallel import n_threads
 from .plane_fit_kernels import robust_planes
 
 CLEAN_NEIGHBORS = 12
@@ -24,7 +26,7 @@ CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
 NOISY_HEIGHTS = (0.5, 0.5, 0.5)
 """The same over planes that move from a noisy point to where its neighbours are densest."""
 _TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
-_CHUNK = 16384
+_CHUNK = 4096
 _TRIED = 2000
 
 
@@ -120,20 +122,15 @@ def planes_near(
     """Axes, centres, reaches and deviations of planes near chosen points."""
     n = len(chosen)
     axes, centers, deviations, reaches = np.zeros((n, 3)), points[chosen], np.zeros(n), np.zeros(n)
-    for begin in range(0, n, _CHUNK):
+
+    def fit(begin: int) -> None:
         part = slice(begin, begin + _CHUNK)
-        distances, neighbors = tree.query(points[chosen[part]], k=n_neighbors + 1, workers=-1)
+        distances, neighbors = tree.query(points[chosen[part]], k=n_neighbors + 1)
         neighbors[:, 0] = chosen[part]
-        robust_planes(
-            points,
-            neighbors,
-            distances,
-            np.array(heights),
-            n_starts > 1,
-            n_starts,
-            axes[part],
-            centers[part],
-            deviations[part],
-        )
+        kept = axes[part], centers[part], deviations[part]
+        robust_planes(points, neighbors, distances, np.array(heights), n_starts > 1, n_starts, *kept)
         reaches[part] = distances[:, -1]
+
+    with ThreadPoolExecutor(n_threads()) as pool:
+        list(pool.map(fit, range(0, n, _CHUNK)))
     return axes, centers, reaches, deviations
