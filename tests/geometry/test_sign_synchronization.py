@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from signedheat.geometry.plane_fit_kernels import least_eigenvector
-from signedheat.geometry.plane_fits import CLEAN_NEIGHBORS, fit_planes
+from signedheat.geometry.plane_fits import CLEAN_NEIGHBORS, fit_planes, noise_scale
 from signedheat.geometry.synchronization import synchronize_signs
 from signedheat.geometry.thinning import spread_out
 
@@ -76,8 +76,9 @@ def test_least_eigenvector_of_a_line_is_across_it():
 def test_planes_of_both_sides_of_a_box_are_told_apart():
     rng = np.random.default_rng(0)
     points = np.concatenate([np.c_[rng.random((2000, 2)), np.full(2000, z)] for z in (0.0, 0.03)])
+    assert noise_scale(points) is None
     fits = fit_planes(points)
-    assert not fits.noisy and fits.n_neighbors == CLEAN_NEIGHBORS
+    assert fits.n_neighbors == CLEAN_NEIGHBORS
     assert (np.abs(fits.axes[:, 2]) > 0.999).mean() > 0.99
 
 
@@ -85,10 +86,10 @@ def test_noise_asks_for_more_neighbors_and_moves_points_to_the_surface():
     rng = np.random.default_rng(0)
     points = rng.normal(size=(20_000, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    clean = fit_planes(points)
-    assert not clean.noisy
-    noisy = fit_planes(points + rng.normal(scale=0.02, size=points.shape))
-    assert noisy.noisy and noisy.n_neighbors > CLEAN_NEIGHBORS
+    assert noise_scale(points) is None
+    moved = points + rng.normal(scale=0.02, size=points.shape)
+    noisy = fit_planes(moved, noise_scale(moved))
+    assert noisy.n_neighbors > CLEAN_NEIGHBORS
     assert np.abs(np.linalg.norm(noisy.places, axis=1) - 1).mean() < 0.5 * 0.02
     assert np.median(np.abs((noisy.axes * points).sum(axis=1))) > np.cos(np.radians(10))
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..errors import GeometryError
-from ..geometry.axis_orientation import outward_signs
-from ..geometry.plane_fits import fit_planes
+from ..geometry.axis_orientation import fitted_outward, outward_signs
+from ..geometry.plane_fits import fit_planes, noise_scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +31,9 @@ class PointOrientation:
         Whether noise called for neighbourhoods larger than the smallest.
     sided : bool
         Whether anything told which side is out; points in a plane, say, tell nothing.
+    coherence : float
+        How far points confirm each other: 1 where all do, .98 and more where the result can be relied on; much less
+        where sheets are too thin, or points too few, for the noise.
     """
 
     cloud: PointCloud
@@ -39,6 +42,7 @@ class PointOrientation:
     n_neighbors: int
     noisy: bool
     sided: bool
+    coherence: float
 
 
 def orient_points(cloud: PointCloud) -> PointOrientation:
@@ -77,18 +81,18 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
     ids, which = np.unique(cloud.representatives, return_inverse=True)
     if len(ids) < 4:
         raise GeometryError(f"the point cloud has {len(ids)} distinct points, and a surface needs at least 4: add some")
-    fits = fit_planes(cloud.points[ids])
     if cloud.normals is None:
-        signs, sided = outward_signs(fits, fits.axes)
-        normals = (fits.axes * signs[:, None])[which.ravel()]
-        turned = 0
+        fits, found = fitted_outward(cloud.points[ids])
+        normals = (fits.axes * found.signs[:, None])[which.ravel()]
+        fitted, turned = cloud.n_points, 0
     else:
-        signs, sided = outward_signs(fits, cloud.normals[ids], given=True)
-        every = signs[which.ravel()]
-        normals, turned = cloud.normals * every[:, None], int((every < 0).sum())
-    fitted = 0 if cloud.normals is not None else cloud.n_points
+        fits = fit_planes(cloud.points[ids], noise_scale(cloud.points[ids]))
+        found = outward_signs(fits, cloud.normals[ids], given=True)
+        every = found.signs[which.ravel()]
+        normals = cloud.normals * every[:, None]
+        fitted, turned = 0, int((every < 0).sum())
     oriented = PointCloud(cloud.points, normals, cloud.areas, cloud.n_neighbors)
-    return PointOrientation(oriented, fitted, turned, fits.n_neighbors, fits.noisy, sided)
+    return PointOrientation(oriented, fitted, turned, fits.n_neighbors, fits.noisy, found.sided, found.coherence)
 
 
 def orient_axes(
@@ -128,8 +132,8 @@ def orient_axes(
     rank[order] = np.arange(len(order))
     first, place = first[order], rank[place.ravel()]
     present, kept = np.unique(members[first], return_inverse=True)
-    fits = fit_planes(points[first])
-    found, _ = outward_signs(fits, axes[first], given, None if groups is None else kept.ravel())
+    fits = fit_planes(points[first], noise_scale(points[first]))
+    found = outward_signs(fits, axes[first], given, None if groups is None else kept.ravel()).signs
     if groups is None:
         agrees = (axes * axes[first[place]]).sum(axis=1) >= 0
         return np.where(agrees, 1.0, -1.0) * found[place]

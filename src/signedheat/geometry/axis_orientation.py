@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from .empty_balls import sign_links
-from .plane_fits import PlaneFits
+from .plane_fits import PlaneFits, fit_planes, noisy_sizes
 from .synchronization import synchronize_signs
 from .thinning import spread_out
 
@@ -19,10 +21,49 @@ GIVEN_WEIGHT = 0.1
 """Weight of given signs, beside half of all that balls and neighbours tell about a point."""
 
 
+WORSE = 0.0015
+"""Coherence by which larger neighbourhoods must gain, and which, once lost, no larger ones win back."""
+
+
+@dataclass(frozen=True, eq=False)
+class OutwardSigns:
+    """Signs that turn axes outwards.
+
+    Attributes
+    ----------
+    signs : (n,) float
+        1 or −1.
+    sided : bool
+        Whether anything told which side is out.
+    coherence : float
+        Share of what pairs of points tell about each other that the signs agree with, less that which they contradict.
+    """
+
+    signs: NDArray[np.float64]
+    sided: bool
+    coherence: float
+
+
+def fitted_outward(points: NDArray[np.float64]) -> tuple[PlaneFits, OutwardSigns]:
+    """Planes near (n, 3) distinct points, and signs that turn their normals outwards.
+
+    In noise, neighbourhoods too small fit planes to it, and too large ones to several sheets at once: either way the
+    points contradict each other. The size with which they do so least is taken.
+    """
+    tried: list[tuple[PlaneFits, OutwardSigns]] = []
+    for size in noisy_sizes(points) or (None,):
+        fits = fit_planes(points, size)
+        tried.append((fits, outward_signs(fits, fits.axes)))
+        best = max(found.coherence for _, found in tried)
+        if tried[-1][1].coherence < best - WORSE:
+            break
+    return next(one for one in tried if one[1].coherence >= best - WORSE)
+
+
 def outward_signs(
     fits: PlaneFits, axes: NDArray[np.float64], given: bool = False, groups: NDArray[np.int64] | None = None
-) -> tuple[NDArray[np.float64], bool]:
-    """(n,) signs that turn axes outwards, and whether anything said which side is out.
+) -> OutwardSigns:
+    """Signs that turn axes outwards.
 
     Parameters
     ----------
@@ -31,7 +72,8 @@ def outward_signs(
     axes : (n, 3) float
         Unit normals, up to sign.
     given : bool
-        Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out.
+        Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out. They
+        stay as they are, or are all inverted, where no more of them seem wrong than points contradict each other.
     groups : (n,) int, optional
         Points of the same group, counted from 0, share one sign.
     """
@@ -57,7 +99,11 @@ def outward_signs(
     rest = np.flatnonzero(signs == 0)
     if len(rest):
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
-    return (signs if groups is None else _shared(signs, groups)), sided
+    agreed = float((weights * found[tails] * found[heads]).sum()) / max(float(np.abs(weights).sum()), 1e-300)
+    signs = signs if groups is None else _shared(signs, groups)
+    if given and min((signs < 0).mean(), (signs > 0).mean()) <= 1 - agreed:  # no more than what is contradicted anyway
+        signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
+    return OutwardSigns(signs, sided, agreed)
 
 
 def _followed(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled import compiled
 
+Floats = NDArray[np.float64]
+
 
 @compiled(nogil=True)
-def least_eigenvector(xx, xy, xz, yy, yz, zz, axis):
+def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float, axis: Floats) -> float:
     """Write the unit eigenvector of the least eigenvalue of a symmetric 3×3 matrix; return that eigenvalue.
 
     Eigenvalues in closed form by the angle of their cubic (Smith 1961), the vector as a product of two rows.
@@ -49,11 +52,12 @@ def least_eigenvector(xx, xy, xz, yy, yz, zz, axis):
         longest = axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2
     length = longest**0.5
     axis[0], axis[1], axis[2] = axis[0] / length, axis[1] / length, axis[2] / length
-    return max(least, 0.0)
+    value: float = max(least, 0.0)
+    return value
 
 
 @compiled(nogil=True)
-def weighted_plane(offsets, weights, count, axis, center):
+def weighted_plane(offsets: Floats, weights: Floats, count: int, axis: Floats, center: Floats) -> float:
     """Write normal and weighted mean of the first `count` points; return their mean squared height."""
     total = x = y = z = 0.0
     for j in range(count):
@@ -69,11 +73,12 @@ def weighted_plane(offsets, weights, count, axis, center):
         xx, xy, xz = xx + wa * a, xy + wa * b, xz + wa * c
         yy, yz, zz = yy + wb * b, yz + wb * c, zz + weights[j] * c * c
     center[0], center[1], center[2] = x, y, z
-    return least_eigenvector(xx / total, xy / total, xz / total, yy / total, yz / total, zz / total, axis)
+    square: float = least_eigenvector(xx / total, xy / total, xz / total, yy / total, yz / total, zz / total, axis)
+    return square
 
 
 @compiled(nogil=True)
-def plane_through(a, b, axis):
+def plane_through(a: Floats, b: Floats, axis: Floats) -> bool:
     """Write the normal of the plane spanned by two vectors; return whether they span one."""
     u, v, w = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     square = u * u + v * v + w * w
@@ -85,7 +90,7 @@ def plane_through(a, b, axis):
 
 
 @compiled(nogil=True)
-def weigh_by_height(offsets, near, axis, base, height, weights):
+def weigh_by_height(offsets: Floats, near: Floats, axis: Floats, base: Floats, height: float, weights: Floats) -> float:
     """Write Tukey's biweight of the heights over a plane through `base`, times `near`; return the sum."""
     total = 0.0
     level = axis[0] * base[0] + axis[1] * base[1] + axis[2] * base[2]
@@ -97,7 +102,17 @@ def weigh_by_height(offsets, near, axis, base, height, weights):
 
 
 @compiled(nogil=True)
-def robust_planes(points, neighbors, distances, heights, on_surface, n_starts, axes, centers, deviations):
+def robust_planes(
+    points: Floats,
+    neighbors: NDArray[np.int64],
+    distances: Floats,
+    heights: Floats,
+    on_surface: bool,
+    n_starts: int,
+    axes: Floats,
+    centers: Floats,
+    deviations: Floats,
+) -> None:
     """Fit a plane near each point to those of its neighbours that lie within a height of it, from several starts.
 
     The first neighbour is the point itself. Heights are parts of the reach, one after the other: over the plane through

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ..parallel import n_threads
 from .plane_fit_kernels import robust_planes
 
 CLEAN_NEIGHBORS = 12
 """Neighbours that a plane is fitted to where there is no noise to average out."""
-NOISY_NEIGHBORS = (24, 48, 96, 192)
+NOISY_NEIGHBORS = (12, 24, 48, 96, 192)
 """Sizes of neighbourhood that noise may call for."""
 CLEAN_DEVIATION = 0.07
 """Deviation from robust planes, in reaches of neighbourhoods, above which points are noisy: curvature stays below .06,
 thin sheets and edges too, where the points resolve them; noise as wide as the neighbourhood has .09 or more."""
-ANGLE_ERROR = 0.06
-"""Radians by which noise may turn the plane of a noisy neighbourhood, as estimated from its deviation."""
+ANGLE_ERROR = 0.13
+"""Radians by which noise may turn planes, as estimated from their deviation, above which they tell nothing."""
 CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
 """Heights over the plane through a point, in reaches, beyond which a neighbour belongs to another sheet, one by one."""
 NOISY_HEIGHTS = (0.5, 0.5, 0.5)
 """The same over planes that move from a noisy point to where its neighbours are densest."""
 _TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
-_CHUNK = 16384
+_CHUNK = 4096
 _TRIED = 2000
 
 
@@ -56,12 +58,12 @@ class PlaneFits:
     noisy: bool
 
 
-def fit_planes(points: NDArray[np.float64]) -> PlaneFits:
-    """Fit a plane near each of (n, 3) distinct points, at the scale that their noise calls for.
+def fit_planes(points: NDArray[np.float64], n_neighbors: int | None = None) -> PlaneFits:
+    """Fit a plane near each of (n, 3) distinct points.
 
     Without noise the neighbourhoods are small, and sheets that lie close together, or meet in an edge, are told apart:
-    of several planes that explain the point, the one that explains most neighbours. With noise they are as large as it
-    takes to average it out.
+    of several planes that explain the point, the one that explains most neighbours. `n_neighbors` says that there is
+    noise, and how large neighbourhoods must be to average it out.
 
     Examples
     --------
@@ -71,32 +73,42 @@ def fit_planes(points: NDArray[np.float64]) -> PlaneFits:
     True
     """
     tree = cKDTree(points)
-    n_neighbors, noisy = neighborhood_size(points, tree)
+    noisy = n_neighbors is not None
+    size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
     heights, starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)
-    everything = np.arange(len(points))
-    axes, places, reaches, deviations = planes_near(points, tree, everything, n_neighbors, heights, starts)
-    if noisy:
-        places = points - ((points - places) * axes).sum(axis=1, keepdims=True) * axes
-    else:
-        places = points
-    return PlaneFits(axes, places, reaches, deviations, n_neighbors, noisy)
+    axes, places, reaches, deviations = planes_near(points, tree, np.arange(len(points)), size, heights, starts)
+    places = points - ((points - places) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
+    return PlaneFits(axes, places, reaches, deviations, size, noisy)
 
 
-def neighborhood_size(points: NDArray[np.float64], tree: cKDTree) -> tuple[int, bool]:
-    """Neighbours from which to fit planes, and whether noise calls for them; told from at most 2,000 of the points."""
-    largest = len(points) - 1
-    if largest <= CLEAN_NEIGHBORS:
-        return largest, False
+def noisy_sizes(points: NDArray[np.float64]) -> list[int]:
+    """Sizes of neighbourhoods in which planes can be told in spite of noise, from the least; without noise none.
+
+    Told from at most 2,000 of the points.
+
+    Examples
+    --------
+    >>> points = np.random.default_rng(0).random((2000, 3)) * (1, 1, 0.1)
+    >>> noisy_sizes(points)[-1], noisy_sizes(points * (1, 1, 0))
+    (192, [])
+    """
+    largest = (len(points) - 1) // 4
+    if largest < CLEAN_NEIGHBORS:
+        return []
+    tree = cKDTree(points)
     tried = np.arange(0, len(points), -(-len(points) // _TRIED))
     deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, _TRIAL_HEIGHTS)[3]
     if np.median(deviations) < CLEAN_DEVIATION:
-        return CLEAN_NEIGHBORS, False
-    sizes = [k for k in NOISY_NEIGHBORS if k <= largest // 4]
-    for k in sizes:
-        deviations = planes_near(points, tree, tried, k, (np.inf,), 1)[3]
-        if 2 * np.median(deviations) < ANGLE_ERROR * k**0.5:
-            return k, True
-    return (sizes[-1] if sizes else CLEAN_NEIGHBORS), bool(sizes)
+        return []
+    sizes = [k for k in NOISY_NEIGHBORS if k <= largest]
+    errors = [2 * float(np.median(planes_near(points, tree, tried, k, (np.inf,), 1)[3])) / k**0.5 for k in sizes]
+    return [k for k, error in zip(sizes, errors, strict=True) if error < ANGLE_ERROR] or sizes[-1:]
+
+
+def noise_scale(points: NDArray[np.float64]) -> int | None:
+    """Size of neighbourhoods that noise calls for where the normals are known; without noise none."""
+    sizes = noisy_sizes(points)
+    return sizes[min(2, len(sizes) - 1)] if sizes else None
 
 
 def planes_near(
@@ -110,20 +122,15 @@ def planes_near(
     """Axes, centres, reaches and deviations of planes near chosen points."""
     n = len(chosen)
     axes, centers, deviations, reaches = np.zeros((n, 3)), points[chosen], np.zeros(n), np.zeros(n)
-    for begin in range(0, n, _CHUNK):
+
+    def fit(begin: int) -> None:
         part = slice(begin, begin + _CHUNK)
-        distances, neighbors = tree.query(points[chosen[part]], k=n_neighbors + 1, workers=-1)
+        distances, neighbors = tree.query(points[chosen[part]], k=n_neighbors + 1)
         neighbors[:, 0] = chosen[part]
-        robust_planes(
-            points,
-            neighbors,
-            distances,
-            np.array(heights),
-            n_starts > 1,
-            n_starts,
-            axes[part],
-            centers[part],
-            deviations[part],
-        )
+        kept = axes[part], centers[part], deviations[part]
+        robust_planes(points, neighbors, distances, np.array(heights), n_starts > 1, n_starts, *kept)
         reaches[part] = distances[:, -1]
+
+    with ThreadPoolExecutor(n_threads()) as pool:
+        list(pool.map(fit, range(0, n, _CHUNK)))
     return axes, centers, reaches, deviations

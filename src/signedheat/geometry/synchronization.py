@@ -91,7 +91,13 @@ def _contraction(graph: _Graph) -> tuple[NDArray[np.int64], NDArray[np.float64]]
 
 
 @compiled(nogil=True)
-def turn_where_better(starts, neighbors, weights, signs, rounds):
+def turn_where_better(
+    starts: NDArray[np.int64],
+    neighbors: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    signs: NDArray[np.float64],
+    rounds: int,
+) -> None:
     """Turn signs, one after the other, that disagree with what their neighbours say, until none does."""
     for _ in range(rounds):
         turned = False

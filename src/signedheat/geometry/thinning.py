@@ -31,7 +31,9 @@ def spread_out(points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArr
 
 
 @compiled(nogil=True)
-def _keep_first(ids, ends, near, free):
+def _keep_first(
+    ids: NDArray[np.int64], ends: NDArray[np.int64], near: NDArray[np.int64], free: NDArray[np.bool_]
+) -> None:
     for i in range(len(ids)):
         if free[ids[i]]:
             for k in range(ends[i], ends[i + 1]):
