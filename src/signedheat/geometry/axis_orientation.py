@@ -72,8 +72,8 @@ def outward_signs(
     axes : (n, 3) float
         Unit normals, up to sign.
     given : bool
-        Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out. They
-        stay as they are, or are all inverted, where no more of them seem wrong than points contradict each other.
+        Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out.
+        They stay, or are all inverted, where no more of them seem wrong than points contradict each other.
     groups : (n,) int, optional
         Points of the same group, counted from 0, share one sign.
     """
