@@ -7,7 +7,7 @@ import sys
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
@@ -101,6 +101,10 @@ def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
     return Grid.around(bounds, padding=padding, **options)
 
 
+@overload
+def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField: ...
+@overload
+def compute(shape: Any, domain: TetMesh, arguments: Namespace) -> TetField: ...
 def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField:
     """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
     field: GridField | TetField

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints
 from ..domains.grid import Grid, room_around
 from ..domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
+from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
@@ -223,7 +224,8 @@ def thicken(
 def _field(domain: Domain, shape: Sources) -> Field:
     """The distance whose level sets are the offsets: that to a solid, where the domain is a grid in space."""
     if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
-        return solid_distance(shape, domain)
+        if isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | TetMesh):
+            return solid_distance(shape, domain)
     return _sided(domain, shape)
 
 

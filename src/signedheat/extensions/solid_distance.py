@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import overload
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ..constraints import ZeroSet
+from ..constraints import Constraint, ZeroSet
 from ..diagnostics import Diagnostics, Note, OrientedPoints, SharpenedToShape
 from ..discretization import discretize
 from ..domains.grid import Grid
@@ -28,7 +28,7 @@ from ..method import diffuse, integrate, normalize
 from ..operators.grid.boundary_areas import distances_to_samples
 from ..operators.grid.face_values import values_at
 from ..progress import Progress, Stopwatch
-from ..solver import SignedHeatSolver
+from ..solver import SignedHeatSolver, checked
 from .orientation import orientation
 from .point_orientation import orient_points
 from .shape_sharpening import Assembled, Fit, assemble
@@ -48,17 +48,23 @@ one half a cell thick."""
 
 @dataclass(frozen=True)
 class Steps:
-    """Which steps of `solid_distance` are taken.
+    """Which steps of `solid_distance` are taken, and how the method's own are.
 
     Attributes
     ----------
     orient, unite, sharpen : bool
         Turn faces that face the wrong way; leave out what lies inside other bodies; measure to the shape itself.
+    constraint : Constraint
+        On φ at the faces.
+    diffusion : float
+        τ in ``t = τ h²``.
     """
 
     orient: bool = True
     unite: bool = True
     sharpen: bool = True
+    constraint: Constraint = field(default_factory=ZeroSet)
+    diffusion: float = 1.0
 
 
 @overload
@@ -69,6 +75,7 @@ def solid_distance(
     resolution: int = 128,
     spacing: ArrayLike | None = None,
     padding: float | None = None,
+    constraint: Constraint | None = None,
     diffusion: float = 1.0,
     as_oriented: bool = False,
     keep_overlaps: bool = False,
@@ -80,6 +87,7 @@ def solid_distance(
     shape: Shape | TetMesh | Sequence[Mesh],
     domain: TetMesh,
     *,
+    constraint: Constraint | None = None,
     diffusion: float = 1.0,
     as_oriented: bool = False,
     keep_overlaps: bool = False,
@@ -93,6 +101,7 @@ def solid_distance(
     resolution: int = 128,
     spacing: ArrayLike | None = None,
     padding: float | None = None,
+    constraint: Constraint | None = None,
     diffusion: float = 1.0,
     as_oriented: bool = False,
     keep_overlaps: bool = False,
@@ -117,6 +126,8 @@ def solid_distance(
         Distance between its nodes, in place of `resolution`.
     padding : float, optional
         Room around the shape, in its units; by default a fifth of its longest side.
+    constraint : Free, ZeroSet, EachComponent, LevelValues or Soft, optional
+        What is imposed on φ at the faces; `ZeroSet` by default.
     diffusion : float
         τ in ``t = τ h²``.
     as_oriented : bool
@@ -155,11 +166,11 @@ def solid_distance(
     if domain is None:
         bounds = bounds_around([solid])
         domain = Grid.around(bounds, resolution, padding, spacing)
-    steps = Steps(not as_oriented, not keep_overlaps, not plain)
     diffusion = positive_number(diffusion, "diffusion")
+    steps = Steps(not as_oriented, not keep_overlaps, not plain, checked(constraint), diffusion)
     if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
-        return _on_grid(solid, domain, steps, diffusion, progress)
-    return _elsewhere(solid, domain, steps, diffusion, progress)
+        return _on_grid(solid, domain, steps, progress)
+    return _elsewhere(solid, domain, steps, progress)
 
 
 def _joined(shape: Shape | TetMesh | Sequence[Mesh]) -> Shape:
@@ -195,9 +206,7 @@ def _oriented(shape: Shape, notes: list[Note]) -> Merged:
     return Merged(found.shape, found.walls, 0)
 
 
-def _elsewhere(
-    shape: Shape, domain: Grid | TetMesh, steps: Steps, diffusion: float, progress: Progress | None
-) -> GridField | TetField:
+def _elsewhere(shape: Shape, domain: Grid | TetMesh, steps: Steps, progress: Progress | None) -> GridField | TetField:
     """On tets, and on grids with solid nodes: the method, and distance to φ's own zero set where that can be."""
     notes: list[Note] = []
     if steps.orient:
@@ -206,16 +215,16 @@ def _elsewhere(
         united = union_of(shape)
         shape = united.shape
         notes.append(united.left_out)
-    field = SignedHeatSolver(domain, diffusion, progress).distance(shape)
-    if not isinstance(field, GridField | TetField):
+    phi = SignedHeatSolver(domain, steps.diffusion, progress).distance(shape, steps.constraint)
+    if not isinstance(phi, GridField | TetField):
         kind = type(domain).__name__
         raise UnsupportedTypeError(f"a solid is measured on a Grid or a TetMesh, not on a {kind}")
     if steps.sharpen and not (isinstance(domain, Grid) and domain.mask is not None):
-        field = sharpen(field)
-    return replace(field, diagnostics=field.diagnostics.noting(*notes))
+        phi = sharpen(phi)
+    return replace(phi, diagnostics=phi.diagnostics.noting(*notes))
 
 
-def _on_grid(shape: Shape, grid: Grid, steps: Steps, diffusion: float, progress: Progress | None) -> GridField:
+def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) -> GridField:
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
@@ -227,14 +236,14 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, diffusion: float, progress:
     if samples is None:  # doubled walls alone: there is no φ
         phi, time = None, float("nan")
     else:
-        source = GridSource(samples, grid, diffusion)
+        source = GridSource(samples, grid, steps.diffusion)
         with stopwatch("diffuse"):
             vectors = diffuse(discretization, source)
         with stopwatch("normalize"):
             directions = normalize(discretization, vectors)
             del vectors
         with stopwatch("integrate"):
-            phi, time = integrate(discretization, directions, source, ZeroSet()), source.time
+            phi, time = integrate(discretization, directions, source, steps.constraint), source.time
             del directions
     if not steps.sharpen and phi is not None:
         return GridField(grid, phi, _diagnostics(notes, stopwatch, time))

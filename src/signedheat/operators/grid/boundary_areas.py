@@ -93,7 +93,7 @@ def completion_areas(
 
 
 @compiled(nogil=True)
-def _slope(field, i, j, k, axis, steps):
+def _slope(field: NDArray[np.float64], i: int, j: int, k: int, axis: int, steps: NDArray[np.float64]) -> float:
     """Difference of a grid function along an axis, one-sided at the walls."""
     n = field.shape[axis]
     if n == 1:
@@ -106,11 +106,14 @@ def _slope(field, i, j, k, axis, steps):
         rise = field[i, high, k] - field[i, low, k]
     else:
         rise = field[i, j, high] - field[i, j, low]
-    return rise / ((high - low) * steps[axis])
+    slope: float = rise / ((high - low) * steps[axis])
+    return slope
 
 
 @compiled(nogil=True)
-def _edge_area(field, i, j, k, a, b, c, axis, steps):
+def _edge_area(
+    field: NDArray[np.float64], i: int, j: int, k: int, a: int, b: int, c: int, axis: int, steps: NDArray[np.float64]
+) -> float:
     """Area that one crossed edge, between two nodes along an axis, stands for."""
     across, square = 0.0, 0.0
     volume = 1.0
@@ -121,11 +124,12 @@ def _edge_area(field, i, j, k, a, b, c, axis, steps):
             across = abs(slope)
         if field.shape[d] > 1:
             volume *= steps[d]
-    return volume / steps[axis] * (across / np.sqrt(square) if square > 0.0 else 1.0)
+    area: float = volume / steps[axis] * (across / np.sqrt(square) if square > 0.0 else 1.0)
+    return area
 
 
 @compiled(nogil=True)
-def _wall_area(shape, i, j, k, steps):
+def _wall_area(shape: tuple[int, int, int], i: int, j: int, k: int, steps: NDArray[np.float64]) -> float:
     """Area of the walls of the box around a node."""
     result, volume = 0.0, 1.0
     for d in range(3):
@@ -139,7 +143,14 @@ def _wall_area(shape, i, j, k, steps):
 
 
 @compiled(nogil=True)
-def _boundary_areas(labels, function, distance, steps, far, n_labels):
+def _boundary_areas(
+    labels: NDArray[np.int64],
+    function: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    far: float,
+    n_labels: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     n0, n1, n2 = labels.shape
     total, completed = np.zeros(n_labels), np.zeros(n_labels)
     for i in range(n0):
@@ -165,7 +176,18 @@ def _boundary_areas(labels, function, distance, steps, far, n_labels):
 
 
 @compiled(nogil=True)
-def _completion_areas(holes, bodies, present, phi, winding, distance, steps, far, levels, n_holes):
+def _completion_areas(
+    holes: NDArray[np.int64],
+    bodies: NDArray[np.int64],
+    present: NDArray[np.bool_],
+    phi: NDArray[np.float64],
+    winding: NDArray[np.float64],
+    distance: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    far: float,
+    levels: NDArray[np.float64],
+    n_holes: int,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Each edge between two nodes is crossed at all levels at which one is filled and the other is not."""
     n0, n1, n2 = holes.shape
     changes = np.zeros((n_holes, len(levels) + 1))
@@ -241,7 +263,14 @@ def distances_to_samples(
 
 
 @compiled(nogil=True)
-def _distances_to_samples(positions, vectors, steps, reach, disk, result):
+def _distances_to_samples(
+    positions: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    reach: float,
+    disk: float,
+    result: NDArray[np.float32],
+) -> None:
     low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for s in range(len(positions)):
         length = 0.0

@@ -38,7 +38,7 @@ def ranges_on_faces(
 
 
 @compiled(nogil=True)
-def _value(function, x, y, z):
+def _value(function: NDArray[np.float64], x: float, y: float, z: float) -> float:
     """Linear between nodes."""
     n0, n1, n2 = function.shape
     if not (0.0 <= x <= n0 - 1 and 0.0 <= y <= n1 - 1 and 0.0 <= z <= n2 - 1):
@@ -55,7 +55,7 @@ def _value(function, x, y, z):
 
 
 @compiled(nogil=True)
-def _values_at(function, positions):
+def _values_at(function: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
     result = np.empty(len(positions))
     for s in range(len(positions)):
         result[s] = _value(function, positions[s, 0], positions[s, 1], positions[s, 2])
@@ -63,7 +63,10 @@ def _values_at(function, positions):
 
 
 @compiled(nogil=True)
-def _ranges_on_faces(function, corners):
+def _ranges_on_faces(
+    function: NDArray[np.float64],
+    corners: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     low, high = np.empty(len(corners)), np.empty(len(corners))
     largest = 4 * max(function.shape[0], function.shape[1], function.shape[2])
     for m in range(len(corners)):

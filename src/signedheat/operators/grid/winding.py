@@ -132,7 +132,9 @@ def _refined(values: NDArray[np.float64], shape: tuple[int, ...], axis: int) -> 
 
 
 @compiled(nogil=True)
-def _far_field(places, dipoles, strengths, axis, core):
+def _far_field(
+    places: NDArray[np.float64], dipoles: NDArray[np.float64], strengths: NDArray[np.float64], axis: int, core: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Winding number at places, and its derivative along an axis."""
     dimension = places.shape[1]
     sphere = 2.0 * np.pi if dimension == 2 else 4.0 * np.pi
