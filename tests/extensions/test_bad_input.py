@@ -16,7 +16,6 @@ GRID = sh.Grid((-2, -2, -2), 0.25, (17, 17, 17))
 PLANE = sh.Grid((0, 0), 1.0, (8, 8))
 BOX = boxes((2, 2, 2), 1.0)
 POINTS = samples.oriented_points(BALL, 50)
-BARE = sh.PointCloud(POINTS.points)
 HEIGHT = sh.VertexField(BALL, BALL.vertices[:, 2])
 NAN, INF = float("nan"), float("inf")
 
@@ -48,7 +47,6 @@ def refused(call, arguments, keywords, error, words):
         case("pass that surface as the domain", RING, 0.1, error=sh.SourceError),
         case("whole number of at least 2", BALL, 0.1, resolution=1, error=sh.GeometryError),
         case("lower resolution", BALL, 0.1, resolution=100_000, error=sh.MemoryLimitError),
-        case("no normals", BARE, 0.1, resolution=12, error=sh.SourceError),
         case("is not a domain", BALL, 0.1, "grid", error=TypeError),
         case("3 dimensions, and the grid in 2", BALL, 0.1, PLANE, error=sh.SourceError),
         case("measured to a Curve", BALL, 0.1, BALL, error=sh.SourceError),
@@ -73,7 +71,6 @@ def test_growing_and_shrinking(operation, arguments, keywords, error, words):
         case("not to a NoneType", None, 0, 0.3, error=sh.SourceError),
         case("there is no source", [], 0, 0.3, error=sh.SourceError),
         case("pass that surface", RING[0], 0, 0.3, error=sh.SourceError),
-        case("no normals", BARE, 0, 0.3, error=sh.SourceError),
         case("not on a TriangleMesh", BALL, 0, 0.3, BALL, error=TypeError),
         case("not on a TetMesh", BALL, 0, 0.3, BOX, error=TypeError),
         case("3 dimensions, and the grid in 2", BALL, 0, 0.3, PLANE, error=sh.SourceError),
@@ -219,7 +216,6 @@ def folder(tmp_path):
     header = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
     faces = b"element face 1\nproperty list uchar int vertex_indices\nend_header\n"
     (tmp_path / "nan.ply").write_bytes(header + faces + b"0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n")
-    BARE.save(tmp_path / "bare.xyz")
     (tmp_path / "folder").mkdir()
     return tmp_path
 
@@ -229,7 +225,6 @@ MORPH = [
     ("dilate cut-ball.ply 0.1 -o out.stl", 1, "cut-ball.ply"),
     ("dilate empty-ball.ply 0.1 -o out.stl", 1, "the file is empty"),
     ("dilate nan.ply 0.1 -o out.stl", 1, "nan.ply: 1 of 3 vertices hold NaN"),
-    ("dilate bare.xyz 0.1 -o out.stl", 1, "bare.xyz: the point cloud has no normals"),
     ("dilate ring.txt 0.1 -o out.stl", 1, "not a known format"),
     ("dilate folder 0.1 -o out.stl", 1, "no extension"),
     ("dilate ball.ply 0.1 -o out.docx", 1, "not a known format"),

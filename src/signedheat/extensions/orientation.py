@@ -165,7 +165,10 @@ def orientation(shape: Mesh, soup_signs: SoupSigns | None = None) -> Orientation
     """
     if not isinstance(shape, TriangleMesh | PolygonMesh):
         kind = type(shape).__name__
-        raise GeometryError(f"faces are oriented here, and a {kind} has none: pass a TriangleMesh or PolygonMesh")
+        raise GeometryError(
+            f"faces are oriented here, and a {kind} has none",
+            remedy="pass a TriangleMesh or PolygonMesh",
+        )
     faces = MeshFaces.of(shape)
     surface = faces.surface
     lines, crossed = _crossings(faces)

@@ -195,22 +195,23 @@ def _joined(shape: Shape | TetMesh | Sequence[Mesh]) -> Shape:
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
-def _oriented(shape: Shape, notes: list[Note]) -> Merged:
-    """The shape as `orient` leaves it, which knows its duplicates; points get normals."""
+def _oriented(shape: Shape, notes: list[Note]) -> tuple[Merged, bool]:
+    """The shape as `orient` leaves it, which knows its duplicates, and whether it is closed; points get normals."""
     if isinstance(shape, PointCloud):
         oriented = orient_points(shape)
         notes.append(OrientedPoints(oriented.n_fitted, oriented.n_turned))
-        return merge_duplicates(oriented.cloud)
+        return merge_duplicates(oriented.cloud), False
     found = orientation(shape)
     notes.append(found.note)
-    return Merged(found.shape, found.walls, 0)
+    open_area = found.undecided_area or found.wall_area or found.nonorientable_parts
+    return Merged(found.shape, found.walls, 0), found.closed_parts == found.n_parts and not open_area
 
 
 def _elsewhere(shape: Shape, domain: Grid | TetMesh, steps: Steps, progress: Progress | None) -> GridField | TetField:
     """On tets, and on grids with solid nodes: the method, and distance to φ's own zero set where that can be."""
     notes: list[Note] = []
     if steps.orient:
-        shape = _oriented(shape, notes).shape
+        shape = _oriented(shape, notes)[0].shape
     if steps.unite and not isinstance(domain, Grid):
         united = union_of(shape)
         shape = united.shape
@@ -230,7 +231,7 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     stopwatch = Stopwatch(progress, STEPS)
     discretization = discretize(grid)  # refuses what cannot fit
     with stopwatch("orient"):
-        merged = _oriented(shape, notes) if steps.orient else merge_duplicates(shape)
+        merged, closed = _oriented(shape, notes) if steps.orient else (merge_duplicates(shape), False)
     with stopwatch("unite"):
         shape, samples, winding = _united(merged, grid, steps, notes)
     if samples is None:  # doubled walls alone: there is no φ
@@ -248,9 +249,9 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     if not steps.sharpen and phi is not None:
         return GridField(grid, phi, _diagnostics(notes, stopwatch, time))
     with stopwatch("sides"):
-        sides = _sides(phi, winding, samples, grid)
+        sides = _closed_sides(winding, grid) if closed else _sides(phi, winding, samples, grid)
     with stopwatch("sharpen"):
-        sharpened = _sharpened(shape, phi, sides, winding, grid)
+        sharpened = _sharpened(shape, phi, sides, closed, winding, grid)
     notes.append(SharpenedToShape(sharpened.layered, sharpened.completed))
     notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
     diagnostics = _diagnostics(notes, stopwatch, time)
@@ -262,11 +263,18 @@ def _diagnostics(notes: list[Note], stopwatch: Stopwatch, time: float) -> Diagno
 
 
 def _sharpened(
-    shape: Shape, phi: NDArray[np.float64] | None, sides: Sides, winding: NDArray[np.float64], grid: Grid
+    shape: Shape,
+    phi: NDArray[np.float64] | None,
+    sides: Sides,
+    closed: bool,
+    winding: NDArray[np.float64],
+    grid: Grid,
 ) -> Assembled:
     """Distance to the shape; faces beside which nothing is solid do not tell sides."""
     if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
         return assemble([shape], grid, phi, "auto")
+    if phi is not None and closed:
+        return assemble([shape], grid, sides.function, "auto", phi)
     refused = _widened(sides.refused)
     upper = np.array(grid.shape) - 1
 
@@ -308,6 +316,12 @@ def _wound(shape: Shape, grid: Grid) -> tuple[AreaSamples | None, NDArray[np.flo
     except CancellingNormalsError:
         return None, np.zeros(grid.shape)
     return samples, winding_of(samples, grid)
+
+
+def _closed_sides(winding: NDArray[np.float64], grid: Grid) -> Sides:
+    """The sides of a shape whose parts are all closed: it bounds something, however small or thin its bodies are."""
+    function = (0.5 - winding) * float(grid.spacing.max())
+    return Sides(function < 0, function, np.zeros(grid.shape, dtype=bool))
 
 
 def _sides(

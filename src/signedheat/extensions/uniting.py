@@ -107,7 +107,7 @@ def unite(shape: Shape, domain: Grid | None = None, *, resolution: int = 128) ->
     --------
     >>> from signedheat import samples
     >>> ball, other = samples.sphere(3), samples.sphere(3, center=(1.0, 0, 0))
-    >>> united = unite(samples.union(ball, other), resolution=48)
+    >>> united = unite(samples.union(ball, other), resolution=96)
     >>> bool(abs(united.face_areas.sum() - 6 * np.pi) < 0.15)
     True
     """

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from .empty_balls import sign_links
 from .plane_fits import PlaneFits, fit_planes, noisy_sizes
@@ -110,7 +110,7 @@ def _followed(
     places: NDArray[np.float64], normals: NDArray[np.float64], others: NDArray[np.float64], axes: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Signs of axes at other places that agree with the normals around them."""
-    distances, near = cKDTree(places).query(others, k=min(6, len(places)), workers=-1)
+    distances, near = scipy.spatial.cKDTree(places).query(others, k=min(6, len(places)), workers=-1)
     distances, near = distances.reshape(len(others), -1), near.reshape(len(others), -1)
     weights = 1.0 / (distances + 1e-9 * max(float(distances.max()), np.finfo(float).tiny))
     cosines = np.einsum("nj,nkj->nk", axes, normals[near])

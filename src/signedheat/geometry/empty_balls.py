@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError, cKDTree
 
 JOGGLE = 1e-4
 """Part of the distance to neighbours by which points are moved: flat faces and lattices are slow to triangulate."""
@@ -71,8 +71,8 @@ def sign_links(
     near = _neighbor_links(places, axes, 1.0 if noisy else DIRECT_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
     try:
-        tets = Delaunay(places + moves)
-    except (QhullError, ValueError):
+        tets = scipy.spatial.Delaunay(places + moves)
+    except (scipy.spatial.QhullError, ValueError):
         return near, False
     flat = np.ptp(places @ np.linalg.eigh(np.cov(places.T))[1][:, 0]) <= 10 * JOGGLE * float(reaches.max())
     if flat:
@@ -110,7 +110,7 @@ def _ball_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: ND
     return SignLinks(tails, heads, weights[told])
 
 
-def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: Delaunay) -> SignLinks:
+def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: scipy.spatial.Delaunay) -> SignLinks:
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
     a, b, c = places[faces].transpose(1, 0, 2)
@@ -125,7 +125,7 @@ def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: De
 def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64], weight: float) -> SignLinks:
     """Neighbours compared as if on a circle: one axis reflected in the plane midway is the other."""
     n, k = len(places), min(NEARBY, len(places) - 1)
-    neighbors = cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
+    neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()
     step = places[heads] - places[tails]
     length = np.linalg.norm(step, axis=1)

@@ -6,8 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..parallel import n_threads
 from .plane_fit_kernels import robust_planes
@@ -72,7 +72,7 @@ def fit_planes(points: NDArray[np.float64], n_neighbors: int | None = None) -> P
     >>> bool(np.median(np.abs(fit_planes(sheets).axes[:, 2])) > 0.999)
     True
     """
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
     heights, starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)
@@ -95,7 +95,7 @@ def noisy_sizes(points: NDArray[np.float64]) -> list[int]:
     largest = (len(points) - 1) // 4
     if largest < CLEAN_NEIGHBORS:
         return []
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     tried = np.arange(0, len(points), -(-len(points) // _TRIED))
     deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, _TRIAL_HEIGHTS)[3]
     if np.median(deviations) < CLEAN_DEVIATION:
@@ -113,7 +113,7 @@ def noise_scale(points: NDArray[np.float64]) -> int | None:
 
 def planes_near(
     points: NDArray[np.float64],
-    tree: cKDTree,
+    tree: scipy.spatial.cKDTree,
     chosen: NDArray[np.int64],
     n_neighbors: int,
     heights: tuple[float, ...],

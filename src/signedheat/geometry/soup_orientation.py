@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 N_NEIGHBORS = 12
@@ -81,12 +82,10 @@ def disagreeing_with_neighbors(
     contested : float
         Share of the asking pieces whose neighbours are parallel, but face different ways.
     """
-    from scipy.spatial import cKDTree
-
     here = np.flatnonzero(asking)
     if len(centroids) < 3:
         return np.zeros(len(centroids), dtype=bool), 0.0
-    distance, near = cKDTree(centroids).query(centroids[here], k=min(N_NEIGHBORS + 1, len(centroids)))
+    distance, near = scipy.spatial.cKDTree(centroids).query(centroids[here], k=min(N_NEIGHBORS + 1, len(centroids)))
     away = centroids[near] - centroids[here, None]
     height = np.abs(np.einsum("ijk,ik->ij", away, normals[here])) / np.maximum(distance, 1e-300)
     weights = np.maximum(0.0, 1.0 - 2.0 * height) * (near != here[:, None])

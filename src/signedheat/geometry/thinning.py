@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..compiled import compiled
 
@@ -19,7 +19,7 @@ def spread_out(points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArr
     >>> spread_out(np.array([[0.0, 0, 0], [0.4, 0, 0], [0.8, 0, 0]]), np.full(3, 0.5)).tolist()
     [0, 2]
     """
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     free = np.ones(len(points), dtype=bool)
     for begin in range(0, len(points), _CHUNK):
         part = np.arange(begin, min(begin + _CHUNK, len(points)))

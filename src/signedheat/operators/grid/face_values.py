@@ -80,8 +80,7 @@ def _ranges_on_faces(
         low[m], high[m] = np.inf, -np.inf
         for i in range(n + 1):
             for j in range(n + 1 - i):
-                a, b = i / n, j / n
-                c = 1.0 - a - b
+                a, b, c = i / n, j / n, (n - i - j) / n  # none below zero, for rounding
                 value = _value(
                     function,
                     a * corners[m, 0, 0] + b * corners[m, 1, 0] + c * corners[m, 2, 0],

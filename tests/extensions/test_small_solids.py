@@ -1,0 +1,27 @@
+"""Closed bodies keep their inside, however small beside a cell they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+
+
+@pytest.mark.parametrize(("resolution", "padding"), [(16, 5.25), (24, 2.0), (32, 0.3)])
+def test_a_ball_of_a_few_cells(resolution, padding):
+    field = sh.solid_distance(samples.sphere(3), resolution=resolution, padding=padding)
+    exact = np.linalg.norm(field.grid.points, axis=-1) - 1
+    assert (np.sign(field.values) == np.sign(exact)).all()
+    assert np.abs(field.values - exact).max() < 0.03
+
+
+def test_a_plate_thinner_than_a_tenth_of_a_cell_is_solid():
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 0.002)], dtype=float)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    field = sh.solid_distance(sh.PolygonMesh(corners, quads), resolution=32)
+    grown = field.offset(0.1)
+    assert grown.bounds[0] == pytest.approx([-0.1, -0.1, -0.1], abs=0.005)
+    assert grown.bounds[1] == pytest.approx([1.1, 1.1, 0.102], abs=0.005)
+    assert field.values.max() == pytest.approx(np.linalg.norm([0.2, 0.2, 0.2]), rel=0.15)
