@@ -3,8 +3,8 @@
     python benchmarks/grid.py [64 128 256 …] [--peers]
 
 Each size runs in a process of its own, so that its peak memory is its own. With ``--peers`` the same job is done by
-libigl (unsigned distance with the sign of fast winding numbers, each tree built once), MeshLib (general offset) and signedheat3d, where they
-are installed; they are not needed otherwise.
+libigl (unsigned distance with the sign of fast winding numbers, each tree built once), MeshLib (general offset) and
+signedheat3d, where they are installed; they are not needed otherwise.
 """
 
 from __future__ import annotations
