@@ -7,6 +7,7 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.diagnostics import SampledSource
 
 
 @pytest.mark.parametrize(("resolution", "padding"), [(16, 5.25), (24, 2.0), (32, 0.3)])
@@ -25,3 +26,8 @@ def test_a_plate_thinner_than_a_tenth_of_a_cell_is_solid():
     assert grown.bounds[0] == pytest.approx([-0.1, -0.1, -0.1], abs=0.005)
     assert grown.bounds[1] == pytest.approx([1.1, 1.1, 0.102], abs=0.005)
     assert field.values.max() == pytest.approx(np.linalg.norm([0.2, 0.2, 0.2]), rel=0.15)
+
+
+def test_what_lies_outside_the_grid_is_told():
+    field = sh.solid_distance(samples.sphere(3), sh.Grid((0, -1.5, -1.5), 0.1, (16, 31, 31)))
+    assert field.diagnostics.note(SampledSource).area_outside == pytest.approx(0.5, abs=0.1)

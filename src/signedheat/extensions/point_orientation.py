@@ -32,8 +32,8 @@ class PointOrientation:
     sided : bool
         Whether anything told which side is out; points in a plane, say, tell nothing.
     coherence : float
-        How far points confirm each other: 1 where all do, .98 and more where the result can be relied on; much less
-        where sheets are too thin, or points too few, for the noise.
+        How far points confirm each other: 1 where all do. A low value means doubt; a high one is no proof, since thin
+        sheets of noisy points can agree on a wrong side.
     """
 
     cloud: PointCloud

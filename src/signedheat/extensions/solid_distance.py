@@ -22,6 +22,7 @@ from ..domains.validation import positive_number
 from ..errors import CancellingNormalsError, SourceError, UnsupportedTypeError
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
+from ..fields.to_field import sampled
 from ..lowering.area_elements import AreaSamples, bounds_around, sample_on_grid
 from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
@@ -238,6 +239,7 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
         phi, time = None, float("nan")
     else:
         source = GridSource(samples, grid, steps.diffusion)
+        notes.append(sampled(source))
         with stopwatch("diffuse"):
             vectors = diffuse(discretization, source)
         with stopwatch("normalize"):

@@ -37,7 +37,7 @@ def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diag
 def _(
     discretization: GridDiscretization, values: NDArray[np.float64], source: GridSource, diagnostics: Diagnostics
 ) -> GridField:
-    return GridField(discretization.grid, values, diagnostics.noting(_sampled(source)))
+    return GridField(discretization.grid, values, diagnostics.noting(sampled(source)))
 
 
 @to_field.register
@@ -58,7 +58,7 @@ def _(
             "distance there is NaN",
             UnreachedWarning,
         )
-    told = replace(diagnostics, unreached=unreached).noting(_sampled(source.whole))
+    told = replace(diagnostics, unreached=unreached).noting(sampled(source.whole))
     return GridField(grid, everywhere.reshape(grid.shape), told)
 
 
@@ -102,5 +102,5 @@ def _(
     return TetField(mesh, at_vertices, told, source)
 
 
-def _sampled(source: GridSource) -> SampledSource:
+def sampled(source: GridSource) -> SampledSource:
     return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)
