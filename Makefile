@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
-.PHONY: demo test lint types coverage matrix dist clean
+.PHONY: demo test fuzz lint types coverage matrix dist clean
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -21,6 +21,9 @@ demo: $(VENV)/.installed
 
 test: $(VENV)/.installed-test
 	$(BIN)/python -m pytest
+
+fuzz: $(VENV)/.installed-test  # CASES="1000 --seed 3" runs these
+	cd tests && ../$(BIN)/python -m fuzz --cases $(or $(CASES),10000)
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .

@@ -1,0 +1,54 @@
+"""Families that fail, to test the frame; hidden from `python -m fuzz` unless they are named."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+
+from fuzz.frame import Wrong, family
+from signedheat import GeometryError
+
+
+def build(random: np.random.Generator, folder: Path) -> float:
+    """A number."""
+    return float(random.random())
+
+
+def _refuse(_: float) -> str:
+    raise GeometryError("it is broken")
+
+
+def _wrong(number: float) -> str:
+    raise Wrong("changed input", f"{number}")
+
+
+def _warn(number: float) -> str:
+    return f"{np.float64(number) / np.float64(0.0)}"
+
+
+def _hang(_: float) -> str:
+    time.sleep(100)
+    return "late"
+
+
+def _crash(_: float) -> str:
+    os.kill(os.getpid(), signal.SIGSEGV)
+    return "alive"
+
+
+def _grow(number: float) -> str:
+    return "grown" if np.full(1 << 26, number).any() else "empty"
+
+
+family("frame right", build, lambda number: "fine")
+family("frame refused", build, _refuse)
+family("frame wrong", build, _wrong)
+family("frame exception", build, lambda number: {}[str(number)])
+family("frame warning", build, _warn)
+family("frame hang", build, _hang)
+family("frame crash", build, _crash)
+family("frame memory", build, _grow, memory=1 << 28)
