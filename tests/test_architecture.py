@@ -14,7 +14,7 @@ from import_graph import circles, import_graph, upward_imports
 PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
-    {"cache", "compiled", "diagnostics", "errors", "memory", "packages", "parallel", "progress", "slots"},
+    {"cache", "compiled", "diagnostics", "errors", "frozen", "memory", "packages", "parallel", "progress", "slots"},
     {"geometry"},
     {"linear"},
     {"operators"},

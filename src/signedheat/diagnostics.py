@@ -9,11 +9,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .frozen import Frozen
+
 AnyNote = TypeVar("AnyNote", bound="Note")
 
 
 @dataclass(frozen=True, eq=False)
-class Note:
+class Note(Frozen):
     """A note on a computation; ``str(note)`` is its text."""
 
     def as_dict(self) -> dict[str, object]:

@@ -23,6 +23,7 @@ from .fields.grid_field import GridField
 from .fields.tet_field import TetField
 from .fields.to_field import Field, to_field
 from .fields.vertex_field import VertexField
+from .frozen import Frozen
 from .lowering.area_elements import grid_around
 from .lowering.surface.intrinsic import Retriangulated
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
@@ -34,7 +35,7 @@ AnyDomain = TypeVar("AnyDomain", bound=Domain, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class SignedHeatSolver(Generic[AnyDomain]):
+class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     """Generalized signed distance on one domain.
 
     Matrices are factorised at first use and kept, so that further distances are cheap.

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, SourceError
+from ..frozen import Frozen
 from .validation import finite_rows, frozen
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(Frozen):
     """A polyline on a surface; φ > 0 to its left if it is oriented.
 
     Left is the direction of the curve turned by 90° counter-clockwise, as seen with the face normal towards you. For a
@@ -107,7 +108,7 @@ class Curve:
 
 
 @dataclass(frozen=True, eq=False)
-class SurfacePoints:
+class SurfacePoints(Frozen):
     """Isolated points on a surface; φ grows away from each.
 
     Parameters

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from ..frozen import Frozen
 from .validation import frozen
 
 ROOM = 0.2
@@ -26,7 +27,7 @@ else:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid(Generic[Dimension]):
+class Grid(Frozen, Generic[Dimension]):
     """Nodes at ``origin + index * spacing``, in any number of dimensions.
 
     Parameters

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from ..frozen import Frozen
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
@@ -39,7 +40,7 @@ LARGEST_ANGLE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
-class IntrinsicTriangulation:
+class IntrinsicTriangulation(Frozen):
     """An intrinsic triangulation of a mesh, made by `intrinsic_delaunay`; a domain like the mesh itself.
 
     The first vertices are those of the mesh, with the same ids. Sources are given on the mesh; fields have values at

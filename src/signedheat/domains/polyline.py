@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from ..frozen import Frozen
 from ..geometry.marching import level_lines
 from .validation import finite_rows
 
 
 @dataclass(frozen=True, eq=False)
-class Polyline:
+class Polyline(Frozen):
     """Points in the plane, joined in order by straight segments; φ is positive to the left.
 
     A closed polyline that runs clockwise has φ < 0 inside, like a shape whose normals point outward.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SourceError
+from ..frozen import Frozen
 from ..geometry.meshes import Triangles
 from ..geometry.surface_points import corners_at
 from .curves import Curve, SurfacePoints
@@ -13,7 +14,7 @@ from .level_sets import boundary_curves, level_set, region_boundary
 from .projection import projected_curve
 
 
-class Surface:
+class Surface(Frozen):
     """A domain on which curves and points can be placed.
 
     Face ids of curves and points refer to `triangulation`, vertex ids to the domain.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
+from ..frozen import Frozen
 from ..geometry.box_tree import BoxTree
 from ..geometry.components import element_components
 from ..geometry.tet_faces import FaceTable, face_table
@@ -30,7 +31,7 @@ else:
 
 
 @dataclass(frozen=True, eq=False)
-class TetMesh:
+class TetMesh(Frozen):
     """Tetrahedra in space.
 
     Parameters

@@ -12,6 +12,7 @@ from ..diagnostics import ShapeOriented
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
+from ..frozen import Frozen
 from ..geometry.orientation_votes import votes
 from ..geometry.part_orientation import PartOrientation, Parts, orient_parts
 from ..geometry.soup_orientation import disagreeing_with_neighbors, odds_at_corners
@@ -39,7 +40,7 @@ SMALL = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Orientation:
+class Orientation(Frozen):
     """How a mesh was oriented, and what was found on the way.
 
     Attributes

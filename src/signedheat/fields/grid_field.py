@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Any, Generic, Literal, overload
+from typing import Generic, Literal, overload
 
 import numpy as np
 import scipy
@@ -16,13 +16,14 @@ from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
+from ..frozen import Frozen
 from ..geometry.marching import closed_surface, level_lines
 from ..operators.grid.exact_surface import ExactSurface
 from .files import save_field
 
 
 @dataclass(frozen=True, eq=False)
-class GridField(Generic[Dimension]):
+class GridField(Frozen, Generic[Dimension]):
     """Signed distance at the nodes of a grid.
 
     Parameters
@@ -241,6 +242,3 @@ class GridField(Generic[Dimension]):
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"GridField({self.grid!r}, values from {low:g} to {high:g})"
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.grid, self.values, self.diagnostics, self.confidence, self.surface)

@@ -14,6 +14,7 @@ from ..domains.curves import Curve, SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
+from ..frozen import Frozen
 from ..geometry.components import connected_components
 from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
@@ -29,7 +30,7 @@ FAR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Cut:
+class Cut(Frozen):
     """A polyline along edges of the surface across which a field is discontinuous.
 
     Attributes
@@ -64,7 +65,7 @@ class Cut:
 
 
 @dataclass(frozen=True, eq=False)
-class PiecewiseField:
+class PiecewiseField(Frozen):
     """Signed distance that is linear in every triangle and may be discontinuous across edges.
 
     Attributes

@@ -14,6 +14,7 @@ from ..discretization import SourceTerm
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
+from ..frozen import Frozen
 from ..geometry.box_tree import BoxTree
 from ..geometry.marching_tets import closed_level_set
 from ..geometry.nearest import nearest_on_triangles
@@ -22,7 +23,7 @@ from .files import save_field
 
 
 @dataclass(frozen=True, eq=False)
-class TetField:
+class TetField(Frozen):
     """Signed distance at the vertices of a tet mesh, linear on every tet.
 
     Parameters

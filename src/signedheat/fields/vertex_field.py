@@ -19,6 +19,7 @@ from ..domains.projection import closest_points
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_rows
 from ..errors import OutsideError
+from ..frozen import Frozen
 from .files import save_field
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ Embedded = TypeVar("Embedded", bound=EmbeddedSurface)
 
 
 @dataclass(frozen=True, eq=False)
-class VertexField(Generic[Surface]):
+class VertexField(Frozen, Generic[Surface]):
     """Signed distance at the vertices of a surface, linear on its triangles.
 
     Attributes

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..frozen import Frozen
 from .triangle_kernels import find_edges
 
 
 @dataclass(frozen=True, eq=False)
-class EdgeTable:
+class EdgeTable(Frozen):
     """Edges, and how faces and edges are incident.
 
     Attributes

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..frozen import Frozen
 from .components import element_components
 from .edges import EdgeTable, edge_table
 from .triangle_kernels import gather
@@ -21,7 +22,7 @@ Index = NDArray[np.int64] | slice
 
 
 @dataclass(frozen=True, eq=False)
-class IntrinsicMesh:
+class IntrinsicMesh(Frozen):
     """Triangles given by their vertices, their edges and their shapes alone, without positions in space.
 
     Attributes

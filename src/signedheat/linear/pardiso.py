@@ -10,13 +10,13 @@ import threading
 import weakref
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import FactorizationError
+from ..errors import FactorizationError, UnsupportedTypeError
 
 _ANALYZE_AND_FACTORIZE, _SOLVE, _RELEASE = 12, 33, -1
 _POSITIVE_DEFINITE = {np.dtype(np.float64): 2, np.dtype(np.complex128): 4}
@@ -61,6 +61,12 @@ class PardisoFactor:
     def nonzeros(self) -> int:
         """Entries stored in the factor."""
         return int(self._call.parameters[17])
+
+    def __reduce__(self) -> NoReturn:
+        raise UnsupportedTypeError(
+            "a factor is memory of the MKL library, which is released with it: it cannot be copied or pickled",
+            remedy="factorise the matrix again",
+        )
 
 
 class _Call:

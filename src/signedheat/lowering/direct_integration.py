@@ -13,6 +13,7 @@ from scipy import sparse
 from ..cache import LastUsed, fingerprint
 from ..discretization import Levels, SourceTerm
 from ..errors import ConstraintError
+from ..frozen import Frozen
 from ..linear import Factor, factorize, upper_triangle, whole
 from ..linear.conjugate_gradients import conjugate_gradients
 
@@ -23,7 +24,7 @@ BATCH = 32
 
 
 @dataclass(frozen=True, eq=False)
-class DirectIntegration:
+class DirectIntegration(Frozen):
     """``C φ = b`` on vertices, under any of the constraints of Sec. 7.1.
 
     Parameters

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...frozen import Frozen
 from ..intrinsic_mesh import IntrinsicMesh
 from .delaunay import glue
 from .transfer_kernels import trace_both_ways, transfer
@@ -37,7 +38,7 @@ class Lines(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class History(Frozen):
     """Two triangulations of one surface and the steps from one to the other.
 
     Attributes

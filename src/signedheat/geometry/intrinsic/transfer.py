@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...frozen import Frozen
 from ..curve_segments import CurveSegments
 from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import SNAP, barycentric_in, concatenated, locate_points, unique_points
@@ -16,7 +17,7 @@ from .history import History, straight_lines
 
 
 @dataclass(frozen=True, eq=False)
-class ConformingRefinement:
+class ConformingRefinement(Frozen):
     """Triangles cut so that some curves run along edges.
 
     Attributes

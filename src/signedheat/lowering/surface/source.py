@@ -12,6 +12,7 @@ from scipy.sparse import csr_array, csr_matrix, vstack
 
 from ...domains.segments import segments_of_each
 from ...errors import SourceError
+from ...frozen import Frozen
 from ...geometry.components import connected_components
 from ...geometry.curve_segments import CurveSegments, interpolation_at
 from ...geometry.intrinsic_mesh import IntrinsicMesh
@@ -28,7 +29,7 @@ from .free_ends import free_end_arcs
 
 
 @dataclass(frozen=True, eq=False)
-class SurfaceSource:
+class SurfaceSource(Frozen):
     """Curves and points, lowered to an intrinsic mesh.
 
     Attributes

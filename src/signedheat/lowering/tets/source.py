@@ -13,6 +13,7 @@ from scipy import sparse
 from ...diagnostics import Note, OutsideMesh
 from ...domains.tet_mesh import TetMesh
 from ...errors import SourceError
+from ...frozen import Frozen
 from ...geometry.directions import unit
 from ...geometry.tet_clipping import ClippedPolygons, Planes, barycentric, clip_triangles, containing_tets
 from ..area_elements import AreaElements, area_elements
@@ -22,7 +23,7 @@ WHOLE = 1 - 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class TetSource:
+class TetSource(Frozen):
     """Sources lowered to a tet mesh.
 
     Attributes

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...frozen import Frozen
 from ...geometry.box_tree import BoxTree
 from ...geometry.face_features import FaceFeatures
 from ...geometry.nearest import nearest_on_triangles
@@ -24,7 +25,7 @@ CLEARANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class ExactSurface:
+class ExactSurface(Frozen):
     """Faces, and crossings of a zero set where there are none.
 
     Attributes

@@ -1,0 +1,47 @@
+"""Copies and pickles of frozen objects: what they were made of, and none of what was derived from it."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+
+import numpy as np
+
+
+class Frozen:
+    """A frozen dataclass whose copies and pickles hold its fields alone, with read-only arrays read-only again.
+
+    Cached properties are made anew where they are needed: factors live in the memory of other libraries, and what is
+    derived is often larger than what it is derived from.
+
+    Examples
+    --------
+    >>> import copy
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Row(Frozen):
+    ...     values: NDArray[np.float64]
+    >>> row = Row(np.zeros(3))
+    >>> row.values.flags.writeable = False
+    >>> copy.deepcopy(row).values.flags.writeable
+    False
+    """
+
+    def __getstate__(self) -> tuple[dict[str, object], frozenset[str]]:
+        names = {entry.name for entry in fields(self)} if is_dataclass(self) else self.__dict__.keys()
+        held = {name: value for name, value in self.__dict__.items() if name in names}
+        return held, frozenset(name for name, value in held.items() if _is_read_only(value))
+
+    def __setstate__(self, state: tuple[dict[str, object], frozenset[str]]) -> None:
+        held, read_only = state
+        self.__dict__.update(held)
+        for name in read_only:
+            _set_read_only(held[name])
+
+
+def _is_read_only(value: object) -> bool:
+    return isinstance(value, np.ndarray) and not value.flags.writeable
+
+
+def _set_read_only(value: object) -> None:
+    assert isinstance(value, np.ndarray)
+    value.flags.writeable = False

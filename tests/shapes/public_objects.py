@@ -1,0 +1,128 @@
+"""One of every public object, used before it is handed out, so that what it derives from itself is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+import signedheat as sh
+from shapes.tet_cases import boxes
+from signedheat import samples
+
+BALL = samples.sphere(1)
+RING = BALL.level_set(BALL.vertices[:, 2], 0.1)
+BOX = boxes((2, 2, 2), 1.0)
+INNER = sh.TriangleMesh(0.4 * BALL.vertices + 1, BALL.faces)
+WALL = np.zeros((9, 9, 9), dtype=bool)
+WALL[0] = True
+
+
+def triangles() -> sh.TriangleMesh:
+    mesh = sh.TriangleMesh(BALL.vertices, BALL.faces)
+    assert len(mesh.face_areas) == mesh.edges.face_edges.shape[0]
+    return mesh
+
+
+def polygons() -> sh.PolygonMesh:
+    mesh = sh.PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    assert mesh.triangulation.n_faces == 4
+    return mesh
+
+
+def points() -> sh.PointCloud:
+    cloud = samples.oriented_points(BALL, 60)
+    assert cloud.triangulation.n_faces
+    return cloud
+
+
+def voxels() -> sh.DigitalSurface:
+    surface = sh.DigitalSurface(np.ones((3, 3, 3), dtype=bool))
+    assert len(surface.normals)
+    return surface
+
+
+def tets() -> sh.TetMesh:
+    mesh = sh.TetMesh(BOX.vertices, BOX.tets)
+    assert mesh.geometry is not None
+    return mesh
+
+
+def grid() -> sh.Grid:
+    return sh.Grid((-2, -2, -2), 0.5, (9, 9, 9))
+
+
+def walled_grid() -> sh.Grid:
+    return sh.Grid((-2, -2, -2), 0.5, (9, 9, 9), WALL)
+
+
+def triangulation() -> sh.IntrinsicTriangulation:
+    return sh.intrinsic_delaunay(BALL, keep=RING, refine=True)
+
+
+def used(domain: object, sources: object, **options: object) -> sh.SignedHeatSolver:
+    """A solver after use, with every factor that it keeps."""
+    solver = sh.SignedHeatSolver(domain, **options)
+    for constraint in (sh.ZeroSet(), sh.Free()):
+        solver.distance(sources, constraint)
+    return solver
+
+
+def curve_on(surface: sh.PolygonMesh | sh.PointCloud | sh.DigitalSurface) -> sh.Curve:
+    return surface.path([0, 1])
+
+
+SOLVERS: dict[str, Callable[[], sh.SignedHeatSolver]] = {
+    "triangles": lambda: used(triangles(), RING),
+    "intrinsic": lambda: used(triangles(), RING, intrinsic=True),
+    "triangulation": lambda: used(triangulation(), RING),
+    "polygons": lambda: used(polygons(), curve_on(polygons())),
+    "points": lambda: used(points(), points().points_at(0)),
+    "voxels": lambda: used(voxels(), curve_on(voxels())),
+    "tets": lambda: used(tets(), INNER),
+    "grid": lambda: used(grid(), BALL),
+    "walled grid": lambda: used(walled_grid(), BALL),
+}
+
+SOURCES: dict[str, Callable[[], object]] = {
+    "triangles": lambda: RING,
+    "intrinsic": lambda: RING,
+    "triangulation": lambda: RING,
+    "polygons": lambda: curve_on(polygons()),
+    "points": lambda: points().points_at(0),
+    "voxels": lambda: curve_on(voxels()),
+    "tets": lambda: INNER,
+    "grid": lambda: BALL,
+    "walled grid": lambda: BALL,
+}
+
+OBJECTS: dict[str, Callable[[], object]] = {
+    "triangles": triangles,
+    "polygons": polygons,
+    "points": points,
+    "voxels": voxels,
+    "tets": tets,
+    "grid": grid,
+    "walled grid": walled_grid,
+    "triangulation": triangulation,
+    "polyline": lambda: sh.Polyline([[0, 0], [1, 0], [1, 1]]),
+    "curve": lambda: RING[0],
+    "isolated points": lambda: BALL.points_at([0, 3]),
+    "vertex field": lambda: sh.SignedHeatSolver(BALL).distance(RING),
+    "sharpened": lambda: sh.sharpen(sh.SignedHeatSolver(BALL).distance(RING)),
+    "triangulation's field": lambda: sh.SignedHeatSolver(triangulation()).distance(RING),
+    "tet field": lambda: sh.SignedHeatSolver(BOX).distance(INNER),
+    "grid field": lambda: sh.SignedHeatSolver(grid()).distance(BALL),
+    "walled grid's field": lambda: sh.SignedHeatSolver(walled_grid()).distance(BALL),
+    "solid": lambda: sh.solid_distance(BALL, resolution=16),
+    "piecewise field": lambda: sh.piecewise_distance(BALL, BALL.path([0, 5])),
+    "orientation": lambda: sh.orientation(BALL),
+    "free": sh.Free,
+    "zero set": lambda: sh.ZeroSet(hard=True),
+    "each component": sh.EachComponent,
+    "level values": lambda: sh.LevelValues([0.0, 1.0]),
+    "soft": lambda: sh.Soft(10.0),
+    "convex": sh.Convex,
+    "geodesic": sh.Geodesic,
+    "diagnostics": sh.Diagnostics,
+}
