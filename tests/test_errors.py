@@ -69,16 +69,26 @@ def test_wrong_types_are_type_errors_too():
     assert caught.value.path == "input.ply"
 
 
-def test_no_remedy_hides_in_a_cause():
-    """Where errors are raised, what to do is an argument of its own."""
+def calls_of_errors():
+    """(where, text of the cause, names of the keywords) of every error of our own that the package makes."""
     names = {kind.__name__ for kind in KINDS}
-    verbs = r": (use|pass|give|choose|write|save|raise|lower|remove|check|convert|move|turn|orient|leave|make|try) "
-    found = []
     for path in Path(sh.__file__).parent.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names and node.args:
                 cause = ast.get_source_segment(text, node.args[0]) or ""
-                if re.search(verbs, cause) or cause.startswith('f"{path}: '):
-                    found.append(f"{path.name}:{node.lineno}")
+                yield f"{path.name}:{node.lineno}", cause, {keyword.arg for keyword in node.keywords}
+
+
+def test_every_error_says_what_it_is_about_or_what_to_do():
+    assert [where for where, _, given in calls_of_errors() if not given & {"element", "remedy", "path"}] == []
+
+
+def test_no_remedy_hides_in_a_cause():
+    """Where errors are raised, what to do is an argument of its own."""
+    verbs = "use pass give choose write save raise lower remove check convert move turn orient leave make try add"
+    remedy = rf"[:;] ({verbs.replace(' ', '|')}) "
+    found = [
+        where for where, cause, _ in calls_of_errors() if re.search(remedy, cause) or cause.startswith('f"{path}: ')
+    ]
     assert found == []

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat.lowering.grid.discretization import fitting_spacing, memory_estimate
 from signedheat.memory import available_memory
 
@@ -44,5 +45,5 @@ def test_the_spacing_that_is_proposed_fits(shape):
     counts = np.floor((grid.upper - grid.origin) / spacing).astype(int) + 1
     fitting = memory_estimate(sh.Grid(grid.origin, spacing, counts))
     assert 0.9 * 8e9 < fitting <= 8e9
-    with pytest.raises(sh.MemoryLimitError, match="spacing of"):
+    with refused(sh.MemoryLimitError):
         _ = sh.SignedHeatSolver(grid).discretization

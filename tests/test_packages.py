@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat.cli import main
 from signedheat.extensions.tet_meshers import tetrahedralize_with_tetgen, tetrahedralize_with_tetwild
 from signedheat.packages import REMEDIES, lazy_module, require
@@ -97,7 +98,7 @@ def test_a_missing_package_is_bad_input_and_an_import_error():
 def test_a_package_that_is_there_and_broken_says_why(monkeypatch, tmp_path):
     (tmp_path / "broken_package.py").write_text("import its_own_requirement\n")
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(sh.MissingPackageError, match="its_own_requirement"):
+    with refused(sh.MissingPackageError, "broken_package"):
         require("broken_package", "tests")
 
 

@@ -108,7 +108,7 @@ class LevelValues:
     def __post_init__(self) -> None:
         values = tuple(float(v) for v in np.atleast_1d(np.asarray(self.values, dtype=np.float64)))
         if not np.isfinite(values).all():
-            raise ConstraintError(f"level values must be finite, not {list(values)}")
+            raise ConstraintError(f"level values must be finite, not {list(values)}", element="values")
         object.__setattr__(self, "values", values)
 
     def integrate(
@@ -152,7 +152,9 @@ class Soft:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.weight) and self.weight > 0):
-            raise ConstraintError(f"the weight of a soft constraint must be positive and finite, not {self.weight}")
+            raise ConstraintError(
+                f"the weight of a soft constraint must be positive and finite, not {self.weight}", element="weight"
+            )
 
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm

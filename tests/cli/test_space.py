@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 from signedheat.cli import main
 from signedheat.domains.inspection import inspect
@@ -255,7 +256,7 @@ def test_grids_that_cannot_be(tmp_path, ball, capsys):
     assert "GB" in fail(capsys, "volume", ball, "-o", str(output), "--resolution", "40000")
     assert "GB" in fail(capsys, "volume", ball, "-o", str(output), "--spacing", "1e-9")
     assert time.perf_counter() - begin < 5
-    with pytest.raises(sh.MemoryLimitError, match="GB"):
+    with refused(sh.MemoryLimitError):
         sh.signed_distance(sh.read(ball), resolution=40_000)
     assert output.read_text() == "precious"
 

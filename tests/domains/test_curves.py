@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.surface_cases import band, book, flipped, laid_out, positions, sphere, square
 from signedheat.domains.projection import closest_points
 from signedheat.domains.segments import segments_of
@@ -222,57 +223,57 @@ def test_curves_on_a_nonmanifold_spine():
 
 def test_polylines_far_away_are_refused_with_the_farthest_distance():
     mesh = sphere(2)
-    with pytest.raises(sh.SourceError, match=r"point 1.*1\.\d+ away.*max_distance"):
+    with refused(sh.SourceError, "point 1"):
         mesh.polyline([[1, 0, 0], [0, 2.5, 0]])
     assert mesh.polyline([[1, 0, 0], [0, 2.5, 0]], max_distance=2).n_points > 2
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
+    ("make", "element"),
     [
-        (lambda m: sh.Curve([0], [[1, 0, 0]]), "at least two points"),
-        (lambda m: sh.Curve([], []), "at least two points"),
-        (lambda m: sh.SurfacePoints([], []), "no point"),
-        (lambda m: sh.Curve([0, 1], [[1, 0, 0], [0.5, 0.2, 0.2]]), "point 1 .* add up to 1"),
-        (lambda m: sh.Curve([0, 1], [[1.5, -0.5, 0], [1, 0, 0]]), "point 0 .* at least 0"),
-        (lambda m: sh.Curve([0, 1], [[np.nan, 1, 0], [1, 0, 0]]), "NaN"),
-        (lambda m: sh.Curve([0.5, 1.0], [[1, 0, 0], [1, 0, 0]]), "integer face id"),
-        (lambda m: sh.Curve([0, 1], [[1, 0, 0], [0, 1, 0]], normals=[[0, 0, 1], [0, 0, 1]]), "as many normals"),
-        (lambda m: m.path([1, 2, 99999]), "point of the path 2 is vertex 99999"),
-        (lambda m: m.path([0.5, 2.0]), "integer vertex ids"),
+        (lambda m: sh.Curve([0], [[1, 0, 0]]), None),
+        (lambda m: sh.Curve([], []), None),
+        (lambda m: sh.SurfacePoints([], []), None),
+        (lambda m: sh.Curve([0, 1], [[1, 0, 0], [0.5, 0.2, 0.2]]), "point 1"),
+        (lambda m: sh.Curve([0, 1], [[1.5, -0.5, 0], [1, 0, 0]]), "point 0"),
+        (lambda m: sh.Curve([0, 1], [[np.nan, 1, 0], [1, 0, 0]]), "number 0"),
+        (lambda m: sh.Curve([0.5, 1.0], [[1, 0, 0], [1, 0, 0]]), "faces"),
+        (lambda m: sh.Curve([0, 1], [[1, 0, 0], [0, 1, 0]], normals=[[0, 0, 1], [0, 0, 1]]), "normals"),
+        (lambda m: m.path([1, 2, 99999]), "vertex 99999"),
+        (lambda m: m.path([0.5, 2.0]), "vertices"),
         (lambda m: m.points_at([-1]), "vertex -1"),
-        (lambda m: m.level_set(np.zeros(3)), "one value per vertex"),
-        (lambda m: m.region_boundary(np.zeros(3, dtype=bool)), "one boolean per face"),
-        (lambda m: m.region_boundary(np.zeros(m.n_faces)), "one boolean per face"),
-        (lambda m: m.polyline([[1, 0, 0]]), "at least two points"),
-        (lambda m: m.polyline([[1, 0, 0], [0, np.inf, 0]]), "NaN or infinity"),
-        (lambda m: sh.SignedHeatSolver(m).distance(sh.Curve([0, 99999], np.eye(3)[:2])), "point 1 lies in face 99999"),
-        (lambda m: sh.SignedHeatSolver(m).distance(sh.Curve([0, 0], np.eye(3)[[0, 0]])), "has no length"),
-        (lambda m: sh.SignedHeatSolver(m).distance(m.path([0, 12], closed=True)), "cancel"),
-        (lambda m: sh.SignedHeatSolver(m).distance([m.path([0, 12]), m.path([12, 0])]), "cancel"),
-        (lambda m: sh.SignedHeatSolver(m).distance(sh.Curve([0] * 3, 0.1 + 0.7 * np.eye(3), True)), "close inside"),
-        (lambda m: sh.SignedHeatSolver(m).distance([]), "no source"),
-        (lambda m: sh.SignedHeatSolver(m).distance([[]]), "no source|empty"),
-        (lambda m: sh.SignedHeatSolver(m).distance("curve"), "Curve or SurfacePoints"),
+        (lambda m: m.level_set(np.zeros(3)), "values"),
+        (lambda m: m.region_boundary(np.zeros(3, dtype=bool)), "face_mask"),
+        (lambda m: m.region_boundary(np.zeros(m.n_faces)), "face_mask"),
+        (lambda m: m.polyline([[1, 0, 0]]), None),
+        (lambda m: m.polyline([[1, 0, 0], [0, np.inf, 0]]), "number 1"),
+        (lambda m: sh.SignedHeatSolver(m).distance(sh.Curve([0, 99999], np.eye(3)[:2])), "face 99999"),
+        (lambda m: sh.SignedHeatSolver(m).distance(sh.Curve([0, 0], np.eye(3)[[0, 0]])), "curve 0"),
+        (lambda m: sh.SignedHeatSolver(m).distance(m.path([0, 12], closed=True)), "curves"),
+        (lambda m: sh.SignedHeatSolver(m).distance([m.path([0, 12]), m.path([12, 0])]), "curves"),
+        (lambda m: sh.SignedHeatSolver(m).distance(sh.Curve([0] * 3, 0.1 + 0.7 * np.eye(3), True)), "curves"),
+        (lambda m: sh.SignedHeatSolver(m).distance([]), None),
+        (lambda m: sh.SignedHeatSolver(m).distance([[]]), None),
+        (lambda m: sh.SignedHeatSolver(m).distance("curve"), "source 0"),
     ],
 )
-def test_bad_input_is_refused_by_name(make, message):
-    with pytest.raises(sh.SourceError, match=message):
+def test_bad_input_is_refused_by_name(make, element):
+    with refused(sh.SourceError, element):
         make(sphere(1))
 
 
 def test_normals_that_leave_the_surface_and_points_on_two_components_are_refused():
     mesh = square(4)
     path = mesh.path([5, 6])
-    with pytest.raises(sh.SourceError, match="does not lie along the surface"):
+    with refused(sh.SourceError, "face 1"):
         sh.SignedHeatSolver(mesh).distance(sh.Curve(path.faces, path.barycentric, normals=[[0, 0, 1]]))
     two = sh.TriangleMesh(
         np.concatenate([mesh.vertices, mesh.vertices + np.array([0, 0, 1]), [[5, 5, 5]]]),
         np.concatenate([mesh.faces, mesh.faces + 16]),
     )
-    with pytest.raises(sh.SourceError, match="different connected components"):
+    with refused(sh.SourceError, "face 0"):
         sh.SignedHeatSolver(two).distance(two.path([5, 21]))
-    with pytest.raises(sh.SourceError, match="vertex 32, which no face has"):
+    with refused(sh.SourceError, "vertex 32"):
         two.path([5, 32])
 
 

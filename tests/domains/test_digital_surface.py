@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes import domain_cases as cases
 from signedheat.discretization import discretize
 from signedheat.geometry.surfels import boundary_surfels
@@ -202,18 +203,18 @@ def test_volumes_come_from_files(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "match"),
+    ("arguments", "element"),
     [
-        ({"volume": np.ones((3, 3))}, "3 axes"),
-        ({"volume": np.zeros((3, 3, 3))}, "no voxel"),
-        ({"volume": np.full((3, 3, 3), 0.3)}, "threshold"),
+        ({"volume": np.ones((3, 3))}, "volume"),
+        ({"volume": np.zeros((3, 3, 3))}, "volume"),
+        ({"volume": np.full((3, 3, 3), 0.3)}, None),
         ({"volume": np.ones((3, 3, 3)), "spacing": 0.0}, "spacing"),
         ({"volume": np.ones((3, 3, 3)), "spacing": (1, 2)}, "spacing"),
         ({"volume": np.ones((3, 3, 3)), "origin": (0, np.nan, 0)}, "origin"),
         ({"volume": np.ones((3, 3, 3)), "radius": -1.0}, "radius"),
-        ({"volume": np.empty((0, 3, 3), dtype=bool)}, "no voxel"),
+        ({"volume": np.empty((0, 3, 3), dtype=bool)}, "volume"),
     ],
 )
-def test_what_is_no_volume_is_refused(arguments, match):
-    with pytest.raises(sh.GeometryError, match=match):
+def test_what_is_no_volume_is_refused(arguments, element):
+    with refused(sh.GeometryError, element):
         sh.DigitalSurface(**arguments)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 
 
@@ -34,12 +35,12 @@ def test_unreferenced_vertices_take_no_room():
 
 @pytest.mark.parametrize("options", [{"resolution": 1}, {"padding": -1}, {"padding": np.nan}, {"spacing": 0.0}])
 def test_nonsense_is_refused(options):
-    with pytest.raises(sh.GeometryError, match=r"resolution|padding|spacing"):
+    with refused(sh.GeometryError):
         sh.Grid.around([[0, 0, 0], [1, 1, 1]], **options)
 
 
 def test_a_single_point_needs_padding():
-    with pytest.raises(sh.GeometryError, match="single point"):
+    with refused(sh.GeometryError):
         sh.Grid.around([[1, 1, 1], [1, 1, 1]], 8)
     assert sh.Grid.around([[1, 1, 1], [1, 1, 1]], 8, padding=1.0).shape == (8, 8, 8)
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 import signedheat as sh
+from refusals import refused
 from shapes.degenerate_meshes import stretched_square, with_caps, with_needles
 from shapes.surface_cases import band, book, flipped, sphere, square
 from signedheat.diagnostics import IntrinsicTriangles
@@ -370,28 +371,28 @@ def test_progress_and_cancelling():
 def test_what_cannot_be_done_is_said():
     mesh = square(4)
     for angle in 45, 0, -3, np.nan, np.inf, "28", [20]:
-        with pytest.raises(sh.GeometryError, match="30 degrees"):
+        with refused(sh.GeometryError, "angle"):
             sh.intrinsic_delaunay(mesh, refine=True, angle=angle)
     for limit in 0, -1, np.nan, np.inf, "many", [9]:
-        with pytest.raises(sh.GeometryError, match="max_vertices"):
+        with refused(sh.GeometryError, "max_vertices"):
             sh.intrinsic_delaunay(mesh, refine=True, max_vertices=limit)
     for domain in sh.PolygonMesh(mesh.vertices, mesh.faces.tolist()), sh.intrinsic_delaunay(mesh), None:
-        with pytest.raises(sh.GeometryError, match="TriangleMesh"):
+        with refused(sh.GeometryError, "domain"):
             sh.intrinsic_delaunay(domain)
-        with pytest.raises(sh.GeometryError, match="TriangleMesh"):
+        with refused(sh.GeometryError, "domain"):
             sh.SignedHeatSolver(domain, intrinsic=True).distance(mesh.path([0, 1]))
-    with pytest.raises(sh.GeometryError, match="length zero"):
+    with refused(sh.GeometryError, "edges"):
         sh.intrinsic_delaunay(sh.TriangleMesh(np.ones((3, 3)), [[0, 1, 2]]))
-    with pytest.raises(sh.SourceError, match="face 1000"):
+    with refused(sh.SourceError, "face 1000"):
         sh.intrinsic_delaunay(mesh, keep=sh.Curve([1000, 0], np.eye(3)[:2]))
     for keep in "curve", np.zeros(3), [None], 3:
-        with pytest.raises(sh.SourceError, match="Curve or SurfacePoints"):
+        with refused(sh.SourceError, "source 0"):
             sh.intrinsic_delaunay(mesh, keep=keep)
-    with pytest.raises(sh.GeometryError, match="IntrinsicTriangulation"):
+    with refused(sh.GeometryError):
         sh.common_subdivision(mesh)
     better = sh.intrinsic_delaunay(mesh)
-    with pytest.raises(sh.GeometryError, match="NaN"):
+    with refused(sh.GeometryError, "number 0"):
         better.locate([0], [[np.nan, 0, 1]])
     for face in -1, mesh.n_faces:
-        with pytest.raises(sh.GeometryError, match=f"face {face}"):
+        with refused(sh.GeometryError, "point 0"):
             better.locate([face], [[1, 0, 0]])

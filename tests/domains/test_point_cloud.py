@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 import signedheat as sh
+from refusals import refused
 from shapes import domain_cases as cases
 from signedheat.diagnostics import PointsLeftOut
 from signedheat.geometry.hole_filling import hole_fillings
@@ -207,15 +208,15 @@ def test_a_mobius_strip_of_points_is_like_one_of_triangles():
 
 
 @pytest.mark.parametrize(
-    ("points", "match"),
+    "points",
     [
-        (np.zeros((5, 3)), "1 distinct"),
-        (np.outer(np.arange(9.0), [1, 2, 3]), "no triangles"),
-        (np.random.default_rng(0).random((9, 2)), "3 coordinates"),
+        np.zeros((5, 3)),
+        np.outer(np.arange(9.0), [1, 2, 3]),
+        np.random.default_rng(0).random((9, 2)),
     ],
 )
-def test_clouds_that_are_no_surface_are_refused(points, match):
-    with pytest.raises(sh.GeometryError, match=match):
+def test_clouds_that_are_no_surface_are_refused(points):
+    with refused(sh.GeometryError, "points"):
         sh.SignedHeatSolver(sh.PointCloud(points)).distance([sh.SurfacePoints([0], [[1, 0, 0]])])
 
 

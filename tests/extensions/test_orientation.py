@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 
 
@@ -325,7 +326,7 @@ def test_awkward_faces_do_no_harm():
 
 
 def test_only_meshes_have_faces():
-    with pytest.raises(sh.GeometryError, match="PointCloud has none"):
+    with refused(sh.GeometryError):
         sh.orientation(sh.PointCloud([[0, 0, 0], [1, 0, 0]]))
 
 

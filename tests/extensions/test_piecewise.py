@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
 from signedheat.extensions.jump_solvers import JumpProblem, minimize_exactly, minimize_fast
@@ -193,7 +194,7 @@ def test_intrinsic_triangulation_equals_the_mesh():
     assert intrinsic.diagnostics.note(Jumps).cut_length == pytest.approx(plain.diagnostics.note(Jumps).cut_length)
     split = intrinsic.split()
     assert split.domain.n_vertices == plain.split().domain.n_vertices
-    with pytest.raises(sh.GeometryError, match="split"):
+    with refused(sh.GeometryError):
         _ = intrinsic.face_gradients
 
 
@@ -333,13 +334,13 @@ def test_bad_options(keywords, error):
 
 
 def test_bad_domain_and_source():
-    with pytest.raises(TypeError, match="TriangleMesh"):
+    with refused(TypeError, "domain"):
         sh.piecewise_distance(sh.PointCloud(np.eye(3)), [])
     mesh = sphere(1)
     with pytest.raises(sh.SourceError):
         sh.piecewise_distance(mesh, [])
     across = sh.Curve([0, 0], [[0.2, 0.3, 0.5], [0.5, 0.3, 0.2]], oriented=False)
-    with pytest.raises(sh.SourceError, match="keep=curve"):
+    with refused(sh.SourceError):
         sh.piecewise_distance(sh.intrinsic_delaunay(mesh), across)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 from signedheat.extensions.point_orientation import orient_axes, orient_points, orient_triangles
 
@@ -147,9 +148,9 @@ def test_awkward_points_get_unit_normals(points):
 
 
 def test_too_few_points_and_points_in_the_plane_are_refused():
-    with pytest.raises(sh.GeometryError, match="at least 4"):
+    with refused(sh.GeometryError, "points"):
         orient_points(sh.PointCloud([[0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0]]))
-    with pytest.raises(sh.GeometryError, match="3 coordinates"):
+    with refused(sh.GeometryError, "points"):
         orient_points(sh.PointCloud(np.random.default_rng(0).random((9, 2))))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.domain_cases import fitted_order
 from shapes.tet_cases import boxes, lattice, rectangle, rms, sphere
 from signedheat.diagnostics import ConvexRounds, RoundCorners, SlopeErrors
@@ -152,13 +153,13 @@ def test_fields_from_files_can_be_sharpened(tmp_path):
     plain.save(tmp_path / "phi.vtu")
     loaded = sh.load_field(tmp_path / "phi.vtu")
     assert np.array_equal(sh.sharpen(loaded).values, sh.sharpen(plain).values)
-    with pytest.raises(sh.SourceError, match="SignedHeatSolver"):
+    with refused(sh.SourceError):
         sh.sharpen(loaded, method=sh.Convex())
 
 
 def test_one_sign_is_refused():
     mesh = boxes((2, 2, 2), 1.0)
-    with pytest.raises(sh.OutsideError, match="one sign"):
+    with refused(sh.OutsideError):
         sh.sharpen(sh.TetField(mesh, 1 + mesh.vertices[:, 0]))
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 import signedheat as sh
+from refusals import refused
 from signedheat.diagnostics import ConvexRounds, SlopeErrors
 from signedheat.discretization import discretize
 from signedheat.geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
@@ -250,7 +251,7 @@ def test_values_that_are_zero_at_vertices():
 
 def test_one_sign_is_refused():
     mesh = sphere(2)
-    with pytest.raises(sh.OutsideError, match="one sign"):
+    with refused(sh.OutsideError):
         sh.sharpen(sh.VertexField(mesh, 1 + mesh.vertices[:, 2] ** 2))
 
 
@@ -315,7 +316,7 @@ def test_sources_without_sides_on_other_domains():
 
 def test_convex_method_needs_a_source():
     mesh = sphere(2)
-    with pytest.raises(sh.SourceError, match="SignedHeatSolver"):
+    with refused(sh.SourceError):
         sh.sharpen(sh.VertexField(mesh, mesh.vertices[:, 2]), method=sh.Convex())
 
 

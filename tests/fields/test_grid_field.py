@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.grid_cases import assert_closed_manifold, enclosed_volume
 
 
@@ -38,9 +39,9 @@ def test_offset_keeps_its_distance_or_says_why_not():
     field = ball()
     assert_closed_manifold(field.offset(0.2))
     assert np.abs(np.linalg.norm(field.offset(-0.2).vertices, axis=1) - 0.3).max() < 5e-3
-    with pytest.raises(sh.OutsideError, match="padding"):
+    with refused(sh.OutsideError):
         field.offset(0.6)
-    with pytest.raises(sh.OutsideError, match="level 5"):
+    with refused(sh.OutsideError, "level 5"):
         field.contour(5.0)
 
 
@@ -74,9 +75,9 @@ def test_beyond_the_box_a_convex_shape_is_at_least_that_far():
 
 def test_bad_input_is_refused():
     field = ball()
-    with pytest.raises(sh.GeometryError, match="shape"):
+    with refused(sh.GeometryError, "values"):
         sh.GridField(field.grid, np.zeros((3, 3, 3)))
-    with pytest.raises(sh.GeometryError, match="finite"):
+    with refused(sh.GeometryError, "points"):
         field([[np.nan, 0, 0]])
-    with pytest.raises(sh.GeometryError, match="coordinates"):
+    with refused(sh.GeometryError, "points"):
         field([[0.0, 0.0]])

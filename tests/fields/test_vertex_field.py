@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.surface_cases import band, flipped, positions, sphere, square
 from signedheat.io.surface_fields import load_vertex_field
 
@@ -23,7 +24,7 @@ def test_values_between_vertices_are_linear():
     assert phi(curve) == pytest.approx(exact, abs=1e-14)
     assert phi(positions(mesh, curve) + np.array([0, 0, 0.1])) == pytest.approx(exact, abs=1e-14)
     assert np.abs(phi.gradient(curve) - [2, -1, 0]).max() < 1e-12
-    with pytest.raises(sh.OutsideError, match="face 9999"):
+    with refused(sh.OutsideError, "point 0"):
         phi(sh.SurfacePoints([9999], [[1, 0, 0]]))
 
 
@@ -50,7 +51,7 @@ def test_contours_close_and_round_trip_through_the_solver():
     again = sh.SignedHeatSolver(phi.domain).distance(curve)
     assert np.abs(again.values - (phi.values - 0.4))[np.abs(phi.values) < 0.8].max() < 0.03
     assert np.abs(phi(phi.contour(0.0)[0])).max() < 1e-14
-    with pytest.raises(sh.OutsideError, match="φ goes from"):
+    with refused(sh.OutsideError, "level 100"):
         phi.contour(100.0)
 
 
@@ -115,9 +116,9 @@ def test_fields_on_other_surfaces_are_written_too(tmp_path):
 
 def test_bad_names_and_damaged_files_are_refused(tmp_path):
     phi = field_on_sphere(1)
-    with pytest.raises(sh.FileFormatError, match="use one of"):
+    with refused(sh.FileFormatError):
         phi.save(tmp_path / "phi.docx")
-    with pytest.raises(sh.FileFormatError, match="cannot be written"):
+    with refused(sh.FileFormatError):
         phi.save(tmp_path / "missing" / "phi.ply")
     phi.save(tmp_path / "phi.npz")
     whole = (tmp_path / "phi.npz").read_bytes()

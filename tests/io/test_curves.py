@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.surface_cases import positions, sphere, square
 
 
@@ -43,7 +44,7 @@ def test_strict_reading_refuses_points_that_share_no_face(tmp_path):
     sh.write_curves(tmp_path / "jump.txt", [walk, mesh.path([0, 1, 24])], mesh)
     assert len(sh.read_curves(tmp_path / "walk.txt", mesh, strict=True)) == 1
     assert len(sh.read_curves(tmp_path / "jump.txt", mesh)) == 2
-    with pytest.raises(sh.SourceError, match=r"jump.txt: curve 1: points 1 and 2 share no face, nor .* 0 more"):
+    with refused(sh.SourceError, "curve 1"):
         sh.read_curves(tmp_path / "jump.txt", mesh, strict=True)
 
 
@@ -109,26 +110,25 @@ def test_edges_of_polygons_are_numbered_by_first_appearance(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "error", "message"),
+    ("content", "error", "element"),
     [
-        ("", sh.FileFormatError, "empty"),
+        ("", sh.FileFormatError, None),
         ("hello world\n", sh.FileFormatError, "line 1"),
         ("signed_curve\nv x\n", sh.FileFormatError, "line 2"),
-        ("signed_curve\ne 9999 0.5\nv 1\n", sh.FileFormatError, "there is no edge 9999"),
-        ("signed_curve\ne 3 1.5\nv 1\n", sh.FileFormatError, "between 0 and 1"),
-        ("signed_curve\nf 3 0.5\nv 1\n", sh.FileFormatError, "two or three"),
+        ("signed_curve\ne 9999 0.5\nv 1\n", sh.FileFormatError, "line 2"),
+        ("signed_curve\ne 3 1.5\nv 1\n", sh.FileFormatError, "line 2"),
+        ("signed_curve\nf 3 0.5\nv 1\n", sh.FileFormatError, "line 2"),
         ("signed_curve\nv 1\nv 9999\n", sh.SourceError, "vertex 9999"),
-        ("signed_curve\nv 1\n", sh.SourceError, "at least two points"),
-        ("v 1\nv 2\nl 1 7\n", sh.FileFormatError, "there are 2"),
-        ("# nothing\n", sh.FileFormatError, "no curve"),
+        ("signed_curve\nv 1\n", sh.SourceError, None),
+        ("v 1\nv 2\nl 1 7\n", sh.FileFormatError, "segment [0, 6]"),
+        ("# nothing\n", sh.FileFormatError, None),
     ],
 )
-def test_damaged_text_is_refused_with_file_and_line(content, error, message, tmp_path):
+def test_damaged_text_is_refused_with_file_and_line(content, error, element, tmp_path):
     path = tmp_path / "broken.txt"
     path.write_text(content)
-    with pytest.raises(error, match=message) as caught:
+    with refused(error, element, file="broken.txt"):
         sh.read_curves(path, square(4))
-    assert "broken.txt" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -151,16 +151,16 @@ def test_damaged_text_is_refused_with_file_and_line(content, error, message, tmp
 def test_damaged_json_is_refused(content, error, tmp_path):
     path = tmp_path / "broken.json"
     path.write_text(content)
-    with pytest.raises(error, match=r"broken\.json"):
+    with refused(error):
         sh.read_curves(path, square(4))
 
 
 def test_unknown_formats_are_refused_and_nothing_is_overwritten(tmp_path):
     mesh = square(4)
-    with pytest.raises(sh.FileFormatError, match="use one of"):
+    with refused(sh.FileFormatError):
         sh.read_curves(tmp_path / "curves.svg", mesh)
     path = tmp_path / "curves.txt"
     path.write_text("kept")
-    with pytest.raises(sh.SourceError, match="item 0"):
+    with refused(sh.SourceError, "item 0"):
         sh.write_curves(path, ["no curve"], mesh)
     assert path.read_text() == "kept"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 
 TRIANGLES = samples.broken_duck()
@@ -241,17 +242,17 @@ DAMAGED = {
 def test_damaged_files_are_refused_by_name(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(DAMAGED[name])
-    with pytest.raises((sh.FileFormatError, sh.GeometryError), match=name) as caught:
+    with refused(sh.SignedHeatError, file=name) as caught:
         sh.read(path)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value).replace(str(path), "")) < 200
 
 
 def test_missing_files_and_folders_are_refused(tmp_path):
-    with pytest.raises(sh.FileFormatError, match=r"nowhere\.stl: there is no such file"):
+    with refused(sh.FileFormatError):
         sh.read(tmp_path / "nowhere.stl")
     (tmp_path / "folder.stl").mkdir()
-    with pytest.raises(sh.FileFormatError, match="this is a folder"):
+    with refused(sh.FileFormatError):
         sh.read(tmp_path / "folder.stl")
 
 
@@ -274,7 +275,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "a.ply"
     path.write_text("precious")
     monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
-    with pytest.raises(sh.FileFormatError, match="No space left on device"):
+    with refused(sh.FileFormatError):
         samples.sphere(0).save(path)
     assert path.read_text() == "precious"
     assert [file.name for file in tmp_path.iterdir()] == ["a.ply"]
@@ -288,9 +289,9 @@ def test_what_a_format_cannot_hold_is_refused(tmp_path):
         (TRIANGLES, "a.pc"),
         (POINTS, "a.doc"),
     ):
-        with pytest.raises(sh.FileFormatError, match=name):
+        with refused(sh.FileFormatError, file=name):
             shape.save(tmp_path / name)
-    with pytest.raises(sh.FileFormatError, match="cannot be written"):
+    with refused(sh.FileFormatError):
         TRIANGLES.save(tmp_path / "no" / "such" / "folder.stl")
     assert not list(tmp_path.iterdir())
 
@@ -301,7 +302,7 @@ def test_other_packages_round_trip(package):
     pytest.importorskip(package)
     for shape in (TRIANGLES, POLYGONS, POINTS):
         if package == "trimesh" and shape is POLYGONS:
-            with pytest.raises(sh.GeometryError, match="PolygonMesh"):
+            with refused(sh.GeometryError):
                 shape.to_trimesh()
             continue
         back = getattr(type(shape), f"from_{package}")(getattr(shape, f"to_{package}")())
@@ -310,7 +311,7 @@ def test_other_packages_round_trip(package):
 
 def test_triangles_are_not_made_of_polygons_in_silence():
     pytest.importorskip("meshio")
-    with pytest.raises(sh.GeometryError, match="has 4 corners"):
+    with refused(sh.GeometryError, "face 1"):
         sh.TriangleMesh.from_meshio(POLYGONS.to_meshio())
 
 

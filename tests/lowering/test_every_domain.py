@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import signedheat as sh
+from refusals import refused
 from shapes import domain_cases as cases
 from shapes import tet_cases
 from shapes.domain_kinds import APART, KINDS, TILT, TURN, Kind, Surface, positions
@@ -132,7 +133,7 @@ def test_fields_have_values_gradients_and_contours_anywhere(ball):
         (contour,) = field.contour(level)
         assert contour.closed
         assert field(contour) == pytest.approx(level, abs=1e-9)
-    with pytest.raises(sh.OutsideError, match=r"nowhere|outside the values"):
+    with refused(sh.OutsideError, "level 9"):
         field.contour(9.0)
 
 
@@ -159,8 +160,7 @@ def test_a_part_without_source_is_nan_with_one_warning_and_the_rest_as_without_i
     "sources", [[], sh.Curve([0, 10**7], np.eye(3)[:2]), sh.PointCloud([[0, 0, 0]]), "a circle", None]
 )
 def test_sources_that_do_not_fit_are_refused(ball, sources):
-    said = r"no source|face ids go from 0 to|Curve or SurfacePoints|no normals|not (to )?a"
-    with pytest.raises(sh.SourceError, match=said):
+    with refused(sh.SourceError):
         ball.solver.distance(sources)
 
 
@@ -171,7 +171,7 @@ def test_a_vertex_that_does_not_exist_is_refused(ball):
 
 
 def test_level_values_must_be_as_many_as_the_sources(ball):
-    with pytest.raises(sh.ConstraintError, match="3 level values were given for 1 source"):
+    with refused(sh.ConstraintError):
         ball.distance(ball.source, sh.LevelValues([0.0, 1.0, 2.0]))
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy import sparse
 
 import signedheat as sh
+from refusals import refused
 from shapes.tet_cases import boxes, rectangle, sphere
 from signedheat.geometry.tet_clipping import Planes, barycentric, clip_triangles, containing_tets
 from signedheat.linear import factorize
@@ -72,18 +73,18 @@ def test_boundary_faces_outward():
 
 
 @pytest.mark.parametrize(
-    ("vertices", "tets", "message"),
+    ("vertices", "tets", "element"),
     [
-        (np.zeros((4, 3)), [[0, 1, 2, 3]], "none of the 1 tets has any volume"),
-        (np.eye(4, 3), [[0, 1, 2, 4]], "vertex that does not exist"),
-        (np.eye(4, 3), np.empty((0, 4), dtype=int), "there are no tets"),
-        (np.eye(4, 3), [[0, 1, 2]], r"shape \(m, 4\)"),
-        (np.eye(4, 3) * np.nan, [[0, 1, 2, 3]], "NaN or infinity"),
-        (np.eye(4, 3), [[0.0, 1.0, 2.0, 3.0]], "integer vertex ids"),
+        (np.zeros((4, 3)), [[0, 1, 2, 3]], "vertices"),
+        (np.eye(4, 3), [[0, 1, 2, 4]], "number 0"),
+        (np.eye(4, 3), np.empty((0, 4), dtype=int), "tets"),
+        (np.eye(4, 3), [[0, 1, 2]], "tets"),
+        (np.eye(4, 3) * np.nan, [[0, 1, 2, 3]], "number 0"),
+        (np.eye(4, 3), [[0.0, 1.0, 2.0, 3.0]], "tets"),
     ],
 )
-def test_bad_meshes_are_named(vertices, tets, message):
-    with pytest.raises(sh.GeometryError, match=message):
+def test_bad_meshes_are_named(vertices, tets, element):
+    with refused(sh.GeometryError, element):
         sh.TetMesh(vertices, tets)
 
 

@@ -75,6 +75,7 @@ def run(arguments: Namespace) -> Summary:
         if not hasattr(shape, "triangulation"):
             raise SourceError(
                 f"curves lie on meshes and point clouds, not a {type(shape).__name__}",
+                element="shape",
                 path=arguments.curves,
             )
         summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))

@@ -72,6 +72,7 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     if arguments.intrinsic and not isinstance(surface, TriangleMesh):
         raise SourceError(
             f"--intrinsic is for triangle meshes; this is a {type(surface).__name__}",
+            remedy="leave it out",
             path=arguments.mesh,
         )
     curves = read_curves(arguments.curves, surface)
@@ -124,6 +125,7 @@ def read_surface(path: str) -> Any:
     if not hasattr(surface, "triangulation"):
         raise SourceError(
             f"curves lie on meshes, points and voxels, and this is a {type(surface).__name__}",
+            element="surface",
             path=path,
         )
     return surface

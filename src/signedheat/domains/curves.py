@@ -81,7 +81,8 @@ class Curve(Frozen):
             if len(normals) != self.n_segments:
                 raise SourceError(
                     f"a curve of {self.n_segments} segments needs as many normals, not {len(normals)}: "
-                    "they belong to segments, not to points"
+                    "they belong to segments, not to points",
+                    element="normals",
                 )
         object.__setattr__(self, "normals", normals)
 
@@ -168,7 +169,8 @@ def surface_points(
     weights = finite(barycentric, f"barycentric coordinates of a {name}")
     if ids.ndim != 1 or len(ids) != len(weights) or not np.issubdtype(ids.dtype, np.integer):
         raise SourceError(
-            f"a {name} needs one integer face id per point: {ids.dtype} of shape {ids.shape} for {len(weights)} points"
+            f"a {name} needs one integer face id per point: {ids.dtype} of shape {ids.shape} for {len(weights)} points",
+            element="faces",
         )
     wrong = np.flatnonzero((weights < -1e-6).any(axis=1) | (np.abs(weights.sum(axis=1) - 1) > 1e-6))
     if len(wrong):

@@ -87,16 +87,24 @@ class Grid(Frozen, Generic[Dimension]):
         corner = np.atleast_1d(np.array(origin, dtype=np.float64))
         counts = np.atleast_1d(np.asarray(shape))
         if corner.ndim != 1 or not np.isfinite(corner).all():
-            raise GeometryError(f"grid origin must be a finite vector, not {np.asarray(origin).tolist()}")
+            raise GeometryError(
+                f"grid origin must be a finite vector, not {np.asarray(origin).tolist()}", element="origin"
+            )
         if counts.shape != corner.shape or not np.issubdtype(counts.dtype, np.integer):
-            raise GeometryError(f"grid shape must be {len(corner)} integers, not {np.asarray(shape).tolist()}")
+            raise GeometryError(
+                f"grid shape must be {len(corner)} integers, not {np.asarray(shape).tolist()}", element="shape"
+            )
         if (counts < 2).any():
-            raise GeometryError(f"a grid needs at least 2 nodes along every axis, not {counts.tolist()}")
+            raise GeometryError(
+                f"a grid needs at least 2 nodes along every axis, not {counts.tolist()}", element="shape"
+            )
         steps = np.asarray(spacing, dtype=np.float64)
         if steps.ndim > 1 or (steps.ndim == 1 and steps.shape != corner.shape):
-            raise GeometryError(f"grid spacing must be one number or {len(corner)}, not {steps.tolist()}")
+            raise GeometryError(
+                f"grid spacing must be one number or {len(corner)}, not {steps.tolist()}", element="spacing"
+            )
         if not (np.isfinite(steps).all() and (steps > 0).all()):
-            raise GeometryError(f"grid spacing must be positive and finite, not {steps.tolist()}")
+            raise GeometryError(f"grid spacing must be positive and finite, not {steps.tolist()}", element="spacing")
         object.__setattr__(self, "origin", frozen(corner))
         object.__setattr__(self, "spacing", frozen(np.broadcast_to(steps, corner.shape).copy()))
         object.__setattr__(self, "shape", tuple(int(n) for n in counts))
@@ -136,7 +144,7 @@ class Grid(Frozen, Generic[Dimension]):
         lower, upper = np.asarray(bounds, dtype=np.float64)
         longest = float((upper - lower).max())
         if padding is not None and not (np.isfinite(padding) and padding >= 0):
-            raise GeometryError(f"the padding must be a length, zero or more, not {padding}")
+            raise GeometryError(f"the padding must be a length, zero or more, not {padding}", element="padding")
         room = room_around(bounds) if padding is None else float(padding)
         if not longest + 2 * room > 0:
             raise GeometryError(
@@ -145,11 +153,15 @@ class Grid(Frozen, Generic[Dimension]):
             )
         if spacing is None:
             if int(resolution) != resolution or resolution < 2:
-                raise GeometryError(f"the resolution must be a whole number of at least 2 nodes, not {resolution}")
+                raise GeometryError(
+                    f"the resolution must be a whole number of at least 2 nodes, not {resolution}", element="resolution"
+                )
             spacing = (longest + 2 * room) / (int(resolution) - 1)
         steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), lower.shape)
         if not (np.isfinite(steps).all() and (steps > 0).all()):
-            raise GeometryError(f"grid spacing must be positive and finite, not {np.asarray(spacing).tolist()}")
+            raise GeometryError(
+                f"grid spacing must be positive and finite, not {np.asarray(spacing).tolist()}", element="spacing"
+            )
         cells = np.maximum(1, np.ceil((upper - lower + 2 * room) / steps - 1e-9))
         return cls(0.5 * (lower + upper) - 0.5 * cells * steps, steps, cells.astype(np.int64) + 1)
 
@@ -207,7 +219,11 @@ def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = ROOM) -> f
 def _solid_nodes(mask: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     solid = np.array(mask)
     if solid.dtype != np.bool_ or solid.shape != shape:
-        raise GeometryError(f"the mask must be boolean, of shape {shape}, not {solid.dtype} of shape {solid.shape}")
+        raise GeometryError(
+            f"the mask must be boolean, of shape {shape}, not {solid.dtype} of shape {solid.shape}", element="mask"
+        )
     if solid.all():
-        raise GeometryError("all nodes of the grid are solid: True in the mask means that no way leads through")
+        raise GeometryError(
+            "all nodes of the grid are solid: True in the mask means that no way leads through", element="mask"
+        )
     return frozen(solid)

@@ -246,9 +246,9 @@ def intrinsic_delaunay(
     """
     mesh = triangle_mesh(mesh)
     if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
-        raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}")
+        raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}", element="angle")
     if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):
-        raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices!r}")
+        raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices!r}", element="max_vertices")
     stopwatch = Stopwatch(progress, steps=3)
     with stopwatch("embed curves"):
         base, _ = laid_out(mesh)
@@ -277,7 +277,8 @@ def triangle_mesh(domain: object) -> TriangleMesh:
     """The domain, if it is a triangle mesh; others have no intrinsic triangulation."""
     if not isinstance(domain, TriangleMesh):
         raise GeometryError(
-            f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(domain).__name__}"
+            f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(domain).__name__}",
+            element="domain",
         )
     return domain
 
@@ -286,5 +287,7 @@ def laid_out(mesh: TriangleMesh) -> tuple[IntrinsicMesh, float]:
     """The intrinsic mesh of a mesh, mollified, and the length that mollification has added to all edges."""
     lengths, added = mollify(mesh.edge_lengths[mesh.edges.face_edges], MARGIN)
     if not lengths.max() > 0:
-        raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
+        raise GeometryError(
+            "all edges of the mesh have length zero: it has no area to measure distance on", element="edges"
+        )
     return IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added

@@ -20,7 +20,9 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     """
     faces, edges = mesh.faces, mesh.edges
     if values.shape != (mesh.n_vertices,):
-        raise SourceError(f"a level set needs one value per vertex: {mesh.n_vertices}, not an array {values.shape}")
+        raise SourceError(
+            f"a level set needs one value per vertex: {mesh.n_vertices}, not an array {values.shape}", element="values"
+        )
     above = values >= level
     known = np.isfinite(values)[faces].all(axis=1)
     count = above[faces].sum(axis=1)

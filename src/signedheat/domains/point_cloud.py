@@ -70,7 +70,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     ) -> None:
         positions = finite_rows(points, "points")
         if len(positions) == 0:
-            raise GeometryError("there are no points: the point cloud is empty")
+            raise GeometryError("there are no points: the point cloud is empty", element="points")
         directions = sizes = None
         if normals is not None:
             directions = finite_rows(normals, "normals", positions.shape[1])
@@ -88,10 +88,10 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             sizes = np.array(areas, dtype=np.float64)
             _same_length(sizes, positions, "areas")
             if sizes.ndim != 1 or not (np.isfinite(sizes) & (sizes > 0)).all():
-                raise GeometryError("areas must be one positive, finite number per point")
+                raise GeometryError("areas must be one positive, finite number per point", element="areas")
             sizes = frozen(sizes)
         if n_neighbors < 3:
-            raise GeometryError(f"neighbourhoods need at least 3 points, not {n_neighbors}")
+            raise GeometryError(f"neighbourhoods need at least 3 points, not {n_neighbors}", element="n_neighbors")
         object.__setattr__(self, "points", positions)
         object.__setattr__(self, "normals", directions)
         object.__setattr__(self, "areas", sizes)
@@ -125,17 +125,21 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         """Ids of the distinct points, and their local triangulations."""
         if self.points.shape[1] != 3:
             raise GeometryError(
-                f"distance is measured on point clouds in space: points need 3 coordinates, not {self.points.shape[1]}"
+                f"distance is measured on point clouds in space: points need 3 coordinates, not {self.points.shape[1]}",
+                element="points",
             )
         ids = np.unique(self.representatives)
         points, normals = self.points[ids], None if self.normals is None else self.normals[ids]
         if len(ids) < 3:
-            raise GeometryError(f"the point cloud has {len(ids)} distinct points, and a surface needs at least 3")
+            raise GeometryError(
+                f"the point cloud has {len(ids)} distinct points, and a surface needs at least 3", element="points"
+            )
         found = local_triangulations(points, normals, self.n_neighbors)
         if len(found.faces) == 0:
             raise GeometryError(
-                "no triangles could be made of the point cloud: its points lie along a line or too far apart; "
-                "add points, or raise n_neighbors"
+                "no triangles could be made of the point cloud: its points lie along a line or too far apart",
+                remedy="add points, or raise n_neighbors",
+                element="points",
             )
         return ids, found
 
@@ -167,4 +171,4 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
 def _same_length(values: NDArray[np.float64], points: NDArray[np.float64], name: str) -> None:
     if len(values) != len(points):
-        raise GeometryError(f"there are {len(points)} points, but {len(values)} {name}")
+        raise GeometryError(f"there are {len(points)} points, but {len(values)} {name}", element=name)

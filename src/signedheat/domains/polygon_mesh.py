@@ -54,7 +54,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         positions = finite_rows(vertices, "vertices", 3)
         counts = np.fromiter((len(p) for p in polygons), dtype=np.int64, count=len(polygons))
         if len(counts) == 0:
-            raise GeometryError("there are no polygons: the shape is empty")
+            raise GeometryError("there are no polygons: the shape is empty", element="polygons")
         if (counts < 3).any():
             first = int(np.argmax(counts < 3))
             raise GeometryError(
@@ -63,7 +63,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
             )
         corners = np.array(list(itertools.chain.from_iterable(polygons)))
         if not np.issubdtype(corners.dtype, np.integer):
-            raise GeometryError(f"polygons must hold integer vertex ids, not {corners.dtype}")
+            raise GeometryError(f"polygons must hold integer vertex ids, not {corners.dtype}", element="polygons")
         offsets = np.concatenate([[0], np.cumsum(counts)])
         outside = np.flatnonzero((corners < 0) | (corners >= len(positions)))
         if len(outside):

@@ -47,9 +47,11 @@ class Polyline(Frozen):
         if closed and len(positions) > 2 and (positions[0] == positions[-1]).all():
             positions = finite_rows(positions[:-1], "points", 2)
         if len(positions) < 2:
-            raise GeometryError(f"a polyline needs at least 2 points, not {len(positions)}")
+            raise GeometryError(f"a polyline needs at least 2 points, not {len(positions)}", element="points")
         if (positions == positions[0]).all():
-            raise GeometryError(f"the polyline has no length: its {len(positions)} points are the same")
+            raise GeometryError(
+                f"the polyline has no length: its {len(positions)} points are the same", element="points"
+            )
         object.__setattr__(self, "points", positions)
         object.__setattr__(self, "closed", bool(closed))
 

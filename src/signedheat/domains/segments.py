@@ -101,7 +101,11 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
     steps = ((at_end - at_start) * corners).sum(axis=1)
     keep = (ends[:, 0] != ends[:, 1]) & (np.abs(steps) > 0)
     if not keep.any():
-        raise SourceError(f"{name} has no length: all its points coincide; use SurfacePoints for isolated points")
+        raise SourceError(
+            f"{name} has no length: all its points coincide",
+            remedy="use SurfacePoints for isolated points",
+            element=name,
+        )
 
     empty = (at_start == 0) & (at_end == 0)
     sides = (empty.argmax(axis=1) + 1) % 3

@@ -203,5 +203,6 @@ def check_mask(face_mask: NDArray[np.bool_], n_faces: int) -> None:
     """Raise `SourceError` unless there is one boolean per face."""
     if face_mask.shape != (n_faces,) or face_mask.dtype != bool:
         raise SourceError(
-            f"a region needs one boolean per face, {n_faces} in all, not {face_mask.dtype} of shape {face_mask.shape}"
+            f"a region needs one boolean per face, {n_faces} in all, not {face_mask.dtype} of shape {face_mask.shape}",
+            element="face_mask",
         )

@@ -71,7 +71,10 @@ class TetMesh(Frozen):
         ids = element_ids(tets, "tets", 4, len(positions))
         volumes = signed_volumes(positions, ids)
         if not volumes.any():
-            raise GeometryError(f"none of the {len(ids)} tets has any volume: the vertices lie in one plane or point")
+            raise GeometryError(
+                f"none of the {len(ids)} tets has any volume: the vertices lie in one plane or point",
+                element="vertices",
+            )
         inside_out = np.flatnonzero(volumes < 0)
         if len(inside_out):
             ids = ids.copy()

@@ -25,7 +25,7 @@ def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDA
     array = np.array(values, dtype=np.float64)
     if array.ndim != 2 or (columns is not None and array.shape[1] != columns):
         wanted = f"(n, {columns})" if columns is not None else "(n, d)"
-        raise GeometryError(f"{name} must have shape {wanted}, not {array.shape}")
+        raise GeometryError(f"{name} must have shape {wanted}, not {array.shape}", element=name)
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         raise GeometryError(
@@ -45,11 +45,11 @@ def finite_number(value: object, name: str, least: float = -np.inf) -> float:
     2.0
     """
     if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
-        raise SignedHeatError(f"{name} must be a number, not {value!r}")
+        raise SignedHeatError(f"{name} must be a number, not {value!r}", element=name)
     number = float(value)
     if not (np.isfinite(number) and number >= least):
         wanted = "finite" if least == -np.inf else "finite and not negative" if least == 0 else f"at least {least:g}"
-        raise SignedHeatError(f"{name} must be {wanted}, not {number:g}")
+        raise SignedHeatError(f"{name} must be {wanted}, not {number:g}", element=name)
     return number
 
 
@@ -57,7 +57,7 @@ def positive_number(value: object, name: str) -> float:
     """`value` as a finite positive float."""
     number = finite_number(value, name)
     if number <= 0:
-        raise SignedHeatError(f"{name} must be positive and finite, not {number:g}")
+        raise SignedHeatError(f"{name} must be positive and finite, not {number:g}", element=name)
     return number
 
 
@@ -65,11 +65,11 @@ def element_ids(values: ArrayLike, name: str, corners: int, n_vertices: int) -> 
     """`values` as a read-only int64 array of shape (m, corners), with all ids within 0 … n_vertices − 1."""
     array = np.asarray(values)
     if array.size == 0:
-        raise GeometryError(f"there are no {name}: the shape is empty")
+        raise GeometryError(f"there are no {name}: the shape is empty", element=name)
     if array.ndim != 2 or array.shape[1] != corners:
-        raise GeometryError(f"{name} must have shape (m, {corners}), not {array.shape}")
+        raise GeometryError(f"{name} must have shape (m, {corners}), not {array.shape}", element=name)
     if not np.issubdtype(array.dtype, np.integer):
-        raise GeometryError(f"{name} must hold integer vertex ids, not {array.dtype}")
+        raise GeometryError(f"{name} must hold integer vertex ids, not {array.dtype}", element=name)
     ids = array.astype(np.int64)
     outside = np.flatnonzero(((ids < 0) | (ids >= n_vertices)).any(axis=1))
     if len(outside):

@@ -36,10 +36,12 @@ def _(
     if not np.isfinite(field.values).all():
         raise GeometryError(
             "a field around solid nodes, or with parts that no source reaches, cannot be sharpened: straight lines to "
-            "its zero set would pass through what is solid; use it as it is"
+            "its zero set would pass through what is solid",
+            remedy="use it as it is",
+            element="field",
         )
     if fit not in get_args(Fit):
-        raise SignedHeatError(f"fit must be one of {', '.join(map(repr, get_args(Fit)))}, not {fit!r}")
+        raise SignedHeatError(f"fit must be one of {', '.join(map(repr, get_args(Fit)))}, not {fit!r}", element="fit")
     if shape is None and sides is not None:
         raise SourceError("sides are for sharpening to a shape", remedy="pass the shape, or a field with those signs")
     report = None if progress is None else lambda: progress(0.0, "sharpen")
@@ -75,5 +77,7 @@ def _checked_sides(field: GridField, sides: ArrayLike | None) -> NDArray[np.floa
     """A function that is negative inside; φ by default."""
     known = field.values if sides is None else np.ascontiguousarray(sides, dtype=np.float64)
     if known.shape != field.grid.shape or not np.isfinite(known).all():
-        raise GeometryError(f"sides must be finite, one for each of the {field.grid.shape} nodes, not {known.shape}")
+        raise GeometryError(
+            f"sides must be finite, one for each of the {field.grid.shape} nodes, not {known.shape}", element="sides"
+        )
     return known

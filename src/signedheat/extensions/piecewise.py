@@ -107,7 +107,8 @@ def piecewise_distance(
     if not isinstance(domain, TriangleMesh | PolygonMesh | IntrinsicTriangulation):
         raise UnsupportedTypeError(
             "piecewise distance needs a TriangleMesh, a PolygonMesh or an IntrinsicTriangulation, not a "
-            f"{type(domain).__name__}"
+            f"{type(domain).__name__}",
+            element="domain",
         )
     if smoothing is not None:
         smoothing = positive_number(smoothing, "smoothing")

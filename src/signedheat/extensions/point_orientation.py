@@ -75,12 +75,17 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
     """
     if cloud.points.shape[1] != 3:
         raise GeometryError(
-            f"point clouds are oriented in space: points need 3 coordinates, not {cloud.points.shape[1]}; "
-            "in the plane, give a Polyline"
+            f"point clouds are oriented in space: points need 3 coordinates, not {cloud.points.shape[1]}",
+            remedy="in the plane, give a Polyline",
+            element="points",
         )
     ids, which = np.unique(cloud.representatives, return_inverse=True)
     if len(ids) < 4:
-        raise GeometryError(f"the point cloud has {len(ids)} distinct points, and a surface needs at least 4: add some")
+        raise GeometryError(
+            f"the point cloud has {len(ids)} distinct points, and a surface needs at least 4",
+            remedy="add some",
+            element="points",
+        )
     if cloud.normals is None:
         fits, found = fitted_outward(cloud.points[ids])
         normals = (fits.axes * found.signs[:, None])[which.ravel()]

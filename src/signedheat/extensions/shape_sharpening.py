@@ -38,7 +38,8 @@ def triangles_of(shape: object) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     """Vertices and triangles that a shape in space consists of."""
     raise SourceError(
         f"a field on a grid in space is sharpened to a TriangleMesh, PolygonMesh or PointCloud, "
-        f"not to a {type(shape).__name__}"
+        f"not to a {type(shape).__name__}",
+        element="shape",
     )
 
 

@@ -51,7 +51,9 @@ class Geodesic:
 
     def __post_init__(self) -> None:
         if not 0 <= finite_number(self.tolerance, "tolerance") < 0.1:
-            raise SignedHeatError(f"tolerance must be at least 0 and below 0.1, not {self.tolerance}")
+            raise SignedHeatError(
+                f"tolerance must be at least 0 and below 0.1, not {self.tolerance}", element="tolerance"
+            )
 
     def sharpened(
         self,
@@ -83,7 +85,7 @@ def straight_distance(
     discretization: object, values: NDArray[np.float64], source: SourceTerm | None, tolerance: float
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Distance of every unknown from the zero set of `values`, inf where there is none in its component; and notes."""
-    raise UnsupportedTypeError(f"there are no straight lines on a {type(discretization).__name__}")
+    raise UnsupportedTypeError(f"there are no straight lines on a {type(discretization).__name__}", element="method")
 
 
 @dataclass(frozen=True)
@@ -117,9 +119,11 @@ class Convex:
     def __post_init__(self) -> None:
         positive_number(self.tolerance, "tolerance")
         if positive_number(self.max_rounds, "max_rounds") % 1:
-            raise SignedHeatError(f"max_rounds must be a whole number, not {self.max_rounds}")
+            raise SignedHeatError(f"max_rounds must be a whole number, not {self.max_rounds}", element="max_rounds")
         if not 1 <= finite_number(self.relaxation, "relaxation") < 2:
-            raise SignedHeatError(f"relaxation must be at least 1 and below 2, not {self.relaxation}")
+            raise SignedHeatError(
+                f"relaxation must be at least 1 and below 2, not {self.relaxation}", element="relaxation"
+            )
 
     def sharpened(
         self,

@@ -220,7 +220,7 @@ def _elsewhere(shape: Shape, domain: Grid | TetMesh, steps: Steps, progress: Pro
     phi = SignedHeatSolver(domain, steps.diffusion, progress).distance(shape, steps.constraint)
     if not isinstance(phi, GridField | TetField):
         kind = type(domain).__name__
-        raise UnsupportedTypeError(f"a solid is measured on a Grid or a TetMesh, not on a {kind}")
+        raise UnsupportedTypeError(f"a solid is measured on a Grid or a TetMesh, not on a {kind}", element="domain")
     if steps.sharpen and not (isinstance(domain, Grid) and domain.mask is not None):
         phi = sharpen(phi)
     return replace(phi, diagnostics=phi.diagnostics.noting(*notes))

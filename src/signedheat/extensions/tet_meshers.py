@@ -111,7 +111,9 @@ def _box_around(
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
-        raise GeometryError(f"{shape!r} has no extent in space of three dimensions to put a mesh around")
+        raise GeometryError(
+            f"{shape!r} has no extent in space of three dimensions to put a mesh around", element="shape"
+        )
     padding = room_around((lower, upper)) if padding is None else padding
     return lower - padding, upper + padding, longest / resolution
 

@@ -77,12 +77,15 @@ def tetrahedralize(
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
-        raise GeometryError(f"{shape!r} has no extent in space of three dimensions to put a mesh around")
+        raise GeometryError(
+            f"{shape!r} has no extent in space of three dimensions to put a mesh around", element="shape"
+        )
     padding = room_around((lower, upper)) if padding is None else padding
     if resolution < 1 or not 0 <= padding < np.inf or not grading >= LEAST_GRADING:
         raise GeometryError(
             f"resolution must be at least 1, padding at least 0 and grading at least {LEAST_GRADING}, not "
-            f"{resolution}, {padding} and {grading}"
+            f"{resolution}, {padding} and {grading}",
+            element="resolution, padding or grading",
         )
     spacing = longest / resolution
     lower, sides = lower - padding, upper - lower + 2 * padding

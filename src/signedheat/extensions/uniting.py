@@ -144,7 +144,8 @@ def merge_duplicates(shape: Shape) -> Merged:
         return Merged(shape, np.zeros(shape.n_polygons, dtype=bool), 0)
     if not isinstance(shape, TriangleMesh):
         raise UnsupportedTypeError(
-            f"bodies of a TriangleMesh, PolygonMesh or PointCloud are united, not of a {type(shape).__name__}"
+            f"bodies of a TriangleMesh, PolygonMesh or PointCloud are united, not of a {type(shape).__name__}",
+            element="shape",
         )
     corners = same_positions(shape.vertices)[shape.faces]
     first = corners.argmin(axis=1)

@@ -33,7 +33,7 @@ def _(field: VertexField, method: Method | None = None, progress: Progress | Non
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
         raise UnsupportedTypeError(
-            f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface"
+            f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface", element="field"
         )
     elements = LinearElements.on_triangles(surface.triangles)
     new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), method, progress)

@@ -68,7 +68,9 @@ class GridField(Frozen, Generic[Dimension]):
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float64)
         if values.shape != self.grid.shape:
-            raise GeometryError(f"values have shape {values.shape}, but the grid has {self.grid.shape} nodes")
+            raise GeometryError(
+                f"values have shape {values.shape}, but the grid has {self.grid.shape} nodes", element="values"
+            )
         object.__setattr__(self, "values", values)
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
@@ -210,7 +212,7 @@ class GridField(Frozen, Generic[Dimension]):
     def _into_box(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         points = np.asarray(points, dtype=np.float64)
         if points.shape[-1:] != (self.grid.dimension,) or not np.isfinite(points).all():
-            raise GeometryError(f"points must be finite, with {self.grid.dimension} coordinates each")
+            raise GeometryError(f"points must be finite, with {self.grid.dimension} coordinates each", element="points")
         return points, np.clip(np.atleast_2d(points), self.grid.origin, self.grid.upper)
 
     def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:

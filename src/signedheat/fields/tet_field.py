@@ -63,7 +63,9 @@ class TetField(Frozen):
     def __post_init__(self) -> None:
         values = np.ascontiguousarray(self.values, dtype=np.float64)
         if values.shape != (self.mesh.n_vertices,):
-            raise GeometryError(f"values have shape {values.shape}, but the mesh has {self.mesh.n_vertices} vertices")
+            raise GeometryError(
+                f"values have shape {values.shape}, but the mesh has {self.mesh.n_vertices} vertices", element="values"
+            )
         object.__setattr__(self, "values", values)
 
     @property
@@ -230,5 +232,5 @@ class TetField(Frozen):
 def _checked(points: ArrayLike) -> NDArray[np.float64]:
     array = np.asarray(points, dtype=np.float64)
     if array.ndim not in (1, 2) or array.shape[-1] != 3 or not np.isfinite(array).all():
-        raise GeometryError("points must be finite, with 3 coordinates each")
+        raise GeometryError("points must be finite, with 3 coordinates each", element="points")
     return array

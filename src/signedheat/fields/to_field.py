@@ -30,7 +30,7 @@ Field = GridField | VertexField | TetField
 @singledispatch
 def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> Field:
     """The field with the values of a discretisation's unknowns, and with its notes added to the diagnostics."""
-    raise UnsupportedTypeError(f"no field is known for {type(discretization).__name__}")
+    raise UnsupportedTypeError(f"no field is known for {type(discretization).__name__}", element="domain")
 
 
 @to_field.register

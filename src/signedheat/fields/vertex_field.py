@@ -130,7 +130,8 @@ class VertexField(Frozen, Generic[Surface]):
         low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
         if not low <= level <= high:
             raise OutsideError(
-                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}; choose a level between",
+                f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}",
+                remedy="choose a level between",
                 element=f"level {level:g}",
             )
         result: list[Curve] = field.domain.level_set(field.values, level)

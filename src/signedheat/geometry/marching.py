@@ -46,9 +46,11 @@ def closed_surface(
         Vertex ids, counter-clockwise as seen from the side of greater values.
     """
     if values.ndim != 3:
-        raise GeometryError(f"fields are contoured in 2 and 3 dimensions, and this grid has {values.ndim}")
+        raise GeometryError(
+            f"fields are contoured in 2 and 3 dimensions, and this grid has {values.ndim}", element="field"
+        )
     if np.isinf(values).any():
-        raise GeometryError("infinite values have no contour")
+        raise GeometryError("infinite values have no contour", element="values")
     height = closed_at_unknown(heights_above(values, spacing, level))
     shift = 0
     if wall_signs(height) == {True, False}:

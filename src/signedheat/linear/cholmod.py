@@ -39,7 +39,7 @@ class CholmodFactor:
                 lower, mode="supernodal", ordering_method="default" if order is None else "natural"
             )
         except cholmod.CholmodError as error:
-            raise FactorizationError(f"CHOLMOD failed on {self.n} unknowns: {error}") from error
+            raise FactorizationError(f"CHOLMOD failed on {self.n} unknowns: {error}", element="matrix") from error
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
         """Solution for one right-hand side (n,) or several (n, k)."""

@@ -116,7 +116,9 @@ class _Call:
         _library().MKL_Set_Num_Threads_Local(others)
         if status.value != 0:
             cause = _CAUSES.get(status.value, "see the PARDISO manual")
-            raise FactorizationError(f"PARDISO failed with error {status.value} on {self._n} unknowns: {cause}")
+            raise FactorizationError(
+                f"PARDISO failed with error {status.value} on {self._n} unknowns: {cause}", element="matrix"
+            )
 
     def release(self) -> None:
         self(_RELEASE)

@@ -46,9 +46,11 @@ class SuperLUFactor:
                     options={"SymmetricMode": True},
                 )
             except RuntimeError as error:
-                raise FactorizationError(f"SuperLU failed on {self.n} unknowns: {error}") from error
+                raise FactorizationError(f"SuperLU failed on {self.n} unknowns: {error}", element="matrix") from error
         if not (self._factor.U.diagonal().real > 0).all():
-            raise FactorizationError(f"SuperLU failed on {self.n} unknowns: the matrix is not positive definite")
+            raise FactorizationError(
+                f"SuperLU failed on {self.n} unknowns: the matrix is not positive definite", element="matrix"
+            )
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
         """Solution for one right-hand side (n,) or several (n, k)."""

@@ -100,7 +100,8 @@ def area_elements(shape: Any) -> AreaElements:
     """Lower a shape in space or in the plane to simplices with area vectors; further kinds of shapes register here."""
     raise SourceError(
         f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
-        f"Polyline, not to a {type(shape).__name__}"
+        f"Polyline, not to a {type(shape).__name__}",
+        element="source",
     )
 
 
@@ -229,7 +230,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         first += int(elements.components.max()) + 1
     joined = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
     if total <= 0:
-        raise SourceError("the source has no area: every face is degenerate")
+        raise SourceError("the source has no area: every face is degenerate", element="source")
     if not len(joined[2]):
         raise SourceError(
             f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape",

@@ -53,7 +53,9 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
     """
     ensure_picture_writable(path)
     if field.grid.dimension not in (2, 3):
-        raise GeometryError(f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}")
+        raise GeometryError(
+            f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}", element="field"
+        )
     if field.grid.dimension == 2:
         sides = field.grid.upper - field.grid.origin
         figure = new_figure(*(7.5 * sides / sides.max() + [1.6, 0.6]))

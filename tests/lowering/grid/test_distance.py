@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.grid_cases import (
     assert_closed_manifold,
     box,
@@ -173,7 +174,7 @@ def test_levels_of_several_sources_and_components():
             assert spread < 0.3 * h
     free = solver.distance(both, sh.EachComponent())
     assert max(level_at(free, left)[1], level_at(free, right)[1]) < 0.3 * h
-    with pytest.raises(sh.ConstraintError, match="3 level values"):
+    with refused(sh.ConstraintError):
         solver.distance([left, right], sh.LevelValues([0, 1, 2]))
 
 
@@ -186,24 +187,24 @@ def test_sides_that_coincide_are_told_and_refused_when_nothing_is_left():
     outside = np.abs(field.grid.points[..., 2]) > 0.1
     assert (field.values[outside] > 0).all()
     twice = sh.TriangleMesh(thin.vertices, np.concatenate([thin.faces, thin.faces[:, ::-1]]))
-    with pytest.raises(sh.SourceError, match="cancel each other everywhere"):
+    with refused(sh.SourceError):
         sh.signed_distance(twice, resolution=32)
 
 
 def test_what_cannot_be_done_is_refused_with_the_remedy():
     shape = sphere(300)
-    with pytest.raises(sh.SourceError, match="normals"):
+    with refused(sh.SourceError):
         sh.signed_distance(sh.PointCloud(shape.vertices), box(16))
-    with pytest.raises(sh.SourceError, match="misses the shape"):
+    with refused(sh.SourceError):
         sh.signed_distance(shape, sh.Grid((5, 5, 5), 0.1, (9, 9, 9)))
-    with pytest.raises(sh.SourceError, match="no area"):
+    with refused(sh.SourceError, "source"):
         sh.signed_distance(sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]), box(16))
-    with pytest.raises(sh.SourceError, match="dimensions"):
+    with refused(sh.SourceError, "source 0"):
         sh.signed_distance(sh.PointCloud([[0, 0]], [[0, 1]]), box(16))
-    with pytest.raises(sh.SourceError, match="Grid"):
+    with refused(sh.SourceError, "source"):
         sh.signed_distance(box(4), box(16))
-    with pytest.raises(sh.MemoryLimitError, match=r"GB.*lower resolution"):
+    with refused(sh.MemoryLimitError):
         sh.signed_distance(shape, resolution=20000)
-    with pytest.raises(sh.OutsideError, match="one sign"):
+    with refused(sh.OutsideError, "field"):
         sh.sharpen(sh.GridField(box(8), np.ones((8, 8, 8))))
     assert memory_estimate(box(512)) < 10e9

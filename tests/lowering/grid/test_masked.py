@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.grid_cases import assert_closed_manifold, enclosed_volume
 from signedheat.linear.restarts import matrix_forces, solve_with_restarts
 from signedheat.lowering.grid import masked as masked_grid
@@ -121,7 +122,7 @@ def test_levels_and_components():
     np.testing.assert_allclose(phi([[0.3, 1.5], [0.6, 1.5]]), [0, 0.3], atol=0.01)
     each = sh.signed_distance(sources, grid, constraint=sh.EachComponent())
     np.testing.assert_allclose(np.diff(each([[0.3, 1.5], [0.6, 1.5]])), 0.3, atol=0.01)
-    with pytest.raises(sh.ConstraintError, match="level values"):
+    with refused(sh.ConstraintError):
         sh.signed_distance(sources, grid, constraint=sh.LevelValues([0.0, 0.3, 1.0]))
 
 
@@ -148,7 +149,7 @@ def test_a_room_without_a_source_is_nan_and_says_so():
     [line] = phi.contour(3.5)
     assert not line.closed
     np.testing.assert_allclose(line.points[:, 0], 8.5, atol=1e-4)
-    with pytest.raises(sh.GeometryError, match="cannot be sharpened"):
+    with refused(sh.GeometryError, "field"):
         sh.sharpen(phi)
 
 
@@ -212,15 +213,15 @@ def test_contours_among_any_solid_nodes_are_closed_manifold_surfaces(level):
 
 
 def test_masks_are_checked():
-    with pytest.raises(sh.GeometryError, match="must be boolean, of shape"):
+    with refused(sh.GeometryError, "mask"):
         sh.Grid((0, 0), 1.0, (3, 3), np.zeros((3, 4), dtype=bool))
-    with pytest.raises(sh.GeometryError, match="must be boolean, of shape"):
+    with refused(sh.GeometryError, "mask"):
         sh.Grid((0, 0), 1.0, (3, 3), np.zeros((3, 3)))
-    with pytest.raises(sh.GeometryError, match="all nodes of the grid are solid"):
+    with refused(sh.GeometryError, "mask"):
         sh.Grid((0, 0), 1.0, (3, 3), np.ones((3, 3), dtype=bool))
     solid = np.zeros((10, 10), dtype=bool)
     solid[4:8] = True
-    with pytest.raises(sh.SourceError, match="within solid nodes"):
+    with refused(sh.SourceError, "source 0"):
         sh.signed_distance(sh.Polyline([[5.2, 1.0], [5.2, 8.0]]), sh.Grid((0, 0), 1.0, (10, 10), solid))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import visualization
 
 
@@ -125,7 +126,7 @@ def test_lines_of_equal_distance_are_oriented_and_close():
     assert again([[0, 0]])[0] < 0 < again([[1.4, 0]])[0]
     [out] = phi.offset(-0.5)
     assert -out.signed_area == pytest.approx(np.pi * 0.25, rel=2e-3)
-    with pytest.raises(sh.OutsideError, match="use a padding"):
+    with refused(sh.OutsideError):
         phi.offset(0.5)
     with pytest.raises(sh.OutsideError):
         phi.contour(10.0)
@@ -168,20 +169,20 @@ def test_boolean_images():
     assert rms(phi.values - exact) < 0.03
     [border] = sh.Polyline.from_mask(np.ones((3, 3), dtype=bool))  # what meets the border of the image is closed
     assert border.closed and border.bounds.tolist() == [[-0.5, -0.5], [2.5, 2.5]]
-    with pytest.raises(sh.GeometryError, match="boolean image"):
+    with refused(sh.GeometryError):
         sh.Polyline.from_mask(np.ones((3, 3)))
-    with pytest.raises(sh.GeometryError, match="boolean image"):
+    with refused(sh.GeometryError):
         sh.Polyline.from_mask(np.zeros((3, 3), dtype=bool))
 
 
 def test_polylines_are_checked():
-    with pytest.raises(sh.GeometryError, match="at least 2"):
+    with refused(sh.GeometryError, "points"):
         sh.Polyline([[0, 0]])
-    with pytest.raises(sh.GeometryError, match="no length"):
+    with refused(sh.GeometryError, "points"):
         sh.Polyline([[1, 1], [1, 1], [1, 1]])
-    with pytest.raises(sh.GeometryError, match="NaN"):
+    with refused(sh.GeometryError, "number 1"):
         sh.Polyline([[0, 0], [np.nan, 1]])
-    with pytest.raises(sh.GeometryError, match="shape"):
+    with refused(sh.GeometryError, "points"):
         sh.Polyline([[0, 0, 0], [1, 0, 0]])
     assert sh.Polyline([[0, 0], [1, 0], [1, 1], [0, 0]], closed=True).n_points == 3
     repeated = sh.Polyline([[-1, 0], [0, 0], [0, 0], [1, 0]])  # ugly, but valid
@@ -190,11 +191,11 @@ def test_polylines_are_checked():
 
 
 def test_sources_of_the_wrong_dimension_are_refused():
-    with pytest.raises(sh.SourceError, match="lives in 2 dimensions, and the grid in 3"):
+    with refused(sh.SourceError, "source 0"):
         sh.signed_distance(SQUARE, sh.Grid((0, 0, 0), 0.1, (4, 4, 4)))
-    with pytest.raises(sh.SourceError, match="lives in 3 dimensions, and the grid in 2"):
+    with refused(sh.SourceError, "source 0"):
         sh.signed_distance(sh.TriangleMesh(np.eye(3), [[0, 1, 2]]), sh.Grid((0, 0), 0.1, (4, 4)))
-    with pytest.raises(sh.SourceError, match="misses the shape"):
+    with refused(sh.SourceError):
         sh.signed_distance(SQUARE, sh.Grid((5, 5), 0.1, (4, 4)))
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy import sparse
 
 import signedheat as sh
+from refusals import refused
 from shapes.surface_cases import book, flipped, sphere, square
 from shapes.surfaces import FlatGluing
 from signedheat.diagnostics import EdgesLengthened
@@ -230,7 +231,7 @@ def test_levels_that_contradict_each_other_are_refused():
     mesh = bumpy()
     x, y, _ = mesh.vertices.T
     crossing = [mesh.level_set(x, 0.1)[0], mesh.level_set(y, 0.1)[0], mesh.level_set(x, 0.1)[0]]
-    with pytest.raises(sh.ConstraintError, match="contradict"):
+    with refused(sh.ConstraintError, "vertex 169"):
         sh.SignedHeatSolver(mesh).distance(crossing, sh.LevelValues([0.0, 0.0, 1.0]))
 
 

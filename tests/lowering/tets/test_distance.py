@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import signedheat as sh
+from refusals import refused
 from shapes.domain_cases import fitted_order
 from shapes.tet_cases import boxes, lattice, plain_recipe, rectangle, rms, sphere
 from signedheat.diagnostics import OutsideMesh
@@ -131,7 +132,7 @@ def test_level_values_and_groups(cube):
     middle = exact(cube.vertices) - gap / 2  # the mean over both sheets is zero
     inner = (cube.vertices > 0.5).all(axis=1) & (cube.vertices < 1.5).all(axis=1)
     assert np.abs(grouped.values - middle)[inner].max() < 0.1
-    with pytest.raises(sh.ConstraintError, match="3 level values"):
+    with refused(sh.ConstraintError):
         distance(cube, [low, high], sh.LevelValues([0.0, 1.0, 2.0]))
 
 
@@ -170,7 +171,7 @@ def test_polygons_and_points_are_sources(cube):
     assert np.abs(phi.values - exact).max() < 1e-7
     cloud = sh.PointCloud(vertices, normals=np.tile(normal, (625, 1)))
     assert np.abs(distance(cube, cloud).values - exact).max() < 1e-7
-    with pytest.raises(sh.SourceError, match="no normals"):
+    with refused(sh.SourceError):
         distance(cube, sh.PointCloud(vertices))
 
 
@@ -285,19 +286,19 @@ def test_directions_survive_beyond_the_range_of_numbers():
 
 def test_bad_sources_are_named(cube):
     far = rectangle([10, 10, 10], [1, 0, 0], [0, 1, 0])
-    with pytest.raises(sh.SourceError, match=r"source 1 .* lies outside the tet mesh"):
+    with refused(sh.SourceError, "source 1"):
         distance(cube, [tilted()[0], far])
-    with pytest.raises(sh.SourceError, match="there is no source"):
+    with refused(sh.SourceError):
         distance(cube, [])
-    with pytest.raises(sh.SourceError, match="no area"):
+    with refused(sh.SourceError, "source 0"):
         distance(cube, sh.TriangleMesh([[1, 1, 1], [1.5, 1, 1], [0.5, 1, 1]], [[0, 1, 2]]))
-    with pytest.raises(sh.SourceError, match="three dimensions"):
+    with refused(sh.SourceError, "source 0"):
         distance(cube, sh.PointCloud([[1.0, 1.0], [0.5, 1.0]], normals=[[0, 1], [0, 1]], areas=[1, 1]))
     with pytest.raises(sh.SourceError):
         distance(cube, sh.Curve([0], [[1, 0, 0]]))
     wall = tilted()[0]
     both = sh.TriangleMesh(wall.vertices, np.concatenate([wall.faces, wall.faces[:, ::-1]]))
-    with pytest.raises(sh.SourceError, match="cancel"):
+    with refused(sh.SourceError):
         distance(cube, both)
 
 

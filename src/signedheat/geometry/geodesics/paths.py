@@ -148,7 +148,8 @@ def through_vertices(triangles: IntrinsicMesh, start: LocatedPoints, end: Locate
     if path[-1] != n:
         raise SourceError(
             f"{name}: no way along the surface joins the point in face {start.faces[0]} to the point "
-            f"in face {end.faces[0]}: they lie on different connected components; make them two curves",
+            f"in face {end.faces[0]}: they lie on different connected components",
+            remedy="make them two curves",
             element=f"face {start.faces[0]}",
         )
     chain = concatenated([start, points_at_vertices(triangles, np.array(path[-2:0:-1])), end])

@@ -103,7 +103,7 @@ class GridDiscretization(DiffusesEach):
 @discretize.register
 def _(domain: Grid) -> GridDiscretization:
     if domain.dimension > 4:
-        raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}")
+        raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}", element="domain")
     refuse_beyond_memory(domain)
     if domain.mask is not None:
         return MaskedGridDiscretization(domain)

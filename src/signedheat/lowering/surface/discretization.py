@@ -164,7 +164,9 @@ class SurfaceDiscretization:
 def _(domain: TriangleMesh) -> SurfaceDiscretization:
     lengths, added = mollify(domain.edge_lengths[domain.edges.face_edges], 1e-6)
     if not lengths.max() > 0:
-        raise GeometryError("all edges of the mesh have length zero: it has no area to measure distance on")
+        raise GeometryError(
+            "all edges of the mesh have length zero: it has no area to measure distance on", element="edges"
+        )
     triangles = IntrinsicMesh.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)
     share = large_angles(triangles)
     notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))

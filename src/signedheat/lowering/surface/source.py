@@ -113,7 +113,7 @@ def surface_source(
             remedy="pass at least one curve or point, and no empty lists",
         )
     if not all(part.is_conforming for part in parts):
-        raise SourceError("unoriented curves inside faces must be embedded in the triangles first")
+        raise SourceError("unoriented curves inside faces must be embedded in the triangles first", element="curves")
     vectors = oriented_vectors(triangles, [p for p in parts if p.oriented])
     vectors = vectors + unoriented_vectors(triangles, parts, spacing)
     points = [p.nodes for p in parts if len(p.ends) == 0]
@@ -124,8 +124,9 @@ def surface_source(
         vectors = vectors + np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
     elif np.abs(vectors.data).max(initial=0.0) <= 1e-12 * max(part.lengths.max() for part in parts):
         raise SourceError(
-            "the curves cancel: all of them run both ways, or close inside single faces, so that no side is positive; "
-            "make them unoriented (oriented=False), or the faces smaller"
+            "the curves cancel: all of them run both ways, or close inside single faces, so that no side is positive",
+            remedy="make them unoriented (oriented=False), or the faces smaller",
+            element="curves",
         )
 
     components = connected(parts)

@@ -34,7 +34,11 @@ def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float6
     field = np.ascontiguousarray(values).reshape(shape)
     edges = crossed_edges(field)
     if not len(edges):
-        raise OutsideError("the field has one sign everywhere, so there is no zero set to measure distance to")
+        raise OutsideError(
+            "the field has one sign everywhere, so there is no zero set to measure distance to",
+            element="field",
+            remedy="use a larger grid, or add an offset to the values",
+        )
     crossings = crossings_at(field, edges, steps)
     nearest = np.full(shape, -1, dtype=np.int32)
     squares = np.full(shape, np.inf, dtype=np.float32)

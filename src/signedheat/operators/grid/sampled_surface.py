@@ -117,7 +117,8 @@ def sampled_surface(
     """
     if not len(band.faces) and not len(crossings):
         raise OutsideError(
-            "there is nothing to measure distance to: the shape has no faces, and the field one sign everywhere"
+            "there is nothing to measure distance to: the shape has no faces, and the field one sign everywhere",
+            element="shape",
         )
     nearest, squares = band.nearest[None], band.squares[None]
     owners = np.concatenate([band.faces, -1 - np.arange(len(crossings), dtype=np.int32)])
