@@ -4,6 +4,7 @@ from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .diagnostics import Diagnostics
 from .domains.curves import Curve, SurfacePoints
 from .domains.digital_surface import DigitalSurface
+from .domains.foreign import as_shape
 from .domains.grid import Grid
 from .domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .domains.point_cloud import PointCloud
@@ -89,6 +90,7 @@ __all__ = [
     "UnsupportedTypeError",
     "VertexField",
     "ZeroSet",
+    "as_shape",
     "close_curves",
     "closing",
     "common_subdivision",

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .domains.foreign import TAKEN
 from .errors import UnsupportedTypeError
 
 
@@ -143,5 +144,5 @@ def discretize(domain: Any, **options: Any) -> Discretization:
     """Lower a domain to its discretisation; every kind of domain registers a function of its own."""
     raise UnsupportedTypeError(
         f"{type(domain).__name__} is not a domain",
-        remedy="use TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid",
+        remedy=f"use a Grid, or {TAKEN}",
     )

@@ -13,6 +13,7 @@ from .constraints import Constraint, ZeroSet
 from .diagnostics import Diagnostics
 from .discretization import Adaptable, discretize
 from .domains.curves import CurvesAndPoints
+from .domains.foreign import ForeignShape, as_shapes, converted
 from .domains.grid import Dimension, Grid
 from .domains.intrinsic_triangulation import triangle_mesh
 from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources
@@ -31,7 +32,8 @@ from .progress import Progress, Stopwatch
 
 _BATCH = 16  # sources diffused at a time
 
-AnyDomain = TypeVar("AnyDomain", bound=Domain, covariant=True)
+AnyDomain = TypeVar("AnyDomain", bound=Domain | ForeignShape, covariant=True)
+One = TypeVar("One")
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +68,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     intrinsic: bool = False
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "domain", converted(self.domain))
         object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
 
     @cached_property
@@ -198,9 +201,6 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         return fields
 
 
-One = TypeVar("One")
-
-
 def checked(constraint: Constraint | None) -> Constraint:
     """The constraint, or the default for None."""
     if constraint is None:
@@ -214,8 +214,8 @@ def checked(constraint: Constraint | None) -> Constraint:
 
 
 def as_list(sources: One | Sequence[One]) -> list[One]:
-    """One source or several sources, as a list."""
-    listed: list[One] = list(sources) if isinstance(sources, Sequence) else [sources]
+    """One source or several sources, as a list, with those of other packages as shapes."""
+    listed: list[One] = as_shapes(sources)
     if not listed:
         raise SourceError(
             "there is no source",
@@ -276,7 +276,7 @@ def signed_distance(
 @overload
 def signed_distance(
     source: Sources,
-    domain: Domain | None,
+    domain: Domain | ForeignShape | None,
     *,
     resolution: int = 128,
     padding: float | None = None,
@@ -286,7 +286,7 @@ def signed_distance(
 ) -> Field: ...
 def signed_distance(
     source: Sources,
-    domain: Domain | None = None,
+    domain: Domain | ForeignShape | None = None,
     *,
     resolution: int = 128,
     padding: float | None = None,
@@ -299,7 +299,8 @@ def signed_distance(
     Parameters
     ----------
     source : TriangleMesh, PolygonMesh, PointCloud with normals or Polyline, or a sequence of them
-        The shape; in the plane a `Polyline`. If a domain is given, any source of `SignedHeatSolver.distance` on it.
+        The shape; in the plane a `Polyline`. Objects of trimesh, PyVista, meshio and Open3D and pairs (vertices, faces)
+        are taken wherever a shape is. If a domain is given, any source of `SignedHeatSolver.distance` on it.
     domain : Grid, TetMesh, TriangleMesh, …, optional
         Where distance is measured; by default on a grid of cubic cells around the shape.
     resolution : int
@@ -339,5 +340,6 @@ def signed_distance(
     array([False,  True])
     """
     if domain is None:
-        domain = grid_around(as_list(source), resolution, padding)
+        source = as_list(source)
+        domain = grid_around(source, resolution, padding)
     return SignedHeatSolver(domain, diffusion, progress)._distance(source, constraint)

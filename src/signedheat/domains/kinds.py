@@ -7,6 +7,8 @@ from typing import TypeAlias, TypeVar
 
 from .curves import CurveOrPoints
 from .digital_surface import DigitalSurface
+from .foreign import ForeignShape
+from .foreign import Shape as Shape
 from .grid import Grid
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .point_cloud import PointCloud
@@ -14,9 +16,6 @@ from .polygon_mesh import PolygonMesh
 from .polyline import Polyline
 from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh
-
-Shape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh
-"""What a file of a shape may hold. In space points need normals, and volumes are refused: give their boundary."""
 
 EmbeddedSurface: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface
 """Surfaces with positions in space, on which curves and points are given."""
@@ -30,13 +29,16 @@ Domain: TypeAlias = SurfaceDomain | TetMesh | Grid[int]
 AnySurface = TypeVar("AnySurface", bound=SurfaceDomain)
 """A surface of one kind."""
 
-Shapes: TypeAlias = Shape | Sequence[Shape]
+ShapeLike: TypeAlias = Shape | ForeignShape
+"""What is taken for a shape: also objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
+
+Shapes: TypeAlias = ShapeLike | Sequence[ShapeLike]
 """One shape in space or several."""
 
 Polylines: TypeAlias = Polyline | Sequence[Polyline]
 """One line in the plane or several."""
 
-SpaceSource: TypeAlias = Shape | Polyline
+SpaceSource: TypeAlias = ShapeLike | Polyline
 """What distance on grids is measured to."""
 
 SpaceSources: TypeAlias = SpaceSource | Sequence[SpaceSource]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import get_args
+from typing import cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import SharpenedToShape
+from ..domains.foreign import as_shapes
+from ..domains.kinds import Shapes
 from ..errors import GeometryError, SignedHeatError, SourceError
 from ..fields.grid_field import GridField
 from ..operators.grid.closest_points import distance_to_zero_set
@@ -23,7 +24,7 @@ from .sharpening import sharpen_field
 @sharpen_field.register
 def _(
     field: GridField,
-    shape: Shape | Sequence[Shape] | None = None,
+    shape: Shapes | None = None,
     *,
     fit: Fit = "auto",
     sides: ArrayLike | None = None,
@@ -60,14 +61,14 @@ def _(
     return replace(sharpened, diagnostics=replace(sharpened.diagnostics, timings=timings))
 
 
-def _sharpen_to(field: GridField, shape: Shape | Sequence[Shape], sides: NDArray[np.float64], fit: Fit) -> GridField:
+def _sharpen_to(field: GridField, shape: Shapes, sides: NDArray[np.float64], fit: Fit) -> GridField:
     grid = field.grid
     if grid.dimension != 3:
         raise SourceError(
             f"fields in space are sharpened to shapes, and this one has {grid.dimension} dimensions",
             remedy="leave the shape out",
         )
-    parts = list(shape) if isinstance(shape, Sequence) else [shape]
+    parts = cast("list[Shape]", as_shapes(shape))
     made = assemble(parts, grid, sides, fit)
     diagnostics = field.diagnostics.noting(SharpenedToShape(made.layered, made.completed))
     return GridField(grid, made.values, diagnostics, made.confidence, made.surface)

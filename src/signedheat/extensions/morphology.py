@@ -14,6 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints
+from ..domains.foreign import converted
 from ..domains.grid import Grid, room_around
 from ..domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from ..domains.point_cloud import PointCloud
@@ -223,6 +224,7 @@ def thicken(
 
 def _field(domain: Domain, shape: Sources) -> Field:
     """The distance whose level sets are the offsets: that to a solid, where the domain is a grid in space."""
+    shape = converted(shape)
     if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
         if isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | TetMesh):
             return solid_distance(shape, domain)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import ShapeOriented
+from ..domains.foreign import ForeignShape, converted
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
@@ -112,7 +113,7 @@ class Orientation(Frozen):
         return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
 
 
-def orient(shape: Mesh) -> Mesh:
+def orient(shape: Mesh | ForeignShape) -> Mesh:
     """The mesh with its faces turned so that neighbours agree and every part points outwards.
 
     See `orientation`, which also tells what was turned.
@@ -127,7 +128,7 @@ def orient(shape: Mesh) -> Mesh:
     return orientation(shape).shape
 
 
-def orientation(shape: Mesh, soup_signs: SoupSigns | None = None) -> Orientation:
+def orientation(shape: Mesh | ForeignShape, soup_signs: SoupSigns | None = None) -> Orientation:
     """Orient a mesh, and tell what was turned, merged and left.
 
     Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Across edges of two faces
@@ -164,6 +165,7 @@ def orientation(shape: Mesh, soup_signs: SoupSigns | None = None) -> Orientation
     >>> orientation(samples.union(outer, cavity)).nested_bodies
     1
     """
+    shape = converted(shape)
     if not isinstance(shape, TriangleMesh | PolygonMesh):
         kind = type(shape).__name__
         raise GeometryError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import singledispatch
 from typing import Protocol, TypeVar, overload, runtime_checkable
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..diagnostics import Diagnostics, Note, SlopeErrors
 from ..discretization import Discretization, SourceTerm
 from ..domains.grid import Dimension
+from ..domains.kinds import Shapes
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
@@ -21,7 +21,7 @@ from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
-from .shape_sharpening import Fit, Shape
+from .shape_sharpening import Fit
 from .sharpening_methods import Geodesic
 
 
@@ -46,7 +46,7 @@ AnyField = TypeVar("AnyField", bound=VertexField | TetField)
 @overload
 def sharpen(
     field: GridField[Dimension],
-    shape: Shape | Sequence[Shape] | None = None,
+    shape: Shapes | None = None,
     *,
     fit: Fit = "auto",
     sides: ArrayLike | None = None,

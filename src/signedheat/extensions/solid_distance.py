@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import overload
+from typing import cast, overload
 
 import numpy as np
 import scipy
@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..constraints import Constraint, ZeroSet
 from ..diagnostics import Diagnostics, Note, OrientedPoints, SharpenedToShape
 from ..discretization import discretize
+from ..domains.foreign import as_shapes
 from ..domains.grid import Grid
+from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
@@ -70,7 +72,7 @@ class Steps:
 
 @overload
 def solid_distance(
-    shape: Shape | TetMesh | Sequence[Mesh],
+    shape: ShapeLike | Sequence[ShapeLike],
     domain: Grid | None = None,
     *,
     resolution: int = 128,
@@ -85,7 +87,7 @@ def solid_distance(
 ) -> GridField: ...
 @overload
 def solid_distance(
-    shape: Shape | TetMesh | Sequence[Mesh],
+    shape: ShapeLike | Sequence[ShapeLike],
     domain: TetMesh,
     *,
     constraint: Constraint | None = None,
@@ -96,7 +98,7 @@ def solid_distance(
     progress: Progress | None = None,
 ) -> TetField: ...
 def solid_distance(
-    shape: Shape | TetMesh | Sequence[Mesh],
+    shape: ShapeLike | Sequence[ShapeLike],
     domain: Grid | TetMesh | None = None,
     *,
     resolution: int = 128,
@@ -118,7 +120,8 @@ def solid_distance(
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh; or several meshes
-        Broken or not; points with normals or without.
+        Broken or not; points with normals or without. Objects of trimesh, PyVista, meshio and Open3D and pairs
+        (vertices, faces) are taken wherever a shape is.
     domain : Grid or TetMesh, optional
         Where to measure; by default a grid of cubic cells around the shape.
     resolution : int
@@ -174,23 +177,22 @@ def solid_distance(
     return _elsewhere(solid, domain, steps, progress)
 
 
-def _joined(shape: Shape | TetMesh | Sequence[Mesh]) -> Shape:
+def _joined(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
     """One shape of several meshes."""
-    if isinstance(shape, TetMesh):
-        return shape.boundary
-    if not isinstance(shape, Sequence):
-        return shape
-    if not shape:
+    shapes = as_shapes(shape)
+    if not shapes:
         raise SourceError("there is no shape", remedy="pass at least one")
-    if len(shape) == 1:
-        return shape[0]
-    for index, each in enumerate(shape):
+    if len(shapes) == 1:
+        whole = shapes[0]
+        return whole.boundary if isinstance(whole, TetMesh) else cast("Shape", whole)
+    meshes = []
+    for index, each in enumerate(shapes):
         if not isinstance(each, TriangleMesh | PolygonMesh):
             raise SourceError(
                 f"several meshes make one solid, and shape {index} is a {type(each).__name__}",
                 element=f"shape {index}",
             )
-    meshes = [each.triangulation for each in shape]
+        meshes.append(each.triangulation)
     starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))

@@ -9,14 +9,15 @@ angles of 60° and 90°; where sizes change angles stay between 30° and 135°.
 from __future__ import annotations
 
 import itertools
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..domains.foreign import converted
 from ..domains.grid import room_around
-from ..domains.kinds import Shape
+from ..domains.kinds import Shape, ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError, MemoryLimitError
@@ -30,7 +31,7 @@ MOST_TETS = 50_000_000
 
 
 def tetrahedralize(
-    shape: Shape, *, resolution: int = 32, padding: float | None = None, grading: float = 3.0
+    shape: ShapeLike, *, resolution: int = 32, padding: float | None = None, grading: float = 3.0
 ) -> TetMesh:
     """Fill a box around a shape with tets of good angles, whose size grows with the distance from the shape.
 
@@ -74,11 +75,12 @@ def tetrahedralize(
     >>> float(mesh.tet_volumes.min()) > 0
     True
     """
-    lower, upper = bounds_around([shape])
+    own = cast("Shape", converted(shape))
+    lower, upper = bounds_around([own])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
         raise GeometryError(
-            f"{shape!r} has no extent in space of three dimensions to put a mesh around", element="shape"
+            f"{own!r} has no extent in space of three dimensions to put a mesh around", element="shape"
         )
     padding = room_around((lower, upper)) if padding is None else padding
     if resolution < 1 or not 0 <= padding < np.inf or not grading >= LEAST_GRADING:
@@ -94,10 +96,10 @@ def tetrahedralize(
         depth = 0
     coarse = spacing * 2**depth
     counts = np.maximum(np.ceil(sides / coarse - 1e-9).astype(np.int64), 1)
-    area = 0.0 if isinstance(shape, PointCloud) else float(area_elements(shape).weights.sum())
+    area = 0.0 if isinstance(own, PointCloud) else float(area_elements(own).weights.sum())
     _refuse_too_many(12 * max(float(counts.prod()), (2 * grading * area / spacing**2) if depth else 0.0))
     origin = lower - (counts * coarse - sides) / 2
-    samples = scipy.spatial.cKDTree(sample_points(shape, spacing))
+    samples = scipy.spatial.cKDTree(sample_points(own, spacing))
     corners, sizes = _octree(samples, origin, spacing, counts, depth, grading)
     points, tets = _join_leaves(corners, sizes, counts * 2 ** (depth + 1))
     return TetMesh(origin + points * (spacing / 2), tets)

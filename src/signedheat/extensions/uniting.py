@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from ..diagnostics import LeftOut
+from ..domains.foreign import ForeignShape, converted
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -78,7 +80,7 @@ class Merged:
     count: int
 
 
-def unite(shape: Shape, domain: Grid | None = None, *, resolution: int = 128) -> Shape:
+def unite(shape: Shape | ForeignShape, domain: Grid | None = None, *, resolution: int = 128) -> Shape:
     """A shape whose bodies overlap, without what lies inside others: the boundary of their union.
 
     Walls of cavities, which face into them, stay. Faces that are partly inside are cut where they enter, to a fraction
@@ -114,10 +116,11 @@ def unite(shape: Shape, domain: Grid | None = None, *, resolution: int = 128) ->
     return union_of(shape, domain, resolution=resolution).shape
 
 
-def union_of(shape: Shape, domain: Grid | None = None, *, resolution: int = 128) -> Union:
+def union_of(shape: Shape | ForeignShape, domain: Grid | None = None, *, resolution: int = 128) -> Union:
     """What `unite` gives, and what was left out for it; see there for parameters and errors."""
-    grid = grid_around([shape], resolution) if domain is None else domain
-    merged = merge_duplicates(shape)
+    own = cast("Shape", converted(shape))
+    grid = grid_around([own], resolution) if domain is None else domain
+    merged = merge_duplicates(own)
     try:
         samples = sample_on_grid([merged.shape], grid, SAMPLE_SIZE)
     except CancellingNormalsError:

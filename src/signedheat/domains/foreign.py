@@ -1,0 +1,180 @@
+"""Shapes of other packages, and pairs of arrays, taken wherever a shape is: the one place that recognises them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol, TypeAlias, TypeVar, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import UnsupportedTypeError
+from .digital_surface import DigitalSurface
+from .exchange import shape_from
+from .point_cloud import PointCloud
+from .polygon_mesh import PolygonMesh
+from .tet_mesh import TetMesh
+from .triangle_mesh import TriangleMesh
+
+Thing = TypeVar("Thing")
+
+PACKAGES = {"meshio": "meshio", "open3d": "open3d", "pyvista": "pyvista", "trimesh": "trimesh"}
+"""Packages whose objects are taken, by the name with which the modules of their classes begin."""
+
+
+class HasVertices(Protocol):
+    """A `trimesh.Trimesh` or `trimesh.PointCloud`, seen by a type checker."""
+
+    @property
+    def vertices(self) -> object:
+        """Positions."""
+
+    @property
+    def metadata(self) -> object:
+        """Whatever belongs to it."""
+
+
+class HasGeometry(Protocol):
+    """A `trimesh.Scene`, seen by a type checker."""
+
+    @property
+    def geometry(self) -> object:
+        """Its meshes, by name."""
+
+    @property
+    def graph(self) -> object:
+        """Where they are."""
+
+
+class HasPointData(Protocol):
+    """A `meshio.Mesh` or an object of PyVista, seen by a type checker."""
+
+    @property
+    def points(self) -> object:
+        """Positions."""
+
+    @property
+    def point_data(self) -> object:
+        """Arrays at the points, by name."""
+
+
+class HasTriangles(Protocol):
+    """An `open3d.geometry.TriangleMesh`, seen by a type checker."""
+
+    @property
+    def vertices(self) -> object:
+        """Positions."""
+
+    @property
+    def triangles(self) -> object:
+        """Vertex ids."""
+
+
+Shape: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh
+"""What a file of a shape may hold. In space points need normals, and volumes are refused: give their boundary."""
+
+ForeignShape: TypeAlias = HasVertices | HasGeometry | HasPointData | HasTriangles | tuple[ArrayLike, ArrayLike]
+"""Objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
+
+TAKEN = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
+"""What is taken for a shape, for messages."""
+
+
+def package_of(thing: object) -> str | None:
+    """The package that made an object, among those whose objects are taken; classes derived from theirs count.
+
+    Examples
+    --------
+    >>> package_of([1, 2]) is None
+    True
+    """
+    roots = (kind.__module__.partition(".")[0] for kind in type(thing).__mro__)
+    return next((PACKAGES[root] for root in roots if root in PACKAGES), None)
+
+
+def is_pair(thing: object) -> bool:
+    """Whether something is a pair of arrays (vertices, faces), and not two sources or two numbers.
+
+    Examples
+    --------
+    >>> is_pair(([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])), is_pair(([0.0, 1], [0.0, 1]))
+    (True, False)
+    """
+    if not (isinstance(thing, tuple | list) and len(thing) == 2 and all(_like_array(part) for part in thing)):
+        return False
+    points, faces = thing
+    try:
+        positions = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError, RuntimeError):
+        return False
+    return positions.ndim == 2 and positions.shape[1] == 3 and _like_ids(faces)
+
+
+def as_shape(thing: Shape | ForeignShape) -> Shape:
+    """The shape that an object of another package, or a pair of arrays, stands for; a shape as it is.
+
+    Every function that takes a shape does this by itself.
+
+    Faces keep their number, order and defects. A shape without faces becomes a `PointCloud`, one of triangles alone a
+    `TriangleMesh`, any other a `PolygonMesh`; tets become a `TetMesh`.
+
+    Parameters
+    ----------
+    thing : shape, object of trimesh, PyVista, meshio or Open3D, or (vertices, faces)
+        Vertices are (n, 3) float, faces (m, 3) int or rows of ids of any length.
+
+    Returns
+    -------
+    TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
+        The shape.
+
+    Raises
+    ------
+    UnsupportedTypeError
+        If it is no shape, such as lines, or an object of another package.
+    GeometryError
+        If the shape is invalid.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> as_shape(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    TriangleMesh(3 vertices, 1 faces)
+    """
+    shape = converted(thing)
+    if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh):
+        raise UnsupportedTypeError(f"a {type(thing).__name__} is no shape", remedy=f"pass {TAKEN}")
+    return shape
+
+
+def converted(thing: Thing) -> Thing:
+    """A shape of another package as one of ours; everything else, such as curves, as it is."""
+    package = "numpy" if is_pair(thing) else package_of(thing)
+    return thing if package is None else cast("Thing", shape_from(package, None, thing))
+
+
+def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:
+    """One thing or several, as a list, with every shape of another package among them converted (see `as_shape`)."""
+    several = isinstance(things, Sequence) and not isinstance(things, str)
+    if is_pair(things) or package_of(things) is not None:
+        several = False
+    listed = list(cast("Sequence[Thing]", things)) if several else [things]
+    return [converted(cast("Thing", thing)) for thing in listed]
+
+
+def _like_array(part: object) -> bool:
+    return isinstance(part, list | tuple) or hasattr(part, "__array__")
+
+
+def _like_ids(faces: object) -> bool:
+    """Whether something is rows of whole numbers, of equal length or not."""
+    rows = faces if hasattr(faces, "__array__") else list(cast("Sequence[object]", faces))
+    if isinstance(rows, list):
+        return bool(rows) and all(
+            isinstance(row, list | tuple | np.ndarray) and _whole(np.asarray(row), 1) for row in rows
+        )
+    return _whole(np.asarray(rows), 2)
+
+
+def _whole(ids: NDArray[np.generic], axes: int) -> bool:
+    return ids.ndim == axes and bool(np.issubdtype(ids.dtype, np.integer))
