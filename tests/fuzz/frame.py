@@ -16,7 +16,7 @@ in modules `fuzz/cases_*.py`, which are found by their name::
 What becomes of a case:
 
 * the check returns: right;
-* it raises a `SignedHeatError`: refused, which is right too (counted by type), provided that there is a cause in one line;
+* it raises a `SignedHeatError`: refused, which is right too (counted by type), provided that its cause is one line;
 * it raises `Wrong("changed input", "...")`, or any other exception, or a warning that is no `UserWarning` (NumPy's are
   not): a failure;
 * it takes longer than the limit (30 s), ends its process, or takes more memory than the family's limit: a failure.
