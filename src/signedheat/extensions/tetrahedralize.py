@@ -79,9 +79,7 @@ def tetrahedralize(
     lower, upper = bounds_around([own])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
-        raise GeometryError(
-            f"{own!r} has no extent in space of three dimensions to put a mesh around", element="shape"
-        )
+        raise GeometryError(f"{own!r} has no extent in space of three dimensions to put a mesh around", element="shape")
     padding = room_around((lower, upper)) if padding is None else padding
     if resolution < 1 or not 0 <= padding < np.inf or not grading >= LEAST_GRADING:
         raise GeometryError(
