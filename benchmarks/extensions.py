@@ -177,7 +177,7 @@ def awkward() -> None:
 
 def in_tets() -> None:
     """A sphere in a box, and a wall in an L of jittered tets, round whose corner distance runs."""
-    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+    sys.path.insert(0, str(Path(__file__).parents[1]))
     from shapes.tet_cases import boxes, lattice, rectangle
     from shapes.tet_cases import sphere as ball
 

@@ -25,7 +25,7 @@ import trimesh
 import signedheat as sh
 from signedheat.extensions.tet_meshers import box_walls
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).parent.parent))
 from shapes.tet_cases import plain_recipe
 
 HALF = 1.6

@@ -16,7 +16,7 @@ from signedheat.compiled import compiled
 def test_the_same_values_without_compiling(tmp_path):
     """Python's own arithmetic, an oracle for indices out of range and integers that overflow as well."""
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    folder = Path(__file__).parent
+    folder = Path(__file__).parents[1]
     command = [sys.executable, "-m", "shapes.small_runs", str(tmp_path / "plain.npz")]
     subprocess.run(command, check=True, cwd=folder, env=environment)
     with np.load(tmp_path / "plain.npz") as plain:

@@ -1,1 +1,0 @@
-"""Shapes and cases with known distances, for the tests."""
