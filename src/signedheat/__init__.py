@@ -1,120 +1,27 @@
-"""Generalized signed distance to broken geometry, by the signed heat method."""
+"""Generalized signed distance to broken geometry, by the signed heat method.
 
-from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
-from .diagnostics import Diagnostics
-from .domains.curves import Curve, SurfacePoints
-from .domains.digital_surface import DigitalSurface
-from .domains.foreign import as_shape
-from .domains.grid import Grid
-from .domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
-from .domains.point_cloud import PointCloud
-from .domains.polygon_mesh import PolygonMesh
-from .domains.polyline import Polyline
-from .domains.tet_mesh import TetMesh
-from .domains.triangle_mesh import TriangleMesh
-from .errors import (
-    ConstraintError,
-    FactorizationError,
-    FileFormatError,
-    GeometryError,
-    MemoryLimitError,
-    MissingPackageError,
-    OutsideError,
-    SignedHeatError,
-    SourceError,
-    UnreachedWarning,
-    UnsupportedTypeError,
-)
-from .extensions.close_curves import close_curves
-from .extensions.common_subdivision import common_subdivision
-from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
-from .extensions.orientation import Orientation, orient, orientation
-from .extensions.piecewise import piecewise_distance
-from .extensions.sharpening import sharpen
-from .extensions.sharpening_methods import Convex, Geodesic
-from .extensions.solid_distance import solid_distance
-from .extensions.tetrahedralize import tetrahedralize
-from .extensions.uniting import unite
-from .fields.grid_field import GridField
-from .fields.piecewise_field import PiecewiseField
-from .fields.tet_field import TetField
-from .fields.vertex_field import VertexField
-from .io import (
-    load_field,
-    read,
-    read_curves,
-    read_mask,
-    read_polylines,
-    read_volume,
-    save,
-    write_curves,
-    write_polylines,
-)
-from .solver import SignedHeatSolver, signed_distance
+The public names are those of `public.py`. They are imported together when one of them is first asked for, so that the
+command line can answer ``--help`` at once.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .public import *  # noqa: F403
+    from .public import __all__ as __all__
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "ConstraintError",
-    "Convex",
-    "Curve",
-    "Diagnostics",
-    "DigitalSurface",
-    "EachComponent",
-    "FactorizationError",
-    "FileFormatError",
-    "Free",
-    "Geodesic",
-    "GeometryError",
-    "Grid",
-    "GridField",
-    "IntrinsicTriangulation",
-    "LevelValues",
-    "MemoryLimitError",
-    "MissingPackageError",
-    "Orientation",
-    "OutsideError",
-    "PiecewiseField",
-    "PointCloud",
-    "PolygonMesh",
-    "Polyline",
-    "SignedHeatError",
-    "SignedHeatSolver",
-    "Soft",
-    "SourceError",
-    "SurfacePoints",
-    "TetField",
-    "TetMesh",
-    "TriangleMesh",
-    "UnreachedWarning",
-    "UnsupportedTypeError",
-    "VertexField",
-    "ZeroSet",
-    "as_shape",
-    "close_curves",
-    "closing",
-    "common_subdivision",
-    "dilate",
-    "erode",
-    "intrinsic_delaunay",
-    "load_field",
-    "opening",
-    "orient",
-    "orientation",
-    "piecewise_distance",
-    "read",
-    "read_curves",
-    "read_mask",
-    "read_polylines",
-    "read_volume",
-    "save",
-    "sharpen",
-    "shell",
-    "signed_distance",
-    "solid_distance",
-    "tetrahedralize",
-    "thicken",
-    "unite",
-    "write_curves",
-    "write_polylines",
-]
+
+def __getattr__(name: str) -> Any:
+    public = import_module(f"{__name__}.public")
+    globals().update({known: getattr(public, known) for known in [*public.__all__, "__all__"]})
+    try:
+        return globals()[name]
+    except KeyError:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=public) from None
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *import_module(f"{__name__}.public").__all__})

@@ -1,18 +1,22 @@
-"""The command line: one module per command, each with `add_to(commands)` and `run(arguments)`."""
+"""The command line: `usage` says what it takes, and a command is run by `run(arguments)` in the module of its name.
+
+However a command ends, it ends here: with a status, and with one line on standard error if it failed.
+"""
 
 from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
 
 from .. import __version__
 from ..errors import SignedHeatError
-from . import close, contour, demo, info, morph, offset, surface, view, volume
-from .options import Parser
+from .signals import Signals
+from .streams import open_standard_streams, say, tell
 
-COMMANDS = (volume, surface, close, offset, contour, morph, info, view, demo)
+FAILED, BUG = 1, 70
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -26,44 +30,55 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0: done; 1: failed, with one line on standard error; 2: bad usage.
+        0: done; 1: failed, with one line on standard error; 2: bad usage; 70: failed by a fault of the program;
+        128 + the number of a signal: stopped by it.
     """
-    try:
-        arguments = _parser().parse_args(argv)
-        summary, text = arguments.run(arguments)
-    except SystemExit as stop:  # argparse: help was asked for, or the usage is wrong
-        return int(stop.code or 0)
-    except (SignedHeatError, MemoryError) as error:
-        print(f"signedheat: {_one_line(error)}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("signedheat: stopped; nothing half-written is left behind", file=sys.stderr)
-        return 130
-    try:
-        if arguments.json:
-            print(json.dumps(summary))
-        elif text and not arguments.quiet:
-            print(text)
-        sys.stdout.flush()
-    except BrokenPipeError:  # whoever was reading, such as `head`, has read enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    open_standard_streams()
+    with Signals() as signals:
+        try:
+            return _run(argv)
+        except SystemExit as stop:  # argparse: help was asked for, or the usage is wrong
+            return int(stop.code or 0)
+        except BaseException as error:
+            if signals.caught or isinstance(error, KeyboardInterrupt):  # whatever else it became on its way
+                say("signedheat: stopped; nothing half-written is left behind")
+                return 128 + int(signals.caught or 2)
+            if os.environ.get("SIGNEDHEAT_TRACEBACK"):
+                raise
+            say(f"signedheat: {_one_line(error)}")
+            return FAILED if _is_expected(error) else BUG
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    """Everything else is imported here, where all that may go wrong is caught."""
+    arguments = import_module(f"{__name__}.usage").parser().parse_args(argv)
+    if arguments.check is not None:
+        arguments.check(arguments)
+    import_module("signedheat.public")
+    summary, text = import_module(f"{__name__}.{arguments.command}").run(arguments)
+    if arguments.json:
+        tell(json.dumps(summary))
+    elif text and not arguments.quiet:
+        tell(text)
     return 0
 
 
-def _parser() -> Parser:
-    parser = Parser(
-        prog="signedheat",
-        description="Generalized signed distance to broken geometry: negative inside, positive outside, "
-        "in the units of the file.",
-    )
-    parser.add_argument("--version", action="version", version=f"signedheat {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
-    for command in COMMANDS:
-        command.add_to(commands)
-    return parser
+def _is_expected(error: BaseException) -> bool:
+    """Whether what happened is due to the input or the system, and not to a fault in this program."""
+    return isinstance(error, SignedHeatError | MemoryError | OSError | Warning)
 
 
 def _one_line(error: BaseException) -> str:
     if isinstance(error, MemoryError):
-        return "there is not enough memory: choose a lower --resolution"
-    return " ".join(str(error).split())
+        return "there is not enough memory: choose a lower --resolution or a smaller shape"
+    if _is_expected(error):
+        return " ".join(str(error).split())
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    place = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else "nowhere"
+    about = " ".join(f"{type(error).__name__}: {error}".split())
+    return (
+        f"this is a bug in signedheat {__version__} ({about:.200}; {place}), not your mistake: please report it, with "
+        "the command and what it prints when SIGNEDHEAT_TRACEBACK=1 is set"
+    )

@@ -3,28 +3,12 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import Any
 
 from ..extensions.close_curves import refuse_without_sides
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
 from ..visualization import ensure_picture_writable, save_surface
-from .computing import prefix_errors
-from .options import Summary, add_command
-from .surface import add_curves_and_output, advice, measured
-
-
-def add_to(commands: Any) -> None:
-    """Register the command."""
-    parser = add_command(
-        commands,
-        "close",
-        run=run,
-        help="complete broken curves on a surface",
-        description="The zero set of the signed distance to broken curves: closed, but for ends at the boundary of the "
-        "surface.",
-    )
-    add_curves_and_output(parser, "completed curves: .txt .obj .json")
-    parser.add_argument("--preview", metavar="PNG", help="draw the distance, with the completed curves")
+from .computing import Summary, prefix_errors
+from .surface import advice, measured
 
 
 def run(arguments: Namespace) -> Summary:

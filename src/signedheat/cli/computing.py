@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-import sys
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, overload
+from typing import Any, TypeAlias, overload
 
 import numpy as np
 
 from .. import sharpen
+from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..diagnostics import (
     BoundsNothing,
     CompletedArea,
@@ -27,14 +27,16 @@ from ..errors import SignedHeatError
 from ..extensions.solid_distance import solid_distance
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
-from ..io import POLYLINE_FORMATS, read, read_mask, read_polylines
-from ..io.files import extension
+from ..io import read, read_mask, read_polylines
 from ..lowering.area_elements import bounds_around
 from ..progress import Progress
 from ..solver import SignedHeatSolver, as_list
-from .options import Parser
 from .progress import ProgressBar
+from .streams import say
+from .usage.options import is_planar
 
+Summary: TypeAlias = tuple[dict[str, Any], str]
+"""The result of a command: a dictionary for ``--json``, and text."""
 RESOLUTION = 128
 MOST = 0.9
 """Fraction of the area that may cancel without a warning."""
@@ -51,33 +53,6 @@ def prefix_errors(path: Any) -> Iterator[None]:
         if error.path is not None:
             raise
         raise error.at(path) from error
-
-
-def check_grid_options(parser: Parser, arguments: Namespace) -> None:
-    """Reject options that contradict each other."""
-    own = arguments.origin is not None or arguments.grid_shape is not None
-    spacing = arguments.spacing
-    dimension = 2 if is_planar(arguments.shape) else 3
-    if spacing is not None and len(spacing) not in (1, dimension):
-        parser.error(f"argument --spacing: one number or {dimension}, not {len(spacing)}")
-    for name, numbers in (("--origin", arguments.origin), ("--shape", arguments.grid_shape)):
-        if numbers is not None and len(numbers) != dimension:
-            parser.error(f"argument {name}: {dimension} numbers, not {len(numbers)}")
-    if arguments.mask is not None:
-        if any(given is not None for given in (arguments.resolution, arguments.padding, arguments.grid_shape)):
-            parser.error("--resolution, --padding and --shape do not go with --mask, whose nodes are the grid's")
-        return
-    if own and (arguments.origin is None or arguments.grid_shape is None or spacing is None):
-        parser.error("a grid of your own needs all of --origin, --spacing and --shape")
-    if own and (arguments.resolution is not None or arguments.padding is not None):
-        parser.error("--resolution and --padding do not go with --origin and --shape")
-    if spacing is not None and arguments.resolution is not None:
-        parser.error("--resolution does not go with --spacing: give one of them")
-
-
-def is_planar(path: Any) -> bool:
-    """Whether a file holds polylines in the plane."""
-    return extension(path) in POLYLINE_FORMATS
 
 
 def read_source(path: Any) -> Any:
@@ -101,6 +76,22 @@ def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:
     return Grid.around(bounds, padding=padding, **options)
 
 
+def constraint_of(word: str) -> Constraint:
+    """A constraint from its name on the command line.
+
+    Examples
+    --------
+    >>> constraint_of("soft:0.5")
+    Soft(weight=0.5)
+    """
+    name, _, values = word.partition(":")
+    if name == "levels":
+        return LevelValues([float(value) for value in values.split(",")])
+    if name == "soft":
+        return Soft(float(values))
+    return {"free": Free(), "zero-set": ZeroSet(), "hard": ZeroSet(hard=True), "each-component": EachComponent()}[word]
+
+
 @overload
 def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField: ...
 @overload
@@ -113,7 +104,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
             field = solid_distance(
                 shape,
                 domain,
-                constraint=arguments.constraint,
+                constraint=constraint_of(arguments.constraint),
                 diffusion=arguments.diffusion,
                 as_oriented=arguments.as_oriented,
                 keep_overlaps=arguments.keep_overlaps,
@@ -124,7 +115,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
             field = planar_distance(shape, domain, arguments, progress)
     if not arguments.quiet:
         for line in told(field):
-            print(f"signedheat: {line}", file=sys.stderr)
+            say(f"signedheat: {line}")
     return field
 
 
@@ -133,7 +124,7 @@ def planar_distance(lines: Any, grid: Grid, arguments: Namespace, progress: Prog
     plain = arguments.plain or grid.mask is not None
     share = 1.0 if plain else 0.8
     solver = SignedHeatSolver(grid, arguments.diffusion, lambda done, step: progress(share * done, step))
-    field: GridField = solver.distance(lines, arguments.constraint)
+    field: GridField = solver.distance(lines, constraint_of(arguments.constraint))
     if plain:
         return field
     progress(share, "sharpen")

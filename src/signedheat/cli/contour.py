@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import Any
 
 from ..fields.grid_field import GridField
 from ..fields.vertex_field import VertexField
@@ -17,31 +16,8 @@ from ..io import (
     write_curves,
     write_polylines,
 )
-from .computing import prefix_errors
+from .computing import Summary, prefix_errors
 from .offset import counts, ensure_offset_writable
-from .options import Summary, add_command, finite
-
-
-def add_to(commands: Any) -> None:
-    """Register the command."""
-    parser = add_command(
-        commands,
-        "contour",
-        run=run,
-        help="surface of equal distance in a field",
-        description="The closed surface, the curves on a surface or the lines in the plane, on which a field takes a "
-        "level.",
-    )
-    parser.add_argument("field", metavar="FIELD", help=".npz .vti .nrrd .npy .vdb")
-    parser.add_argument("level", metavar="LEVEL", type=finite, help="in the units of the field")
-    parser.add_argument(
-        "-o",
-        "--output",
-        required=True,
-        metavar="OUT",
-        help="surface: .stl .obj .ply .off .vtp; of a field on a surface, curves: .obj .txt .json; in the plane, "
-        "lines: .svg .csv",
-    )
 
 
 def run(arguments: Namespace) -> Summary:

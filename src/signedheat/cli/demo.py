@@ -6,7 +6,6 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from ..constraints import ZeroSet
 from ..domains.grid import Grid
 from ..domains.inspection import inspect
 from ..errors import FileFormatError
@@ -14,8 +13,7 @@ from ..io import ensure_writable, save, save_field
 from ..io.files import PathLike, replacing
 from ..samples import broken_duck
 from ..visualization import draw_shape, draw_slices, ensure_picture_writable, new_figure
-from .computing import compute, describe
-from .options import Summary, add_command, whole_number
+from .computing import Summary, compute, describe
 
 DISTANCE = 0.15
 
@@ -23,25 +21,10 @@ DEFAULTS = {
     "as_oriented": False,
     "keep_overlaps": False,
     "plain": False,
-    "constraint": ZeroSet(),
+    "constraint": "zero-set",
     "diffusion": 1.0,
 }
 """What `compute` reads, where the demo has no options."""
-
-
-def add_to(commands: Any) -> None:
-    """Register the command."""
-    parser = add_command(
-        commands,
-        "demo",
-        run=run,
-        help="try it on a broken duck that comes along",
-        description="Make a broken shape, its distance field, an offset surface and a picture.",
-    )
-    parser.add_argument("-o", "--output", default="demo", metavar="FOLDER", help="where to (demo)")
-    parser.add_argument(
-        "--resolution", type=whole_number(8), default=128, metavar="N", help="nodes along the longest side"
-    )
 
 
 def run(arguments: Namespace) -> Summary:

@@ -19,32 +19,9 @@ from ..io.obj import read_obj_lines
 from ..lowering.area_elements import bounds_around
 from ..lowering.grid.discretization import fitting_spacing, memory_estimate
 from ..memory import available_memory
-from .computing import describe, is_planar
+from .computing import Summary, describe
 from .curve_report import as_text, curve_reports
-from .options import Summary, add_command, whole_number
-
-
-def add_to(commands: Any) -> None:
-    """Register the command."""
-    parser = add_command(
-        commands,
-        "info",
-        run=run,
-        help="what a file holds and what is wrong with it",
-        description="Counts, open, nonmanifold and inconsistent edges, degenerate and duplicate elements, bounds; "
-        "which way the parts of a mesh face, doubled walls, bodies within others, sheets, the thinnest wall and gap; "
-        "the memory that grids around a shape take. Of a field: its grid and range.",
-    )
-    parser.add_argument("file", metavar="FILE", help="a shape, polylines in the plane or a field")
-    parser.add_argument("curves", metavar="CURVES", nargs="?", help="curves on the shape: .txt .obj .json")
-    parser.add_argument(
-        "--resolution",
-        type=whole_number(2),
-        nargs="+",
-        default=[64, 128, 256, 512],
-        metavar="N",
-        help="resolutions at which to estimate memory",
-    )
+from .usage.options import is_planar
 
 
 def run(arguments: Namespace) -> Summary:

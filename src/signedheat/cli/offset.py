@@ -8,42 +8,12 @@ from typing import Any
 
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
 from ..visualization import ensure_picture_writable, save_slices
-from .computing import check_grid_options, compute, describe, grid_for, hint, is_planar, prefix_errors, read_source
-from .options import Parser, Summary, add_command, add_grid_options, finite
+from .computing import Summary, compute, describe, grid_for, hint, prefix_errors, read_source
+from .usage.options import is_planar
 
 
-def add_to(commands: Any) -> None:
-    """Register the command."""
-    parser = add_command(
-        commands,
-        "offset",
-        run=lambda arguments: run(parser, arguments),
-        help="closed surfaces at given distances",
-        description="Closed surfaces at given distances from a shape, broken or not; in the plane, lines. Several "
-        "distances make several files: OUT.stl becomes OUT_+0.2.stl, OUT_-0.1.stl.",
-    )
-    parser.usage = "%(prog)s SHAPE DISTANCE [DISTANCE ...] -o OUT [options]"
-    parser.add_argument(
-        "shape",
-        metavar="SHAPE",
-        help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc; in the plane, polylines: .svg .csv",
-    )
-    parser.add_argument(
-        "distances",
-        metavar="DISTANCE",
-        type=finite,
-        nargs="+",
-        help="positive outside, negative inside, 0 the closed shape",
-    )
-    parser.add_argument(
-        "-o", "--output", required=True, metavar="OUT", help="surface: .stl .obj .ply .off .vtp; lines: .svg .csv"
-    )
-    add_grid_options(parser)
-
-
-def run(parser: Parser, arguments: Namespace) -> Summary:
+def run(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute once, contour and write each."""
-    check_grid_options(parser, arguments)
     outputs = output_names(arguments.output, arguments.distances)
     planar = is_planar(arguments.shape)
     for output in outputs:

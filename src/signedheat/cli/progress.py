@@ -7,12 +7,14 @@ import sys
 import time
 from typing import Any
 
+from .streams import say
+
 
 class ProgressBar:
     """A progress callback that draws a bar on standard error."""
 
     def __init__(self, quiet: bool) -> None:
-        self._is_shown = not quiet and sys.stderr.isatty()
+        self._is_shown = not quiet and sys.stderr is not None and sys.stderr.isatty()
         self._begin = time.perf_counter()
 
     def __call__(self, fraction: float, step: str) -> None:
@@ -21,13 +23,11 @@ class ProgressBar:
         width = max(10, min(40, shutil.get_terminal_size().columns - 36))
         full = round(width * min(max(fraction, 0.0), 1.0))
         seconds = time.perf_counter() - self._begin
-        sys.stderr.write(f"\r\x1b[2K{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}")
-        sys.stderr.flush()
+        say(f"\r\x1b[2K{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}", end="")
 
     def __enter__(self) -> ProgressBar:
         return self
 
     def __exit__(self, *_: Any) -> None:
         if self._is_shown:
-            sys.stderr.write("\r\x1b[2K")
-            sys.stderr.flush()
+            say("\r\x1b[2K", end="")

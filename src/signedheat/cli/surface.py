@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints import LevelValues, ZeroSet
 from ..diagnostics import LargeAngles
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
@@ -16,54 +15,8 @@ from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..solver import SignedHeatSolver
 from ..visualization import ensure_picture_writable, save_surface
-from .computing import prefix_errors
-from .options import Parser, Summary, add_command, constraint, finite, positive, whole_number
+from .computing import Summary, constraint_of, prefix_errors
 from .progress import ProgressBar
-
-
-def add_to(commands: Any) -> None:
-    """Register the command."""
-    parser = add_command(
-        commands,
-        "surface",
-        run=lambda arguments: run(parser, arguments),
-        help="signed distance to curves on a surface",
-        description="Signed distance on a mesh, a point cloud or the boundary of a set of voxels to curves, broken or "
-        "not, and to points on it.",
-    )
-    add_curves_and_output(parser, "field: .ply .vtp .obj .npz")
-    parser.add_argument(
-        "--contours", type=whole_number(1), metavar="N", help="write N isolines beside the output, as OUT.contours.obj"
-    )
-    parser.add_argument("--preview", metavar="PNG", help="draw the result")
-
-
-def add_curves_and_output(parser: Parser, output: str) -> None:
-    """Add the arguments of a distance to curves on a surface, and of its output."""
-    parser.add_argument(
-        "mesh", metavar="MESH", help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti"
-    )
-    parser.add_argument("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json .csv")
-    parser.add_argument("-o", "--output", required=True, metavar="OUT", help=output)
-    parser.add_argument(
-        "--constraint",
-        type=surface_constraint,
-        default=ZeroSet(),
-        metavar="C",
-        help="free, zero-set (default), hard, each-component, soft:WEIGHT, or levels:V,V,…, one for each curve",
-    )
-    parser.add_argument(
-        "--diffusion",
-        type=positive,
-        default=1.0,
-        metavar="T",
-        help="diffusion time in squared spacings (1); larger values close gaps more roundly",
-    )
-    parser.add_argument(
-        "--intrinsic",
-        action="store_true",
-        help="measure on better triangles of the same surface: for meshes with large angles, curves across faces",
-    )
 
 
 def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
@@ -78,7 +31,7 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
     curves = read_curves(arguments.curves, surface)
     with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
         solver = SignedHeatSolver(surface, arguments.diffusion, progress, arguments.intrinsic)
-        field = solver.distance(curves, arguments.constraint)
+        field = solver.distance(curves, constraint_of(arguments.constraint))
     return surface, curves, field
 
 
@@ -88,7 +41,7 @@ def advice(field: VertexField) -> str:
     return f"; {note}: --intrinsic is more accurate" if note else ""
 
 
-def run(parser: Parser, arguments: Namespace) -> Summary:
+def run(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute, write."""
     ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
     if arguments.preview:
@@ -129,11 +82,3 @@ def read_surface(path: str) -> Any:
             path=path,
         )
     return surface
-
-
-def surface_constraint(word: str) -> Any:
-    """A constraint from its name on the command line; on surfaces also given levels."""
-    name, _, values = word.partition(":")
-    if name == "levels":
-        return LevelValues([finite(value) for value in values.split(",")])
-    return constraint(word, with_numbers="soft:WEIGHT, levels:V,V,…")

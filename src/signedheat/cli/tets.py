@@ -15,20 +15,15 @@ from ..io import ensure_writable, read
 from ..io.tets import TET_FIELD_FORMATS
 from ..packages import require
 from ..visualization import ensure_picture_writable, save_slices
-from .computing import compute, describe, prefix_errors
-from .options import Parser, Summary
+from .computing import Summary, compute, describe, prefix_errors
 
 RESOLUTION = 32
 PREVIEW_NODES = 64
 
 
-def run(parser: Parser, arguments: Namespace) -> Summary:
+def run(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, write."""
-    if any(x is not None for x in (arguments.spacing, arguments.origin, arguments.grid_shape, arguments.mask)):
-        parser.error("--spacing, --origin, --shape and --mask are for grids, and do not go with --tets")
     given = arguments.tets
-    if given and (arguments.resolution is not None or arguments.padding is not None):
-        parser.error("--resolution and --padding do not go with a mesh of your own")
     ensure_writable(arguments.output, TET_FIELD_FORMATS, "a field on tets")
     require("meshio", "fields on tets")
     if arguments.preview:

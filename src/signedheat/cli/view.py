@@ -15,23 +15,8 @@ from ..io import FIELD_FORMATS, load_field, read
 from ..io.files import extension
 from ..io.tets import TET_FIELD_FORMATS
 from ..visualization import ensure_picture_writable, save_scene, save_slices, save_surface
-from .computing import prefix_errors
-from .options import Summary, add_command
+from .computing import Summary, prefix_errors
 from .tets import on_grid
-
-
-def add_to(commands: Any) -> None:
-    """Register the command."""
-    parser = add_command(
-        commands,
-        "view",
-        run=run,
-        help="picture of a shape or a field",
-        description="Slices through a field; a shape in perspective, outsides yellow, insides red.",
-    )
-    parser.add_argument("file", metavar="FILE", help="a shape or a field")
-    parser.add_argument("--up", choices="xyz", default="z", help="axis that points upwards (default: z)")
-    parser.add_argument("-o", "--output", required=True, metavar="PNG", help="picture: .png .pdf .svg .jpg")
 
 
 def run(arguments: Namespace) -> Summary:

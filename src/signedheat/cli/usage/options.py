@@ -1,18 +1,20 @@
-"""Options that several commands share, and their conversion to numbers and constraints."""
+"""Options that several commands share, and the forms that their values must have."""
 
 from __future__ import annotations
 
 import argparse
 import math
 import re
-import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NoReturn
 
-from ..constraints import Constraint, EachComponent, Free, Soft, ZeroSet
+from ..streams import say, tell
 
-Summary = tuple[dict[str, Any], str]
-"""The result of a command: a dictionary for ``--json``, and text."""
+PLANAR = (".csv", ".svg")
+"""Extensions of files with polylines in the plane."""
+CONSTRAINTS = ("free", "zero-set", "hard", "each-component")
+"""Names of the constraints that have no number."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -24,14 +26,17 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Exit with status 2."""
-        print(f"{self.prog}: {message} (see {self.prog} --help)", file=sys.stderr)
+        say(f"{self.prog}: {message} (see {self.prog} --help)")
         raise SystemExit(2)
 
+    def _print_message(self, message: str, file: object = None) -> None:
+        tell(message.rstrip("\n"))  # help and version, the only messages that are no errors
 
-def add_command(commands: Any, name: str, run: Callable[..., Summary], help: str, description: str) -> Parser:
-    """Add a command with the options that all commands have."""
+
+def add_command(commands: Any, name: str, help: str, description: str) -> Parser:
+    """Add a command with the options that all commands have. The module of its name, one folder up, runs it."""
     parser = commands.add_parser(name, help=help, description=description)
-    parser.set_defaults(run=run)
+    parser.set_defaults(command=name, parser=parser, check=None)
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return parser
@@ -67,7 +72,7 @@ def add_grid_options(parser: Parser) -> None:
     method.add_argument(
         "--constraint",
         type=constraint,
-        default=ZeroSet(),
+        default="zero-set",
         metavar="C",
         help="free, zero-set (default), hard, each-component, or soft:WEIGHT",
     )
@@ -89,15 +94,14 @@ def add_step_options(parser: Parser) -> None:
     )
 
 
-def constraint(word: str, with_numbers: str = "soft:WEIGHT") -> Constraint:
-    """A constraint from its name on the command line; messages also name those `with_numbers`."""
+def constraint(word: str, with_numbers: str = "soft:WEIGHT") -> str:
+    """The name of a constraint, with its number if it has one; messages also name those `with_numbers`."""
     name, _, weight = word.partition(":")
-    known = {"free": Free(), "zero-set": ZeroSet(), "hard": ZeroSet(hard=True), "each-component": EachComponent()}
     if name == "soft":
-        return Soft(positive(weight))
-    if word not in known:
-        raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(known)}, {with_numbers}")
-    return known[word]
+        positive(weight)
+    elif word not in CONSTRAINTS:
+        raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(CONSTRAINTS)}, {with_numbers}")
+    return word
 
 
 def finite(word: str) -> float:
@@ -136,3 +140,31 @@ def whole_number(least: int) -> Callable[[str], int]:
         return int(word)
 
     return parse
+
+
+def is_planar(path: Any) -> bool:
+    """Whether a file holds polylines in the plane."""
+    return Path(path).suffix.lower() in PLANAR
+
+
+def check_grid_options(arguments: argparse.Namespace) -> None:
+    """Reject options that contradict each other."""
+    parser = arguments.parser
+    own = arguments.origin is not None or arguments.grid_shape is not None
+    spacing = arguments.spacing
+    dimension = 2 if is_planar(arguments.shape) else 3
+    if spacing is not None and len(spacing) not in (1, dimension):
+        parser.error(f"argument --spacing: one number or {dimension}, not {len(spacing)}")
+    for name, numbers in (("--origin", arguments.origin), ("--shape", arguments.grid_shape)):
+        if numbers is not None and len(numbers) != dimension:
+            parser.error(f"argument {name}: {dimension} numbers, not {len(numbers)}")
+    if arguments.mask is not None:
+        if any(given is not None for given in (arguments.resolution, arguments.padding, arguments.grid_shape)):
+            parser.error("--resolution, --padding and --shape do not go with --mask, whose nodes are the grid's")
+        return
+    if own and (arguments.origin is None or arguments.grid_shape is None or spacing is None):
+        parser.error("a grid of your own needs all of --origin, --spacing and --shape")
+    if own and (arguments.resolution is not None or arguments.padding is not None):
+        parser.error("--resolution and --padding do not go with --origin and --shape")
+    if spacing is not None and arguments.resolution is not None:
+        parser.error("--resolution does not go with --spacing: give one of them")

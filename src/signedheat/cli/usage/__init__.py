@@ -1,0 +1,27 @@
+"""What the command line takes: one module per command, each with `add_to(commands)`.
+
+Nothing here imports NumPy or the rest of the package, so that help and errors of usage come at once. A command is run
+by the module of the same name one folder up.
+"""
+
+from __future__ import annotations
+
+from ... import __version__
+from . import close, contour, demo, info, morph, offset, surface, view, volume
+from .options import Parser
+
+COMMANDS = (volume, surface, close, offset, contour, morph, info, view, demo)
+
+
+def parser() -> Parser:
+    """The parser of the whole command line."""
+    whole = Parser(
+        prog="signedheat",
+        description="Generalized signed distance to broken geometry: negative inside, positive outside, "
+        "in the units of the file.",
+    )
+    whole.add_argument("--version", action="version", version=f"signedheat {__version__}")
+    commands = whole.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
+    for command in COMMANDS:
+        command.add_to(commands)
+    return whole

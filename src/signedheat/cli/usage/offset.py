@@ -1,0 +1,36 @@
+"""``signedheat offset``: closed surfaces at given distances from a broken shape."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .options import add_command, add_grid_options, check_grid_options, finite
+
+
+def add_to(commands: Any) -> None:
+    """Register the command."""
+    parser = add_command(
+        commands,
+        "offset",
+        help="closed surfaces at given distances",
+        description="Closed surfaces at given distances from a shape, broken or not; in the plane, lines. Several "
+        "distances make several files: OUT.stl becomes OUT_+0.2.stl, OUT_-0.1.stl.",
+    )
+    parser.usage = "%(prog)s SHAPE DISTANCE [DISTANCE ...] -o OUT [options]"
+    parser.add_argument(
+        "shape",
+        metavar="SHAPE",
+        help="surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc; in the plane, polylines: .svg .csv",
+    )
+    parser.add_argument(
+        "distances",
+        metavar="DISTANCE",
+        type=finite,
+        nargs="+",
+        help="positive outside, negative inside, 0 the closed shape",
+    )
+    parser.add_argument(
+        "-o", "--output", required=True, metavar="OUT", help="surface: .stl .obj .ply .off .vtp; lines: .svg .csv"
+    )
+    add_grid_options(parser)
+    parser.set_defaults(check=check_grid_options)

@@ -1,0 +1,61 @@
+"""``signedheat surface``: signed distance to curves on a surface, at its vertices."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .options import Parser, add_command, constraint, finite, positive, whole_number
+
+
+def add_to(commands: Any) -> None:
+    """Register the command."""
+    parser = add_command(
+        commands,
+        "surface",
+        help="signed distance to curves on a surface",
+        description="Signed distance on a mesh, a point cloud or the boundary of a set of voxels to curves, broken or "
+        "not, and to points on it.",
+    )
+    add_curves_and_output(parser, "field: .ply .vtp .obj .npz")
+    parser.add_argument(
+        "--contours", type=whole_number(1), metavar="N", help="write N isolines beside the output, as OUT.contours.obj"
+    )
+    parser.add_argument("--preview", metavar="PNG", help="draw the result")
+
+
+def add_curves_and_output(parser: Parser, output: str) -> None:
+    """Add the arguments of a distance to curves on a surface, and of its output."""
+    parser.add_argument(
+        "mesh", metavar="MESH", help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti"
+    )
+    parser.add_argument("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json .csv")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT", help=output)
+    parser.add_argument(
+        "--constraint",
+        type=surface_constraint,
+        default="zero-set",
+        metavar="C",
+        help="free, zero-set (default), hard, each-component, soft:WEIGHT, or levels:V,V,…, one for each curve",
+    )
+    parser.add_argument(
+        "--diffusion",
+        type=positive,
+        default=1.0,
+        metavar="T",
+        help="diffusion time in squared spacings (1); larger values close gaps more roundly",
+    )
+    parser.add_argument(
+        "--intrinsic",
+        action="store_true",
+        help="measure on better triangles of the same surface: for meshes with large angles, curves across faces",
+    )
+
+
+def surface_constraint(word: str) -> str:
+    """The name of a constraint, with its numbers; on surfaces also given levels."""
+    name, _, values = word.partition(":")
+    if name == "levels":
+        for value in values.split(","):
+            finite(value)
+        return word
+    return constraint(word, with_numbers="soft:WEIGHT, levels:V,V,…")

@@ -1,0 +1,118 @@
+"""The public names, all of which importing this module imports; `signedheat` does when one is first asked for."""
+
+from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
+from .diagnostics import Diagnostics
+from .domains.curves import Curve, SurfacePoints
+from .domains.digital_surface import DigitalSurface
+from .domains.foreign import as_shape
+from .domains.grid import Grid
+from .domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
+from .domains.point_cloud import PointCloud
+from .domains.polygon_mesh import PolygonMesh
+from .domains.polyline import Polyline
+from .domains.tet_mesh import TetMesh
+from .domains.triangle_mesh import TriangleMesh
+from .errors import (
+    ConstraintError,
+    FactorizationError,
+    FileFormatError,
+    GeometryError,
+    MemoryLimitError,
+    MissingPackageError,
+    OutsideError,
+    SignedHeatError,
+    SourceError,
+    UnreachedWarning,
+    UnsupportedTypeError,
+)
+from .extensions.close_curves import close_curves
+from .extensions.common_subdivision import common_subdivision
+from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
+from .extensions.orientation import Orientation, orient, orientation
+from .extensions.piecewise import piecewise_distance
+from .extensions.sharpening import sharpen
+from .extensions.sharpening_methods import Convex, Geodesic
+from .extensions.solid_distance import solid_distance
+from .extensions.tetrahedralize import tetrahedralize
+from .extensions.uniting import unite
+from .fields.grid_field import GridField
+from .fields.piecewise_field import PiecewiseField
+from .fields.tet_field import TetField
+from .fields.vertex_field import VertexField
+from .io import (
+    load_field,
+    read,
+    read_curves,
+    read_mask,
+    read_polylines,
+    read_volume,
+    save,
+    write_curves,
+    write_polylines,
+)
+from .solver import SignedHeatSolver, signed_distance
+
+__all__ = [
+    "ConstraintError",
+    "Convex",
+    "Curve",
+    "Diagnostics",
+    "DigitalSurface",
+    "EachComponent",
+    "FactorizationError",
+    "FileFormatError",
+    "Free",
+    "Geodesic",
+    "GeometryError",
+    "Grid",
+    "GridField",
+    "IntrinsicTriangulation",
+    "LevelValues",
+    "MemoryLimitError",
+    "MissingPackageError",
+    "Orientation",
+    "OutsideError",
+    "PiecewiseField",
+    "PointCloud",
+    "PolygonMesh",
+    "Polyline",
+    "SignedHeatError",
+    "SignedHeatSolver",
+    "Soft",
+    "SourceError",
+    "SurfacePoints",
+    "TetField",
+    "TetMesh",
+    "TriangleMesh",
+    "UnreachedWarning",
+    "UnsupportedTypeError",
+    "VertexField",
+    "ZeroSet",
+    "as_shape",
+    "close_curves",
+    "closing",
+    "common_subdivision",
+    "dilate",
+    "erode",
+    "intrinsic_delaunay",
+    "load_field",
+    "opening",
+    "orient",
+    "orientation",
+    "piecewise_distance",
+    "read",
+    "read_curves",
+    "read_mask",
+    "read_polylines",
+    "read_volume",
+    "save",
+    "sharpen",
+    "shell",
+    "signed_distance",
+    "solid_distance",
+    "tetrahedralize",
+    "thicken",
+    "unite",
+    "write_curves",
+    "write_polylines",
+]

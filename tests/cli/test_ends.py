@@ -1,0 +1,138 @@
+"""However a command ends: one line, a status that tells why, and no traceback."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.cli import info, main
+from signedheat.cli.usage.options import PLANAR
+from signedheat.io import POLYLINE_FORMATS
+
+COMMAND = [sys.executable, "-m", "signedheat.cli"]
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    path = tmp_path_factory.mktemp("ends") / "bäll.stl"
+    sh.save(samples.sphere(2), path)
+    return path
+
+
+def run(*arguments, **options):
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "timeout": 100, **options}
+    return subprocess.run([*COMMAND, *map(str, arguments)], text=True, **options)
+
+
+def assert_one_line(text):
+    assert text.startswith("signedheat") and text.count("\n") == 1 and "Traceback" not in text
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["volume", "--help"], ["morph", "shell", "a", "1"]])
+def test_help_and_bad_usage_come_before_anything_is_imported(arguments):
+    code = "import sys, signedheat.cli as cli; status = cli.main(sys.argv[1:]); print(status, 'numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=100)
+    status = 2 if "morph" in arguments else 0
+    assert done.stdout.splitlines()[-1] == f"{status} False", done.stderr
+
+
+def test_usage_knows_the_formats_of_polylines():
+    assert set(PLANAR) == POLYLINE_FORMATS
+
+
+def test_output_that_cannot_hold_the_text(ball, tmp_path):
+    done = run("volume", ball, "-o", tmp_path / "phi.npz", "--resolution", 6, env={**os.environ, "LC_ALL": "C",
+               "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"})  # fmt: skip
+    assert done.returncode == 0 and "6 x 6 x 6 nodes" in done.stdout and "phi from" in done.stdout, done.stderr
+    assert (tmp_path / "phi.npz").exists()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+@pytest.mark.parametrize("json", [[], ["--json"]])
+def test_full_output(ball, json):
+    with open("/dev/full", "w") as full:
+        done = run("info", ball, *json, stdout=full)
+    assert done.returncode == 1
+    assert_one_line(done.stderr)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="closes file descriptors")
+def test_closed_output_and_errors(ball):
+    done = run("info", ball, stdout=None, preexec_fn=lambda: os.close(1))
+    assert done.returncode == 1
+    assert_one_line(done.stderr)
+    assert run("info", ball, "--quiet", stdout=None, preexec_fn=lambda: os.close(1)).returncode == 0
+    assert run("info", "nowhere.stl", stderr=None, preexec_fn=lambda: os.close(2)).returncode == 1
+
+
+def test_a_reader_that_has_read_enough(ball):
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = run("info", ball, stdout=writing)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("error", [KeyError("x"), RecursionError("deep\ndown"), AttributeError("no 'x'")])
+def test_what_nobody_expected_is_called_a_bug(ball, capsys, monkeypatch, error):
+    def fail(path):
+        raise error
+
+    monkeypatch.setattr(info, "read", fail)
+    assert main(["info", str(ball)]) == 70
+    told = capsys.readouterr().err
+    assert_one_line(told)
+    assert type(error).__name__ in told and "test_ends.py" in told and sh.__version__ in told
+    monkeypatch.setenv("SIGNEDHEAT_TRACEBACK", "1")
+    with pytest.raises(type(error)):
+        main(["info", str(ball)])
+
+
+@pytest.mark.parametrize("error", [MemoryError(), OSError(28, "No space left on device"), UserWarning("it\nis odd")])
+def test_what_is_due_to_the_system_is_told(ball, capsys, monkeypatch, error):
+    def fail(path):
+        raise error
+
+    monkeypatch.setattr(info, "read", fail)
+    assert main(["info", str(ball)]) == 1
+    assert_one_line(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_stop_with_one_line_whatever_becomes_of_them(ball, capsys, monkeypatch, number):
+    def stopped(path):
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(5)
+        except BaseException:
+            raise ImportError("as some packages do") from None
+
+    monkeypatch.setattr(info, "read", stopped)
+    before = signal.getsignal(number)
+    assert main(["info", str(ball)]) == 128 + number
+    assert_one_line(capsys.readouterr().err)
+    assert signal.getsignal(number) is before
+
+
+def test_names_that_are_no_text(tmp_path):
+    name = os.fsdecode(b"b\xe4ll.stl")
+    done = run("info", name, cwd=tmp_path)
+    assert done.returncode == 1
+    assert_one_line(done.stderr)
+
+
+def test_streams_without_a_file(monkeypatch, ball):
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    assert main(["info", str(ball), "--json"]) == 0
+    assert sys.stdout.getvalue().startswith("{")
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "stderr", None)
+    assert main(["info", str(ball)]) == 1
