@@ -40,7 +40,8 @@ def draw(path: Path) -> None:
     level = [len(FLOORS) - 1 - k for k in range(len(FLOORS))]
     for (names, what, color), y in zip(FLOORS, level, strict=True):
         axes.add_patch(_box(0.75, y + 0.06, 7.1, 0.86, color))
-        axes.text(0.95, y + 0.62, names, family="monospace", size=11.5, weight="bold", va="center")
+        size = min(11.5, 780 / len(names))  # that it fits into the box
+        axes.text(0.95, y + 0.62, names, family="monospace", size=size, weight="bold", va="center")
         axes.text(0.95, y + 0.28, what, size=9.5, va="center", color="#333333")
     axes.annotate("", (0.4, 0.1), (0.4, len(FLOORS) - 0.1), arrowprops={"arrowstyle": "-|>", "lw": 1.8})
     axes.text(0.16, len(FLOORS) / 2, "imports point down", rotation=90, va="center", ha="center", size=10)
