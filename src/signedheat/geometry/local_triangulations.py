@@ -65,12 +65,12 @@ def local_triangulations(
     [[0, 1, 2], [0, 2, 3]]
     """
     axes, neighbors, reach = tangent_planes(points, n_neighbors)
-    candidates, votes = offers(points, axes, neighbors, reach)
-    candidates, votes, circumradii = plausible(points, candidates, votes, reach)
+    candidates, votes = proposed_triangles(points, axes, neighbors, reach)
+    candidates, votes, circumradii = well_shaped_triangles(points, candidates, votes, reach)
     axis = axes[:, 2]
     if len(candidates) == 0:
         return LocalTriangulations(candidates, axis)
-    faces = agreed(points, axes, candidates[np.lexsort((circumradii, -votes))])
+    faces = nonoverlapping_triangles(points, axes, candidates[np.lexsort((circumradii, -votes))])
     oriented = axis * aligned(points, axis, faces, normals)[:, None]
     faces = facing(points, oriented, faces)
     return LocalTriangulations(np.concatenate([faces, hole_fillings(points, oriented, faces)]), oriented)
@@ -105,7 +105,7 @@ def principal_axes(offsets: NDArray[np.float64], distances: NDArray[np.float64])
     return np.stack([first, second, np.cross(first, second)], axis=1)
 
 
-def offers(
+def proposed_triangles(
     points: NDArray[np.float64], axes: NDArray[np.float64], neighbors: NDArray[np.int64], reach: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(m, 3) triangles of all local triangulations, each once, corners in increasing order; (m,) votes for each."""
@@ -130,7 +130,7 @@ def offers(
     return ranked[first], np.bincount(np.cumsum(first) - 1)
 
 
-def plausible(
+def well_shaped_triangles(
     points: NDArray[np.float64], triangles: NDArray[np.int64], votes: NDArray[np.int64], reach: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """Triangles with area whose circumradius is within the reach of all their corners; their votes, and the radii."""
@@ -144,7 +144,9 @@ def plausible(
     return triangles[keep], votes[keep], product[keep] / (2 * twice_area[keep])
 
 
-def agreed(points: NDArray[np.float64], axes: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+def nonoverlapping_triangles(
+    points: NDArray[np.float64], axes: NDArray[np.float64], triangles: NDArray[np.int64]
+) -> NDArray[np.int64]:
     """The triangles, in the given order, that overlap no earlier one around any of their corners.
 
     Two triangles overlap if the sectors that they occupy in the tangent plane of a common corner do.
