@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from concurrent.futures import Future, TimeoutError
+from concurrent.futures import Future, ThreadPoolExecutor, TimeoutError
 from threading import Thread
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 INTERVAL = 0.1
 """Seconds between two progress reports."""
+CHUNK = 1 << 16
+"""Rows that a thread works on at a time."""
 
 
 def n_threads() -> int:
@@ -17,6 +22,37 @@ def n_threads() -> int:
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
     wanted = os.environ.get("NUMBA_NUM_THREADS", "")
     return min(available, int(wanted)) if wanted.isdigit() and int(wanted) > 0 else available
+
+
+def in_chunks(
+    function: Callable[[NDArray[np.float64]], tuple[NDArray[Any], ...]], rows: NDArray[np.float64]
+) -> tuple[NDArray[Any], ...]:
+    """Apply a function to chunks of rows on all threads, and put its arrays together again.
+
+    Memory beyond that of the result is that of a chunk for each thread. Chunks do not depend on the number of threads,
+    so neither does the result.
+
+    Examples
+    --------
+    >>> in_chunks(lambda x: (x.sum(axis=1), x > 1), np.array([[1.0, 2.0], [3.0, 0.0]]))
+    (array([3., 3.]), array([[False,  True],
+           [ True, False]]))
+    """
+    if len(rows) <= CHUNK:
+        return function(rows)
+    first = function(rows[:CHUNK])
+    results = tuple(np.empty((len(rows), *part.shape[1:]), dtype=part.dtype) for part in first)
+
+    def fill(start: int, parts: tuple[NDArray[Any], ...]) -> None:
+        for result, part in zip(results, parts, strict=True):
+            result[start : start + len(part)] = part
+
+    fill(0, first)
+    with ThreadPoolExecutor(n_threads()) as pool:
+        starts = range(CHUNK, len(rows), CHUNK)
+        for job in [pool.submit(lambda k: fill(k, function(rows[k : k + CHUNK])), start) for start in starts]:
+            job.result()
+    return results
 
 
 def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:

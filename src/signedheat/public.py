@@ -30,6 +30,7 @@ from .extensions.common_subdivision import common_subdivision
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.orientation import Orientation, orient, orientation
 from .extensions.piecewise import piecewise_distance
+from .extensions.sampling import Samples, sample
 from .extensions.sharpening import sharpen
 from .extensions.sharpening_methods import Convex, Geodesic
 from .extensions.solid_distance import solid_distance
@@ -76,6 +77,7 @@ __all__ = [
     "PointCloud",
     "PolygonMesh",
     "Polyline",
+    "Samples",
     "SignedHeatError",
     "SignedHeatSolver",
     "Soft",
@@ -105,6 +107,7 @@ __all__ = [
     "read_mask",
     "read_polylines",
     "read_volume",
+    "sample",
     "save",
     "sharpen",
     "shell",

@@ -15,10 +15,12 @@ from ..diagnostics import Diagnostics
 from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import GeometryError, OutsideError
+from ..errors import GeometryError, OutsideError, SourceError
 from ..frozen import Frozen
 from ..geometry.marching import closed_surface, level_lines
 from ..operators.grid.exact_surface import ExactSurface
+from ..parallel import in_chunks
+from .closest_points import ClosestPoints, closest_points
 from .files import save_field
 
 
@@ -89,14 +91,9 @@ class GridField(Frozen, Generic[Dimension]):
         (n,) float, or one float
             Signed distances, interpolated from the nodes around that have a value; NaN where none has one.
         """
-        points, inside = self._into_box(points)
-        values = self._interpolate(inside)
-        away = points - inside
-        outside = np.flatnonzero(away.any(axis=-1))
-        if len(outside):
-            slopes = self._slopes(inside[outside])
-            values[outside] += np.einsum("ij,ij->i", slopes, away[outside])
-        return values.reshape(points.shape[:-1]) if points.ndim == 2 else values[0]
+        points = self._checked(points)
+        (values,) = in_chunks(self._values_at, points.reshape(-1, self.grid.dimension))
+        return values.reshape(points.shape[:-1]) if points.ndim > 1 else values[0]
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """∇φ at points in space: central differences of the nodes, interpolated.
@@ -113,8 +110,50 @@ class GridField(Frozen, Generic[Dimension]):
         (n, d) float
             Gradients; of length about 1, since φ is a distance.
         """
-        _, inside = self._into_box(points)
-        return self._slopes(inside)
+        points = np.atleast_2d(self._checked(points))
+        (slopes,) = in_chunks(lambda chunk: (self._slopes(self._into_box(chunk)),), points)
+        return slopes
+
+    def closest_points(self, points: ArrayLike) -> ClosestPoints:
+        """The nearest place of the surface itself for points in space, and exact distances to it.
+
+        Unlike those of a call, distances are not interpolated between nodes. The surface is that which the field was
+        sharpened to: the faces where they are there, φ's zero set where they are missing. Takes time O(n log m) for n
+        points and m faces, on all threads, and little memory beside that of the result; what it needs to know of the
+        surface is prepared at the first call.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Positions, in the units of the grid; they may lie outside of it.
+
+        Returns
+        -------
+        ClosestPoints
+            Places, signed distances, gradients, and whether the place is one that had to be completed.
+
+        Raises
+        ------
+        SourceError
+            If the field does not know its surface: it was read from a file, or not sharpened to a shape.
+        GeometryError
+            If a point is not finite.
+
+        Examples
+        --------
+        >>> from signedheat import TriangleMesh, solid_distance
+        >>> faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+        >>> field = solid_distance(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces), resolution=16)
+        >>> closest = field.closest_points([[0.3, 0.2, -0.5]])
+        >>> closest.points.round(6).tolist(), closest.distances.tolist(), closest.gradients.tolist()
+        ([[0.3, 0.2, 0.0]], [0.5], [[0.0, 0.0, -1.0]])
+        """
+        if self.surface is None:
+            raise SourceError(
+                "the field does not know the surface that it is the distance to",
+                remedy="take it from solid_distance or sharpen(field, shape), not from a file",
+            )
+        return closest_points(self.surface, np.atleast_2d(self._checked(points)), self)
 
     @property
     def domain(self) -> Grid[Dimension]:
@@ -209,26 +248,41 @@ class GridField(Frozen, Generic[Dimension]):
     def _walls(self, axis: int) -> NDArray[np.float64]:
         return self.values.take([0, -1], axis=axis)
 
-    def _into_box(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        points = np.asarray(points, dtype=np.float64)
+    def _checked(self, points: ArrayLike) -> NDArray[np.float64]:
+        points = np.ascontiguousarray(points, dtype=np.float64)
         if points.shape[-1:] != (self.grid.dimension,) or not np.isfinite(points).all():
             raise GeometryError(f"points must be finite, with {self.grid.dimension} coordinates each", element="points")
-        return points, np.clip(np.atleast_2d(points), self.grid.origin, self.grid.upper)
+        return points
+
+    def _into_box(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.clip(points, self.grid.origin, self.grid.upper)
+
+    def _values_at(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+        """φ at (n, d) points, within the box and outside of it."""
+        inside = self._into_box(points)
+        values = self._interpolate(inside)
+        away = points - inside
+        outside = np.flatnonzero(away.any(axis=-1))
+        if len(outside):
+            slopes = self._slopes(inside[outside])
+            values[outside] += np.einsum("ij,ij->i", slopes, away[outside])
+        return (values,)
 
     def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         index = ((points - self.grid.origin) / self.grid.spacing).T
         if self._known is None:
             result: NDArray[np.float64] = scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
             return result
-        sums = scipy.ndimage.map_coordinates(np.where(self._known, self.values, 0.0), index, order=1, mode="nearest")
-        weights = scipy.ndimage.map_coordinates(self._known.astype(np.float64), index, order=1, mode="nearest")
+        filled, known = self._known
+        sums = scipy.ndimage.map_coordinates(filled, index, order=1, mode="nearest")
+        weights = scipy.ndimage.map_coordinates(known, index, order=1, mode="nearest")
         return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
 
     @cached_property
-    def _known(self) -> NDArray[np.bool_] | None:
-        """Nodes with a value, or None if all have one."""
+    def _known(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Values with 0 where there is none, and 1 where there is one, else 0; or None if all nodes have one."""
         known = ~np.isnan(self.values)
-        return None if known.all() else known
+        return None if known.all() else (np.where(known, self.values, 0.0), known.astype(np.float64))
 
     def _slopes(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Central differences of the interpolant, which are those at the nodes, interpolated."""

@@ -25,7 +25,7 @@ def nearest_on_triangles(
     return _nearest(np.ascontiguousarray(triangles), tree.bounds, tree.items, points)
 
 
-@compiled
+@compiled(nogil=True)
 def _nearest(triangles, bounds, items, points):
     found = np.zeros(len(points), dtype=np.int64)
     weights = np.zeros((len(points), 3))

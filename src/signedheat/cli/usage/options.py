@@ -44,12 +44,7 @@ def add_command(commands: Any, name: str, help: str, description: str) -> Parser
 
 def add_grid_options(parser: Parser) -> None:
     """Add the options of the grid and of the computation."""
-    grid = parser.add_argument_group("grid (by default around the shape)")
-    grid.add_argument("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side (128)")
-    grid.add_argument(
-        "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each axis"
-    )
-    grid.add_argument("--padding", type=not_negative, metavar="P", help="room around the shape, in its units")
+    grid = add_room_options(parser)
     grid.add_argument(
         "--origin", type=finite, nargs="+", metavar="X", help="first node of a grid of your own: X Y Z, or X Y"
     )
@@ -68,6 +63,31 @@ def add_grid_options(parser: Parser) -> None:
         "not 0; in the plane also .png .bmp .tif, solid where dark",
     )
     add_step_options(parser)
+    add_method_options(parser)
+    parser.add_argument("--preview", metavar="PNG", help="draw the result: in space, three slices")
+
+
+def add_room_options(parser: Parser) -> argparse._ArgumentGroup:
+    """Add the options of a grid around a shape."""
+    grid = parser.add_argument_group("grid (by default around the shape)")
+    grid.add_argument("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side (128)")
+    grid.add_argument(
+        "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each axis"
+    )
+    grid.add_argument("--padding", type=not_negative, metavar="P", help="room around the shape, in its units")
+    return grid
+
+
+def add_solid_options(parser: Parser) -> None:
+    """Add the options of distance to a solid on a grid around it, of which nothing but the solid is wanted."""
+    add_room_options(parser)
+    add_repair_options(parser)
+    add_method_options(parser)
+    parser.set_defaults(origin=None, grid_shape=None, mask=None, preview=None, plain=False)
+
+
+def add_method_options(parser: Parser) -> None:
+    """Add the options of the method itself."""
     method = parser.add_argument_group("method")
     method.add_argument(
         "--constraint",
@@ -79,19 +99,24 @@ def add_grid_options(parser: Parser) -> None:
     method.add_argument(
         "--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"
     )
-    parser.add_argument("--preview", metavar="PNG", help="draw the result: in space, three slices")
 
 
 def add_step_options(parser: Parser) -> None:
-    """Which of the steps that are taken by default are left out."""
-    steps = parser.add_argument_group("steps (all taken by default)")
-    steps.add_argument("--as-oriented", action="store_true", help="turn no face and no normal: take them as given")
-    steps.add_argument("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface")
+    """Add the options that leave out steps which are taken by default."""
+    steps = add_repair_options(parser)
     steps.add_argument(
         "--plain",
         action="store_true",
         help="the method's own field, not measured to the shape itself",
     )
+
+
+def add_repair_options(parser: Parser) -> argparse._ArgumentGroup:
+    """Add the options that take a shape as it is."""
+    steps = parser.add_argument_group("steps (all taken by default)")
+    steps.add_argument("--as-oriented", action="store_true", help="turn no face and no normal: take them as given")
+    steps.add_argument("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface")
+    return steps
 
 
 def constraint(word: str, with_numbers: str = "soft:WEIGHT") -> str:
@@ -128,6 +153,14 @@ def not_negative(word: str) -> float:
     value = finite(word)
     if value < 0:
         raise argparse.ArgumentTypeError(f"{word} is negative")
+    return value
+
+
+def fraction(word: str) -> float:
+    """A number from 0 to 1."""
+    value = not_negative(word)
+    if value > 1:
+        raise argparse.ArgumentTypeError(f"{word} is more than 1")
     return value
 
 

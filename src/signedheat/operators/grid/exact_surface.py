@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 from ...frozen import Frozen
-from ...geometry.box_tree import BoxTree
+from ...geometry.box_tree import BoxTree, morton_codes
 from ...geometry.face_features import FaceFeatures
 from ...geometry.nearest import nearest_on_triangles
 from ...geometry.nearest_faces import search_from
+from ...parallel import in_chunks
 from .closest_points import distances_to_crossings
 
 CLOSE = 1e-3
@@ -22,6 +24,33 @@ ROUNDS = 10
 """Times a point is moved at most."""
 CLEARANCE = 1e-3
 """Fraction of a cell that points of a level keep from the nodes."""
+_BENDING = ((0, 0, 10), (1, 0, 12), (1, 1, 13), (2, 0, 15), (2, 1, 16), (2, 2, 17))
+"""Row, column and place among the numbers of a crossing of its shape operator in space."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePlaces:
+    """What of a surface is nearest to each of some points.
+
+    Attributes
+    ----------
+    distances : (n,) float
+        To it, without a sign.
+    feet : (n, 3) float
+        The nearest place, around the origin of the surface.
+    directions : (n, 3) float
+        Unit vectors from there to the point; where distance is 0, normals.
+    sides : (n,) float
+        −1 behind, 1 in front of a face that tells the side; 0 where none does.
+    completed : (n,) bool
+        Whether the nearest place is on the zero set, where there are no faces.
+    """
+
+    distances: NDArray[np.float64]
+    feet: NDArray[np.float64]
+    directions: NDArray[np.float64]
+    sides: NDArray[np.float64]
+    completed: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,26 +80,61 @@ class ExactSurface(Frozen):
         triangles = self.features.corners.reshape(-1, 3, 3)
         return BoxTree.of(triangles.min(axis=1), triangles.max(axis=1))
 
+    @cached_property
+    def _crossing_tree(self) -> scipy.spatial.cKDTree:
+        return scipy.spatial.cKDTree(self.crossings[:, 1:4])
+
     def distances(self, points: NDArray[np.float64], guess: float) -> NDArray[np.float64]:
         """(n,) signed distances of (n, 3) points around `origin`.
 
         Where no face tells the side they have the sign of `guess`, and are NaN where that is 0.
         """
-        distances, signs = np.full(len(points), np.inf), np.full(len(points), np.sign(guess))
+        places = self.nearest(points)
+        signs = np.where(places.sides == 0, np.sign(guess), places.sides)
+        return np.where(signs == 0, np.nan, np.where(signs < 0, -places.distances, places.distances))
+
+    def nearest(self, points: NDArray[np.float64]) -> SurfacePlaces:
+        """The nearest place of each of (n, 3) points around `origin`, in time O(n log m), on all threads."""
+        return SurfacePlaces(*in_chunks(self._nearest_of_chunk, points))
+
+    def _nearest_of_chunk(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
+        """The attributes of `SurfacePlaces`, for points that are not many."""
+        if not len(points):
+            return np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty(0), np.empty(0, dtype=bool)
+        order = np.argsort(morton_codes(points), kind="stable")  # neighbours have nearly the same way through the tree
+        sorted_points = points[order]
+        n = len(points)
+        distances, feet, directions = np.full(n, np.inf), sorted_points.copy(), np.zeros((n, 3))
+        sides, completed = np.zeros(n), np.zeros(n, dtype=bool)
         if len(self.features.corners):
-            near, _ = nearest_on_triangles(self.features.corners.reshape(-1, 3, 3), self._tree, points)
-            found = search_from(self.features, points, near.astype(np.int32)[:, None])
-            distances = found.distances
+            near, _ = nearest_on_triangles(self.features.corners.reshape(-1, 3, 3), self._tree, sorted_points)
+            found = search_from(self.features, sorted_points, near.astype(np.int32)[:, None])
+            distances, feet = found.distances, found.feet
+            directions = self.features.face_normals[found.faces]
             told = found.regular if self.telling is None else found.regular & self.telling[found.faces]
-            signs = np.where(told, np.where(found.cosines < 0, -1.0, 1.0), signs)
+            sides = np.where(told, np.where(found.cosines < 0, -1.0, 1.0), 0.0)
         if len(self.crossings):
-            _, nearest = scipy.spatial.cKDTree(self.crossings[:, 1:4]).query(points)
-            other = np.empty(len(points))
+            _, which = self._crossing_tree.query(sorted_points)
+            other = np.empty(n)
             reach = float(np.linalg.norm(self.steps))
-            distances_to_crossings(points, nearest.astype(np.int32), self.crossings, reach, other)
-            signs = np.where(other < distances, np.sign(guess), signs)
+            distances_to_crossings(sorted_points, which.astype(np.int32), self.crossings, reach, other)
+            completed = other < distances
+            rows = self.crossings[which[completed]]
+            away = away_from_circles(sorted_points[completed], rows)
             distances = np.minimum(distances, other)
-        return np.where(signs == 0, np.nan, np.where(signs < 0, -distances, distances))
+            directions = directions.copy()
+            directions[completed] = rows[:, 5:8]
+            feet = feet.copy()
+            feet[completed] = sorted_points[completed] - distances[completed, None] * away
+            sides = np.where(completed, 0.0, sides)
+        apart = sorted_points - feet
+        lengths = np.linalg.norm(apart, axis=1)
+        clear = lengths > 1e-12 * np.abs(sorted_points).max(initial=1e-290)
+        directions = np.where(clear[:, None], apart / np.where(clear, lengths, 1.0)[:, None], directions)
+        distances = np.where(clear, distances, 0.0)
+        back = np.empty(n, dtype=np.int64)
+        back[order] = np.arange(n)
+        return distances[back], feet[back], directions[back], sides[back], completed[back]
 
     def on_level(self, points: NDArray[np.float64], values: NDArray[np.float64], level: float) -> NDArray[np.float64]:
         """Points on edges of the grid, where values of the nodes pass a level, moved along to where distance does.
@@ -126,3 +190,26 @@ class ExactSurface(Frozen):
             last[ahead], last[behind] = 1, -1
             active = active[np.abs(off) > CLOSE * step]  # not where it is NaN
         return moved
+
+
+def away_from_circles(points: NDArray[np.float64], crossings: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) unit vectors to points, from the nearest place of the circle that touches at a crossing (`circle_distance`).
+
+    With s along the normal n, r across it and bending k, they point along ``(1 + ks) n + kr``, from inside the circle
+    the other way.
+    """
+    normals = crossings[:, 5:8]
+    away = points - crossings[:, 1:4]
+    along = np.einsum("ij,ij->i", away, normals)
+    across = away - along[:, None] * normals
+    bending = np.empty((len(crossings), 3, 3))
+    for row, column, at in _BENDING:
+        bending[:, row, column] = bending[:, column, row] = crossings[:, at]
+    square = np.einsum("ij,ij->i", across, across)
+    bend = np.einsum("ij,ijk,ik->i", across, bending, across) / np.where(square > 0, square, 1.0)
+    slope = (1.0 + bend * along)[:, None] * normals + bend[:, None] * across
+    lengths = np.linalg.norm(slope, axis=1, keepdims=True)
+    slope = np.where(lengths > 0, slope / np.where(lengths > 0, lengths, 1.0), normals)
+    in_front = 2.0 * along + bend * np.einsum("ij,ij->i", away, away) >= 0
+    result: NDArray[np.float64] = np.where(in_front[:, None], slope, -slope)
+    return result

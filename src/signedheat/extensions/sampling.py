@@ -1,0 +1,202 @@
+"""Points with distances and gradients, to learn a signed distance from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.validation import finite_number
+from ..errors import OutsideError, SignedHeatError, SourceError
+from ..fields.grid_field import GridField
+from ..operators.grid.exact_surface import ExactSurface
+from ..slots import Slot
+
+WIDTHS = (0.0025**0.5, 0.00025**0.5)
+"""Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
+
+Layout = Literal["arrays", "deepsdf"]
+"""How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
+
+save_samples: Slot[[object, str | PathLike[str], Layout], None] = Slot("save_samples")
+"""Write samples to a file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Points with the signed distances to a shape.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        Positions: those near the surface first, width by width, then those spread over the cube.
+    distances : (n,) float
+        Signed distances to the shape, negative inside: exact where it is there, to the completed surface elsewhere.
+    gradients : (n, 3) float
+        Of the distance; of length 1.
+    near : (n,) bool
+        Whether a point was taken near the surface.
+    completed : (n,) bool
+        Whether the nearest place of the surface is one that had to be completed.
+    center : (3,) float
+        Centre of the box around the surface.
+    radius : float
+        Distance of the farthest place of the surface from there.
+
+    Examples
+    --------
+    >>> from signedheat import samples, solid_distance
+    >>> taken = sample(solid_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
+    >>> taken
+    Samples(1000 points, 800 near the surface, distances from -3.82 to 3.07)
+    >>> bool(np.abs(taken.normalized().points).max() < 1.3)
+    True
+    """
+
+    points: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    gradients: NDArray[np.float64]
+    near: NDArray[np.bool_]
+    completed: NDArray[np.bool_]
+    center: NDArray[np.float64]
+    radius: float
+
+    def normalized(self) -> Samples:
+        """The same of the shape moved and scaled into the unit sphere; `center` and `radius` stay those it had."""
+        points, distances = (self.points - self.center) / self.radius, self.distances / self.radius
+        return replace(self, points=points, distances=distances)
+
+    def save(self, path: str | PathLike[str], layout: Layout = "arrays") -> None:
+        """Write to an ``.npz`` file.
+
+        Parameters
+        ----------
+        path : str or path
+            The file. An existing one survives a failure.
+        layout : "arrays" or "deepsdf"
+            An array for each attribute, with every bit; or ``pos`` and ``neg``, (k, 4) in single precision: x, y, z,
+            distance of the points outside and inside, as DeepSDF reads them.
+
+        Raises
+        ------
+        FileFormatError
+            If the name does not end with ``.npz``, or the file cannot be written.
+        """
+        save_samples(self, path, layout)
+
+    def __repr__(self) -> str:
+        low, high = self.distances.min(), self.distances.max()
+        count = f"{len(self.points)} points, {int(self.near.sum())} near the surface"
+        return f"Samples({count}, distances from {low:.3g} to {high:.3g})"
+
+
+def sample(
+    field: GridField[Literal[3]],
+    n: int = 250_000,
+    *,
+    near: float = 0.8,
+    widths: Sequence[float] = WIDTHS,
+    seed: int = 0,
+) -> Samples:
+    """Points with distances and gradients, near the surface of a shape and all around it.
+
+    Near the surface: places on it, evenly by area, moved by normal noise along each axis. All around it: evenly spread
+    over the cube around the sphere that holds the shape. Distances are measured anew (`GridField.closest_points`), not
+    interpolated between the nodes of the field.
+
+    Parameters
+    ----------
+    field : GridField
+        Distance in space, from `solid_distance` or ``sharpen(field, shape)``.
+    n : int
+        Number of points.
+    near : float
+        Share of them that are near the surface.
+    widths : sequence of float
+        Standard deviations of the noise, over the radius of the shape; each gets the same share of the points near.
+    seed : int
+        The same seed gives the same points.
+
+    Returns
+    -------
+    Samples
+        Points, distances, gradients; with centre and radius of the shape.
+
+    Raises
+    ------
+    SourceError
+        If the field does not know its surface: it was read from a file, or not sharpened to a shape.
+    SignedHeatError
+        If n is not positive, the share not from 0 to 1, or a width negative.
+
+    Examples
+    --------
+    >>> from signedheat import samples, solid_distance
+    >>> field = solid_distance(samples.without_faces(samples.sphere(3), 0.3), resolution=32)
+    >>> taken = sample(field, 2000, near=0.5, widths=[0.1, 0.01], seed=7)
+    >>> bool(np.abs(taken.distances - (np.linalg.norm(taken.points, axis=1) - 1)).max() < 0.05)
+    True
+    """
+    if n < 1:
+        raise SignedHeatError(f"the number of samples is {n}", remedy="take one or more")
+    if not 0 <= near <= 1:
+        raise SignedHeatError(f"the share near the surface is {near:g}", remedy="choose it from 0 to 1")
+    scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
+    n_near = round(near * n) if scales else 0
+    if field.surface is None:
+        raise SourceError(
+            "the field does not know the surface that it is the distance to",
+            remedy="take it from solid_distance or sharpen(field, shape), not from a file",
+        )
+    triangles, completed = surface_triangles(field, field.surface)
+    lower, upper = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    center = (lower + upper) / 2
+    radius = float(np.linalg.norm(triangles - center, axis=2).max())
+    random = np.random.default_rng(seed)
+    points = np.empty((n, 3))
+    ends = np.rint(np.linspace(0, n_near, len(scales) + 1)).astype(int) if scales else np.zeros(1, dtype=int)
+    for start, stop, width in zip(ends[:-1], ends[1:], scales, strict=True):
+        places, faces = _on_triangles(triangles, stop - start, random)
+        filled = completed[faces]
+        places[filled] = field.closest_points(places[filled]).points
+        points[start:stop] = places + random.normal(scale=width * radius, size=places.shape)
+    points[n_near:] = center + radius * random.uniform(-1.0, 1.0, (n - n_near, 3))
+    found = field.closest_points(points)
+    is_near = np.arange(n) < n_near
+    return Samples(points, found.distances, found.gradients, is_near, found.completed, center, radius)
+
+
+def surface_triangles(
+    field: GridField[Literal[3]], surface: ExactSurface
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(m, 3, 3) triangles that cover the surface of a field once, and which of them only stand in for missing faces."""
+    faces = surface.features.corners.reshape(-1, 3, 3) + surface.origin
+    try:
+        contour = field.contour(0.0)
+    except OutsideError:  # open sheets, which bound nothing
+        return faces, np.zeros(len(faces), dtype=bool)
+    triangles = contour.vertices[contour.faces]
+    middles = triangles.mean(axis=1)
+    inside = ((middles > field.grid.origin) & (middles < field.grid.upper)).all(axis=1)  # not the walls of the box
+    triangles = triangles[inside]
+    triangles = triangles[field.closest_points(middles[inside]).completed]
+    return np.concatenate([faces, triangles]), np.arange(len(faces) + len(triangles)) >= len(faces)
+
+
+def _on_triangles(
+    triangles: NDArray[np.float64], n: int, random: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """(n, 3) points on triangles, evenly by area, and the triangle of each: one point in each nth of the area."""
+    a, b, c = triangles.transpose(1, 0, 2)
+    areas = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    marks = (np.arange(n) + random.random(n)) / max(n, 1) * areas[-1]
+    faces = np.minimum(np.searchsorted(areas, marks, side="right"), len(triangles) - 1)
+    u, v = random.random((2, n))
+    over = u + v > 1
+    u, v = np.where(over, 1 - u, u)[:, None], np.where(over, 1 - v, v)[:, None]
+    a, b, c = a[faces], b[faces], c[faces]
+    return a + u * (b - a) + v * (c - a), faces

@@ -1,0 +1,58 @@
+"""The nearest places of the surface that a field is the distance to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..operators.grid.exact_surface import ExactSurface
+
+NEAR = 2.0
+"""Cells from a face within which it tells the side; farther away the field does."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClosestPoints:
+    """The nearest place of a surface for each of some points.
+
+    Attributes
+    ----------
+    points : (n, 3) float
+        The nearest places.
+    distances : (n,) float
+        Signed distances to them, negative inside.
+    gradients : (n, 3) float
+        Gradients of the distance, of length 1; on the surface, its normals.
+    completed : (n,) bool
+        Whether the place lies on the completed surface, which stands in for faces that are missing.
+    """
+
+    points: NDArray[np.float64]
+    distances: NDArray[np.float64]
+    gradients: NDArray[np.float64]
+    completed: NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        return f"ClosestPoints({len(self.points)} points, {int(self.completed.sum())} on completed surface)"
+
+
+def closest_points(
+    surface: ExactSurface,
+    points: NDArray[np.float64],
+    field: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+) -> ClosestPoints:
+    """The nearest place of a surface for each of (n, 3) points; `field` gives the side where no face near tells it."""
+    places = surface.nearest(points - surface.origin)
+    untold = (places.sides == 0) | (places.distances > NEAR * float(surface.steps.max()))
+    sides = places.sides.copy()
+    sides[untold] = np.where(field(points[untold]) < 0, -1.0, 1.0)
+    towards = np.where(places.distances > 0, sides, 1.0)
+    return ClosestPoints(
+        places.feet + surface.origin,
+        sides * places.distances,
+        places.directions * towards[:, None],
+        places.completed,
+    )
