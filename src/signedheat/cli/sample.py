@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from typing import Any, cast, get_args
+from typing import Any, get_args
 
-from ..domains.grid import Grid
 from ..extensions.sampling import WIDTHS, Layout, sample
 from ..io import ensure_writable, read
 from ..io.samples import SAMPLE_FORMATS
@@ -63,7 +62,7 @@ def run(parser: Parser, arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, SAMPLE_FORMATS, "samples")
     shape = read(arguments.shape)
     with prefix_errors(arguments.shape):
-        field = compute(shape, cast("Grid", grid_for(shape, arguments)), arguments)
+        field = compute(shape, grid_for(shape, arguments), arguments)
         taken = sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
     (taken.normalized() if arguments.normalize else taken).save(arguments.output, arguments.layout)
     inside = float((taken.distances < 0).mean())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from ..slots import Slot
 
 WIDTHS = (0.0025**0.5, 0.00025**0.5)
 """Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
+
+BESIDE = 0.05
+"""Cells from the rim of a hole beyond which its completion begins."""
 
 Layout = Literal["arrays", "deepsdf"]
 """How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
@@ -95,7 +98,7 @@ class Samples:
 
 
 def sample(
-    field: GridField[Literal[3]],
+    field: GridField,
     n: int = 250_000,
     *,
     near: float = 0.8,
@@ -152,7 +155,7 @@ def sample(
             "the field does not know the surface that it is the distance to",
             remedy="take it from solid_distance or sharpen(field, shape), not from a file",
         )
-    triangles, completed = surface_triangles(field, field.surface)
+    triangles, _ = surface_triangles(field, field.surface)
     lower, upper = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     center = (lower + upper) / 2
     radius = float(np.linalg.norm(triangles - center, axis=2).max())
@@ -160,9 +163,7 @@ def sample(
     points = np.empty((n, 3))
     ends = np.rint(np.linspace(0, n_near, len(scales) + 1)).astype(int) if scales else np.zeros(1, dtype=int)
     for start, stop, width in zip(ends[:-1], ends[1:], scales, strict=True):
-        places, faces = _on_triangles(triangles, stop - start, random)
-        filled = completed[faces]
-        places[filled] = field.closest_points(places[filled]).points
+        places = _on_triangles(triangles, stop - start, random)
         points[start:stop] = places + random.normal(scale=width * radius, size=places.shape)
     points[n_near:] = center + radius * random.uniform(-1.0, 1.0, (n - n_near, 3))
     found = field.closest_points(points)
@@ -170,27 +171,25 @@ def sample(
     return Samples(points, found.distances, found.gradients, is_near, found.completed, center, radius)
 
 
-def surface_triangles(
-    field: GridField[Literal[3]], surface: ExactSurface
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def surface_triangles(field: GridField, surface: ExactSurface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """(m, 3, 3) triangles that cover the surface of a field once, and which of them only stand in for missing faces."""
     faces = surface.features.corners.reshape(-1, 3, 3) + surface.origin
     try:
-        contour = field.contour(0.0)
+        contour = cast("GridField[Literal[3]]", field).contour(0.0)  # which every field with a surface is
     except OutsideError:  # open sheets, which bound nothing
         return faces, np.zeros(len(faces), dtype=bool)
     triangles = contour.vertices[contour.faces]
     middles = triangles.mean(axis=1)
     inside = ((middles > field.grid.origin) & (middles < field.grid.upper)).all(axis=1)  # not the walls of the box
     triangles = triangles[inside]
-    triangles = triangles[field.closest_points(middles[inside]).completed]
+    places = surface.nearest(middles[inside] - surface.origin)
+    beside = (places.sides == 0) & (places.distances > BESIDE * float(surface.steps.max()))
+    triangles = triangles[places.completed | beside]
     return np.concatenate([faces, triangles]), np.arange(len(faces) + len(triangles)) >= len(faces)
 
 
-def _on_triangles(
-    triangles: NDArray[np.float64], n: int, random: np.random.Generator
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """(n, 3) points on triangles, evenly by area, and the triangle of each: one point in each nth of the area."""
+def _on_triangles(triangles: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:
+    """(n, 3) points on triangles, evenly by area: one in each nth of it."""
     a, b, c = triangles.transpose(1, 0, 2)
     areas = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
     marks = (np.arange(n) + random.random(n)) / max(n, 1) * areas[-1]
@@ -199,4 +198,5 @@ def _on_triangles(
     over = u + v > 1
     u, v = np.where(over, 1 - u, u)[:, None], np.where(over, 1 - v, v)[:, None]
     a, b, c = a[faces], b[faces], c[faces]
-    return a + u * (b - a) + v * (c - a), faces
+    result: NDArray[np.float64] = a + u * (b - a) + v * (c - a)
+    return result

@@ -118,14 +118,15 @@ class ExactSurface(Frozen):
             other = np.empty(n)
             reach = float(np.linalg.norm(self.steps))
             distances_to_crossings(sorted_points, which.astype(np.int32), self.crossings, reach, other)
+            rows = self.crossings[which]
+            touched = sorted_points - other[:, None] * away_from_circles(sorted_points, rows)
+            strayed = np.linalg.norm(touched - rows[:, 1:4], axis=1) > 0.5 * reach  # off the end of the zero set
+            touched[strayed] = rows[strayed, 1:4]
+            other = np.where(strayed, np.linalg.norm(sorted_points - rows[:, 1:4], axis=1), other)
             completed = other < distances
-            rows = self.crossings[which[completed]]
-            away = away_from_circles(sorted_points[completed], rows)
             distances = np.minimum(distances, other)
-            directions = directions.copy()
-            directions[completed] = rows[:, 5:8]
-            feet = feet.copy()
-            feet[completed] = sorted_points[completed] - distances[completed, None] * away
+            feet = np.where(completed[:, None], touched, feet)
+            directions = np.where(completed[:, None], rows[:, 5:8], directions)
             sides = np.where(completed, 0.0, sides)
         apart = sorted_points - feet
         lengths = np.linalg.norm(apart, axis=1)
@@ -193,7 +194,7 @@ class ExactSurface(Frozen):
 
 
 def away_from_circles(points: NDArray[np.float64], crossings: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) unit vectors to points, from the nearest place of the circle that touches at a crossing (`circle_distance`).
+    """(n, 3) unit vectors to points from the nearest place of the circle that touches at a crossing: `circle_distance`.
 
     With s along the normal n, r across it and bending k, they point along ``(1 + ks) n + kr``, from inside the circle
     the other way.

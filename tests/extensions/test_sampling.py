@@ -1,0 +1,143 @@
+"""Samples to learn from: where they are taken, what their distances are, how they are kept."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.extensions.sampling import WIDTHS, surface_triangles
+
+
+@pytest.fixture(scope="module")
+def box():
+    """A cuboid of 1 × 2 × 3, away from the origin, turned by nothing: its distance has a closed form."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    mesh = sh.PolygonMesh(CORNER + corners * SIZE, quads)
+    return sh.solid_distance(mesh, resolution=32)
+
+
+CORNER, SIZE = np.array([5.0, -3.0, 1.0]), np.array([1.0, 2.0, 3.0])
+
+
+def box_distance(points):
+    away = np.abs(points - (CORNER + SIZE / 2)) - SIZE / 2
+    return np.linalg.norm(np.maximum(away, 0), axis=1) + np.minimum(away.max(axis=1), 0)
+
+
+@pytest.fixture(scope="module")
+def holed():
+    return sh.solid_distance(samples.without_faces(samples.sphere(4), 0.5, seed=3), resolution=40)
+
+
+def test_distances_are_exact_and_gradients_theirs(box):
+    taken = sh.sample(box, 20_000, near=0.5, widths=[0.2, 0.01])
+    np.testing.assert_allclose(taken.distances, box_distance(taken.points), atol=1e-12)
+    assert not taken.completed.any()
+    np.testing.assert_allclose(np.linalg.norm(taken.gradients, axis=1), 1, atol=1e-12)
+    step = 1e-5
+    smooth = np.abs(box_distance(taken.points + step) - box_distance(taken.points)) < np.inf
+    for axis in range(3):
+        move = step * np.eye(3)[axis]
+        slope = (box_distance(taken.points + move) - box_distance(taken.points - move)) / (2 * step)
+        smooth &= np.abs(slope - taken.gradients[:, axis]) < 1e-4
+    assert smooth.mean() > 0.999  # all but what lies within a step of the medial axis
+
+
+def test_shares_and_widths(box):
+    widths = [0.3, 0.02, 0.0]
+    taken = sh.sample(box, 30_000, near=0.75, widths=widths)
+    assert taken.near.sum() == 22_500 and taken.near[:22_500].all()
+    assert taken.center == pytest.approx(CORNER + SIZE / 2)
+    assert taken.radius == pytest.approx(np.linalg.norm(SIZE) / 2)
+    # beside a plane the noise moves a point by a normal deviate along the normal: half the normal law's mean is 0.798 σ
+    fine = taken.distances[7500:15_000]
+    assert np.abs(fine).mean() == pytest.approx(0.798 * 0.02 * taken.radius, rel=0.05)
+    assert np.abs(taken.distances[15_000:22_500]).max() < 1e-12
+    everywhere = (taken.points[22_500:] - taken.center) / taken.radius
+    assert np.abs(everywhere).max() <= 1 and np.abs(everywhere.mean(axis=0)).max() < 0.02
+    assert np.abs(everywhere.std(axis=0) - 3**-0.5).max() < 0.01
+
+
+def test_places_are_even_by_area(box):
+    taken = sh.sample(box, 11_000, near=1.0, widths=[0.0])
+    on = [np.abs(taken.points[:, axis] - CORNER[axis]) < 1e-9 for axis in range(3)]
+    # 22 units of area, of which the lowest faces along x, y, z have 6, 3, 2; one point in each 11,000th of it
+    assert [int(side.sum()) for side in on] == pytest.approx([3000, 1500, 1000], abs=4)
+
+
+def test_missing_surface_is_sampled_on_the_completed_one(holed):
+    shape = samples.without_faces(samples.sphere(4), 0.5, seed=3)
+    triangles, completed = surface_triangles(holed, holed.surface)
+    areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1) / 2
+    assert areas[~completed].sum() == pytest.approx(shape.face_areas.sum())
+    open_cap = sh.TriangleMesh(samples.sphere(4).vertices, samples.sphere(4).faces[_above(samples.sphere(4), 0.6)])
+    field = sh.solid_distance(open_cap, resolution=40)
+    triangles, completed = surface_triangles(field, field.surface)
+    areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1) / 2
+    # the lid over the hole is at least the flat disk of radius .8, at most the cap that is missing, 2π · .4
+    assert 0.9 * np.pi * 0.64 < areas[completed].sum() < 1.1 * 2 * np.pi * 0.4
+    taken = sh.sample(field, 4000, near=1.0, widths=[0.0])
+    assert taken.completed.mean() == pytest.approx(areas[completed].sum() / areas.sum(), rel=0.25)  # but at the rim
+    off = np.abs(taken.distances) / field.grid.spacing.max()  # 0 on faces, small where completed, but at its rim
+    assert np.quantile(off, 0.9) < 0.05 and off.max() < 2
+
+
+def _above(mesh, height):
+    return mesh.vertices[mesh.faces].mean(axis=1)[:, 2] < height
+
+
+def test_an_open_sheet_has_one_sign():
+    sheet = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
+    taken = sh.sample(sh.solid_distance(sheet, resolution=24), 2000)
+    assert (taken.distances >= 0).all()
+    np.testing.assert_allclose(
+        taken.distances, np.linalg.norm(taken.points - np.clip(taken.points, 0, [1, 1, 0]), axis=1), atol=1e-12
+    )
+
+
+def test_the_same_seed_gives_the_same_bits(box, holed):
+    one, other, third = sh.sample(holed, 500, seed=1), sh.sample(holed, 500, seed=1), sh.sample(holed, 500, seed=2)
+    np.testing.assert_array_equal(one.points, other.points)
+    np.testing.assert_array_equal(one.distances, other.distances)
+    assert not np.isin(one.points, third.points).any()
+
+
+@pytest.mark.parametrize("layout", ["arrays", "deepsdf"])
+def test_files(tmp_path, box, layout):
+    taken = sh.sample(box, 3000, near=0.9).normalized()
+    taken.save(tmp_path / "box.npz", layout)
+    with np.load(tmp_path / "box.npz", allow_pickle=False) as file:
+        arrays = dict(file)
+    if layout == "arrays":
+        np.testing.assert_array_equal(arrays["points"], taken.points)
+        np.testing.assert_array_equal(arrays["distances"], taken.distances)
+        np.testing.assert_array_equal(
+            arrays["points"] * arrays["radius"] + arrays["center"] < CORNER, taken_below(taken)
+        )
+        return
+    assert set(arrays) == {"pos", "neg"}
+    assert arrays["pos"].dtype == arrays["neg"].dtype == np.float32
+    assert (arrays["pos"][:, 3] >= 0).all() and (arrays["neg"][:, 3] < 0).all()
+    assert len(arrays["pos"]) + len(arrays["neg"]) == 3000
+    rows = np.concatenate([arrays["pos"], arrays["neg"]]).astype(float)
+    scale = np.linalg.norm(SIZE) / 2
+    exact = box_distance(rows[:, :3] * scale + CORNER + SIZE / 2) / scale
+    np.testing.assert_allclose(rows[:, 3], exact, atol=1e-6)
+
+
+def taken_below(taken):
+    return taken.points * taken.radius + taken.center < CORNER
+
+
+def test_what_cannot_be_sampled_says_so(tmp_path, box):
+    plain = sh.GridField(box.grid, box.values)
+    with pytest.raises(sh.SourceError) as caught:
+        sh.sample(plain, 10)
+    assert "solid_distance" in caught.value.remedy
+    for wrong in ({"n": 0}, {"near": 1.5}, {"widths": [-0.1]}, {"widths": [np.nan]}):
+        with pytest.raises(sh.SignedHeatError):
+            sh.sample(box, **{"n": 10, **wrong})
+    with pytest.raises(sh.FileFormatError):
+        sh.sample(box, 10).save(tmp_path / "samples.txt")
+    assert WIDTHS[0] ** 2 == pytest.approx(10 * WIDTHS[1] ** 2)
