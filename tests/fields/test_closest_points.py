@@ -40,7 +40,7 @@ def test_distances_agree_with_those_at_the_nodes(holed):
     near = np.abs(holed.values.ravel()) < 2 * holed.grid.spacing.max()
     # nodes take the nearest of a few candidates, here the search is exact; at the rim of a hole circles end differently
     assert off[near & (nodes[:, 2] < 0.2)].max() < 0.02
-    assert np.quantile(off[near], 0.99) < 0.1 and off[near].max() < 1
+    assert np.quantile(off[near], 0.99) < 0.1 and off[near].max() < 2
     assert ((found.distances < 0) == (holed.values.ravel() < 0)).all()
 
 
