@@ -16,7 +16,7 @@ from ..fields.grid_field import GridField
 from ..operators.grid.exact_surface import ExactSurface
 from ..slots import Slot
 
-WIDTHS = (0.0025**0.5, 0.00025**0.5)
+WIDTHS = (0.05, 0.0158)
 """Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
 
 BESIDE = 0.05
@@ -72,6 +72,18 @@ class Samples:
         """The same of the shape moved and scaled into the unit sphere; `center` and `radius` stay those it had."""
         points, distances = (self.points - self.center) / self.radius, self.distances / self.radius
         return replace(self, points=points, distances=distances)
+
+    @property
+    def figures(self) -> dict[str, float | list[float]]:
+        """What there is to tell about the samples, ready for JSON."""
+        return {
+            "samples": len(self.points),
+            "near": int(self.near.sum()),
+            "inside_share": float((self.distances < 0).mean()),
+            "completed_share": float(self.completed.mean()),
+            "center": [float(x) for x in self.center],
+            "radius": self.radius,
+        }
 
     def save(self, path: str | PathLike[str], layout: Layout = "arrays") -> None:
         """Write to an ``.npz`` file.
