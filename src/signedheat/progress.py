@@ -20,6 +20,10 @@ class Stopwatch:
         self.seconds: dict[str, float] = {}
         self._progress, self._steps = progress, steps
 
+    def skip(self, steps: int) -> None:
+        """So many steps turn out not to be needed."""
+        self._steps -= steps
+
     @contextmanager
     def __call__(self, step: str) -> Iterator[None]:
         if self._progress is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import singledispatch
+from functools import cache, singledispatch
 from typing import Literal
 
 import numpy as np
@@ -82,7 +82,7 @@ def assemble(
     grid: Grid,
     sides: NDArray[np.float64],
     fit: Fit,
-    phi: NDArray[np.float64] | None = None,
+    phi: Callable[[], NDArray[np.float64]] | None = None,
     tells: Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None = None,
 ) -> Assembled:
     """Signed distance to shapes, and to the zero set of `sides` where they are missing.
@@ -92,10 +92,12 @@ def assemble(
     3. Crossings of the zero set farther than `FAR` cells from the others stand in for what is missing.
     4. All nodes find the nearest of both (`sampled_surface`), and the sides from faces nearby or from `sides`.
 
-    Around layers `phi`, where given, takes the place of `sides`, which need not run in their middle. Faces tell no side
-    where `tells`, given (s, 3) places on them in cells from the first node, is False.
+    Around layers what `phi` returns, where given, takes the place of `sides`, which need not run in their middle; it is
+    called where there are layers only. Faces tell no side where `tells`, given (s, 3) places on them in cells from the
+    first node, is False.
     """
     steps = np.array(grid.spacing)
+    middle = cache(phi) if phi is not None else lambda: sides
     clouds = [part for part in parts if isinstance(part, PointCloud)]
     for cloud in clouds if fit != "smooth" else []:
         if cloud.normals is None:
@@ -107,10 +109,10 @@ def assemble(
     n_faces = len(features.rows)
     left_out = np.full(n_faces, fit == "smooth")
     if fit == "auto" and n_faces:
-        left_out = layered_faces(features, band, sides if phi is None else phi, steps)
+        left_out = layered_faces(features, band, middle, steps)
     if left_out.any():
         if phi is not None:
-            sides = np.where(_around_faces(left_out, band), phi, sides)
+            sides = np.where(_around_faces(left_out, band), middle(), sides)
         features = FaceFeatures.of(features.vertices, features.faces[~left_out].astype(np.int64))
         band = FaceBand.of(features, grid.shape, steps)
     edges = crossed_edges(sides[None])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast, overload
 
@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..constraints import Constraint, ZeroSet
-from ..diagnostics import Diagnostics, Note, OrientedPoints, SharpenedToShape
+from ..diagnostics import Diagnostics, LeftOut, Note, OrientedPoints, SharpenedToShape
 from ..discretization import discretize
 from ..domains.foreign import as_shapes
 from ..domains.grid import Grid
@@ -30,11 +30,12 @@ from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
 from ..operators.grid.boundary_areas import distances_to_samples
 from ..operators.grid.face_values import values_at
+from ..operators.grid.line_winding import closed_winding_numbers
 from ..progress import Progress, Stopwatch
 from ..solver import SignedHeatSolver, checked
 from .orientation import orientation
 from .point_orientation import orient_points
-from .shape_sharpening import Assembled, Fit, assemble
+from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .sharpening import sharpen
 from .sides import FAR, Sides, choose_sides, nothing_inside
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
@@ -235,6 +236,10 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     discretization = discretize(grid)  # refuses what cannot fit
     with stopwatch("orient"):
         merged, closed = _oriented(shape, notes) if steps.orient else (merge_duplicates(shape), False)
+    if closed and steps.sharpen:
+        field = _bounded(merged, grid, steps, notes, stopwatch)
+        if field is not None:
+            return field
     with stopwatch("unite"):
         shape, samples, winding = _united(merged, grid, steps, notes)
     if samples is None:  # doubled walls alone: there is no φ
@@ -256,8 +261,50 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
         sides = _closed_sides(winding, grid) if closed else _sides(phi, winding, samples, grid)
     with stopwatch("sharpen"):
         sharpened = _sharpened(shape, phi, sides, closed, winding, grid)
-    notes.append(SharpenedToShape(sharpened.layered, sharpened.completed))
     notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
+    return _solid(sharpened, grid, notes, stopwatch, time)
+
+
+def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwatch: Stopwatch) -> GridField | None:
+    """A shape whose parts are all closed, and do not overlap: there is nothing to complete, and lines tell its inside.
+
+    None if it is not so. φ is needed where its faces lie in layers, only.
+    """
+    shape = merged.shape
+    if isinstance(shape, PointCloud):
+        return None
+    with stopwatch("unite"):
+        vertices, faces = triangles_of(shape)
+        winding = closed_winding_numbers(((vertices - grid.origin) / grid.spacing)[faces], grid.shape)
+        if winding is None or (steps.unite and winding.max() > 1):
+            return None
+        try:
+            source = GridSource(sample_on_grid([shape], grid, SAMPLE_SIZE), grid, steps.diffusion)
+        except CancellingNormalsError:
+            source = None
+    time = float("nan") if source is None else source.time
+    if merged.count:
+        notes.append(LeftOut(merged_faces=merged.count))
+    if source is not None:
+        notes.append(sampled(source))
+    cell = float(grid.spacing.max())
+    function = np.where(winding > 0, -cell, cell)
+
+    def phi() -> NDArray[np.float64]:
+        if source is None:
+            return function
+        discretization = discretize(grid)
+        directions = normalize(discretization, diffuse(discretization, source))
+        return integrate(discretization, directions, source, steps.constraint)
+
+    stopwatch.skip(4)
+    with stopwatch("sharpen"):
+        sharpened = assemble([shape], grid, function, "auto", phi)
+    return _solid(sharpened, grid, notes, stopwatch, time)
+
+
+def _solid(sharpened: Assembled, grid: Grid, notes: list[Note], stopwatch: Stopwatch, time: float) -> GridField:
+    notes.append(SharpenedToShape(sharpened.layered, sharpened.completed))
     diagnostics = _diagnostics(notes, stopwatch, time)
     return GridField(grid, sharpened.values, diagnostics, sharpened.confidence, sharpened.surface)
 
@@ -278,7 +325,7 @@ def _sharpened(
     if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
         return assemble([shape], grid, phi, "auto")
     if phi is not None and closed:
-        return assemble([shape], grid, sides.function, "auto", phi)
+        return assemble([shape], grid, sides.function, "auto", _known(phi))
     refused = _widened(sides.refused)
     upper = np.array(grid.shape) - 1
 
@@ -290,7 +337,11 @@ def _sharpened(
     if phi is not None and refused.any():
         phi = np.where(refused, sides.function, phi)
     fit: Fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
-    return assemble([shape], grid, sides.function, fit, phi, tells)
+    return assemble([shape], grid, sides.function, fit, None if phi is None else _known(phi), tells)
+
+
+def _known(phi: NDArray[np.float64]) -> Callable[[], NDArray[np.float64]]:
+    return lambda: phi
 
 
 def _widened(nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -36,10 +36,15 @@ class BoxTree:
         >>> BoxTree.of(corners, corners + 1).bounds[1]
         array([0., 1., 2., 4., 5., 6.])
         """
+        return cls.in_order(lower, upper, np.argsort(morton_codes((lower + upper) / 2), kind="stable"))
+
+    @classmethod
+    def in_order(cls, lower: NDArray[np.float64], upper: NDArray[np.float64], order: NDArray[np.int64]) -> BoxTree:
+        """The same, with boxes in a given order, in which those near each other in space should be near each other."""
         n = len(lower)
         leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / LEAF))), 0)
         items = np.full(leaves * LEAF, -1, dtype=np.int64)
-        items[:n] = np.argsort(morton_codes((lower + upper) / 2), kind="stable")
+        items[:n] = order
         bounds = np.empty((2 * leaves, 6))
         boxes = np.full((leaves * LEAF, 6), np.inf)
         boxes[:, 3:] = -np.inf

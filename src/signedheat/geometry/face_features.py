@@ -43,6 +43,8 @@ class FaceFeatures:
         The face on the other side of each edge; −1 where it is not regular.
     vertex_starts, vertex_corners : (n + 1,), (3 m,) int
         Corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2.
+    spokes : (3 m, 6) float
+        Directions of the two sides of each of these corners: unit vectors away from the vertex.
     """
 
     corners: NDArray[np.float64]
@@ -58,6 +60,7 @@ class FaceFeatures:
     across: NDArray[np.int32]
     vertex_starts: NDArray[np.int64]
     vertex_corners: NDArray[np.int32]
+    spokes: NDArray[np.float32]
 
     @classmethod
     def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceFeatures:
@@ -103,7 +106,7 @@ class FaceFeatures:
             vertex_regular,
             across,
             starts,
-            _corners_around(faces, starts),
+            *_corners_around(faces, vertices, starts),
         )
 
 
@@ -138,16 +141,33 @@ def _by_first_use(faces: NDArray[np.int64], n_vertices: int) -> tuple[NDArray[np
     return order[:count], result
 
 
-@compiled(nogil=True)
-def _corners_around(faces: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.int32]:
+@compiled(nogil=True, error_model="numpy")
+def _corners_around(
+    faces: NDArray[np.int64], vertices: NDArray[np.float64], starts: NDArray[np.int64]
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     fill = starts.copy()
-    result = np.empty(3 * len(faces), dtype=np.int32)
+    corners = np.empty(3 * len(faces), dtype=np.int32)
+    spokes = np.zeros((3 * len(faces), 6), dtype=np.float32)
     for f in range(len(faces)):
         for c in range(3):
             v = faces[f, c]
-            result[fill[v]] = 3 * f + c
+            at = fill[v]
+            corners[at] = 3 * f + c
+            for turn in range(2):
+                w = faces[f, (c + 1 + turn) % 3]
+                x, y, z = (
+                    vertices[w, 0] - vertices[v, 0],
+                    vertices[w, 1] - vertices[v, 1],
+                    vertices[w, 2] - vertices[v, 2],
+                )
+                scale = 1.0 / np.sqrt(x * x + y * y + z * z)
+                spokes[at, 3 * turn], spokes[at, 3 * turn + 1], spokes[at, 3 * turn + 2] = (
+                    x * scale,
+                    y * scale,
+                    z * scale,
+                )
             fill[v] += 1
-    return result
+    return corners, spokes
 
 
 @compiled(nogil=True, error_model="numpy")

@@ -46,21 +46,22 @@ class NearestFaces:
     cosines: NDArray[np.float32]
     regular: NDArray[np.bool_]
 
+    def replaced(self, rows: NDArray[np.int64], others: NearestFaces) -> NearestFaces:
+        """What was found anew for some of the points, written over what is there."""
+        for name, values in vars(self).items():
+            values[rows] = getattr(others, name)
+        return self
+
 
 def search_from(
     features: FaceFeatures,
     points: NDArray[np.float64],
     candidates: NDArray[np.int32],
-    width: int = 1,
-    patience: float = np.inf,
 ) -> NearestFaces:
     """The nearest of (n, c) candidate faces of each of (n, 3) points, or one that leads on from it; −1 is none.
 
-    What is nearest to the point before is a candidate, too, and to that `width` points before: where points are in
-    order, it is often the right one. As long as there is no candidate, there is no face, and distance is infinite.
-
-    Points farther than `patience` from all candidates look at one more face only: a wrong one near the right one makes
-    less of a difference, the farther both are.
+    What is nearest to the point before is a candidate, too: where points are in order, it is often the right one. As
+    long as there is no candidate, there is no face, and distance is infinite.
     """
     n = len(points)
     found = NearestFaces(
@@ -78,6 +79,7 @@ def search_from(
         features.across,
         features.vertex_starts,
         features.vertex_corners,
+        features.spokes,
         features.edges,
         features.face_normals,
         features.edge_normals,
@@ -86,8 +88,6 @@ def search_from(
         features.vertex_regular,
         points,
         candidates,
-        width,
-        patience * patience,
         found.faces,
         found.distances,
         found.feet,
@@ -106,6 +106,7 @@ def _search(
     across: NDArray[np.int32],
     starts: NDArray[np.int64],
     around: NDArray[np.int32],
+    spokes: NDArray[np.float32],
     edges: NDArray[np.int32],
     face_normals: NDArray[np.float64],
     edge_normals: NDArray[np.float64],
@@ -114,8 +115,6 @@ def _search(
     vertex_regular: NDArray[np.bool_],
     points: NDArray[np.float64],
     candidates: NDArray[np.int32],
-    width: int,
-    patience: float,
     out_faces: NDArray[np.int32],
     out_distances: NDArray[np.float64],
     out_feet: NDArray[np.float64],
@@ -126,68 +125,133 @@ def _search(
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         face, square, feature, fx, fy, fz = -1, np.inf, 0, x, y, z
-        for c in range(-2, candidates.shape[1]):
+        for c in range(-1, candidates.shape[1]):
             if c >= 0:
                 other = candidates[p, c]
-            elif c == -1:
-                other = out_faces[p - 1] if p > 0 else -1
             else:
-                other = out_faces[p - width] if p >= width > 1 else -1
+                other = out_faces[p - 1] if p > 0 else -1
             if other >= 0 and other != face and (c <= 0 or other != candidates[p, c - 1]):
                 s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
                 if s < square:
                     face, square, feature, fx, fy, fz = other, s, which, u, v, w
-        for _ in range(STEPS if square < patience else 1):
-            before = face
-            if feature == 0:
-                break
-            if feature <= 3:
-                other = across[face, feature - 1]
-                if other >= 0:
-                    s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
-                    if s < square:
-                        face, square, feature, fx, fy, fz = other, s, which, u, v, w
-            else:
-                vertex = faces[face, feature - 4]
-                vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
-                dx, dy, dz = x - vx, y - vy, z - vz
-                steepest, other = 0.0, -1  # the side along which distance shrinks fastest; if none, no place is nearer
-                turns = (
-                    2 if vertex_regular[vertex] else 3
-                )  # around a whole vertex every side is the first of one corner
-                for k in range(starts[vertex], starts[vertex + 1]):
-                    for turn in range(1, turns):
-                        a = faces[around[k] // 3, (around[k] + turn) % 3]
-                        ex, ey, ez = places[a, 0] - vx, places[a, 1] - vy, places[a, 2] - vz
-                        gain = dx * ex + dy * ey + dz * ez
-                        if gain > 0.0:
-                            gain *= gain / (ex * ex + ey * ey + ez * ez)
-                            if gain > steepest:
-                                steepest, other = gain, around[k] // 3
-                if other >= 0:
-                    s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
-                    if s < square:
-                        face, square, feature, fx, fy, fz = other, s, which, u, v, w
-            if face == before:
-                break
+        if feature != 0:
+            face, square, feature, fx, fy, fz = walk_to_nearest(
+                rows,
+                places,
+                faces,
+                across,
+                starts,
+                around,
+                spokes,
+                vertex_regular,
+                x,
+                y,
+                z,
+                face,
+                square,
+                feature,
+                fx,
+                fy,
+                fz,
+            )
         out_faces[p], out_features[p], out_distances[p] = face, feature, np.sqrt(square)
         out_feet[p, 0], out_feet[p, 1], out_feet[p, 2] = fx, fy, fz
-        nx = ny = nz = 0.0
-        regular = face >= 0
-        if face >= 0 and feature == 0:
-            nx, ny, nz = face_normals[face, 0], face_normals[face, 1], face_normals[face, 2]
-        elif face >= 0 and feature <= 3:
-            e = edges[face, feature - 1]
-            nx, ny, nz = edge_normals[e, 0], edge_normals[e, 1], edge_normals[e, 2]
-            regular = edge_regular[e]
-        elif face >= 0:
-            e = faces[face, feature - 4]
-            nx, ny, nz = vertex_normals[e, 0], vertex_normals[e, 1], vertex_normals[e, 2]
-            regular = vertex_regular[e]
-        cosine = nx * (x - fx) + ny * (y - fy) + nz * (z - fz)
-        lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * square)
-        out_cosines[p] = cosine / lengths if lengths > 0.0 else 0.0
-        out_regular[p] = regular
+        out_cosines[p], out_regular[p] = facing(
+            faces,
+            edges,
+            face_normals,
+            edge_normals,
+            vertex_normals,
+            edge_regular,
+            vertex_regular,
+            face,
+            feature,
+            x - fx,
+            y - fy,
+            z - fz,
+            square,
+        )
+
+
+@compiled(nogil=True, error_model="numpy")
+def walk_to_nearest(
+    rows: NDArray[np.float64],
+    places: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    across: NDArray[np.int32],
+    starts: NDArray[np.int64],
+    around: NDArray[np.int32],
+    spokes: NDArray[np.float32],
+    vertex_regular: NDArray[np.bool_],
+    x: float,
+    y: float,
+    z: float,
+    face: int,
+    square: float,
+    feature: int,
+    fx: float,
+    fy: float,
+    fz: float,
+) -> tuple[int, float, int, float, float, float]:
+    """From a face and the foot of (x, y, z) on it to faces that are nearer, across their rims."""
+    for _ in range(STEPS):
+        before = face
+        if feature == 0:
+            break
+        if feature <= 3:
+            other = across[face, feature - 1]
+        else:
+            vertex = faces[face, feature - 4]
+            vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
+            dx, dy, dz = x - vx, y - vy, z - vz
+            steepest, other = 0.0, -1  # the side along which distance shrinks fastest; if none, no place is nearer
+            turns = 1 if vertex_regular[vertex] else 2  # around a whole vertex every side is the first of one corner
+            for k in range(starts[vertex], starts[vertex + 1]):
+                for turn in range(turns):
+                    gain = dx * spokes[k, 3 * turn] + dy * spokes[k, 3 * turn + 1] + dz * spokes[k, 3 * turn + 2]
+                    if gain > steepest:
+                        steepest, other = gain, around[k] // 3
+        if other >= 0:
+            s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
+            if s < square:
+                face, square, feature, fx, fy, fz = other, s, which, u, v, w
+        if face == before:
+            break
+    return face, square, feature, fx, fy, fz
+
+
+@compiled(nogil=True, error_model="numpy")
+def facing(
+    faces: NDArray[np.int32],
+    edges: NDArray[np.int32],
+    face_normals: NDArray[np.float64],
+    edge_normals: NDArray[np.float64],
+    vertex_normals: NDArray[np.float64],
+    edge_regular: NDArray[np.bool_],
+    vertex_regular: NDArray[np.bool_],
+    face: int,
+    feature: int,
+    dx: float,
+    dy: float,
+    dz: float,
+    square: float,
+) -> tuple[float, bool]:
+    """Cosine between (dx, dy, dz), away from a foot, and the normal there; and whether that tells the side."""
+    if face < 0:
+        return 0.0, False
+    regular = True
+    if feature == 0:
+        nx, ny, nz = face_normals[face, 0], face_normals[face, 1], face_normals[face, 2]
+    elif feature <= 3:
+        e = edges[face, feature - 1]
+        nx, ny, nz = edge_normals[e, 0], edge_normals[e, 1], edge_normals[e, 2]
+        regular = edge_regular[e]
+    else:
+        e = faces[face, feature - 4]
+        nx, ny, nz = vertex_normals[e, 0], vertex_normals[e, 1], vertex_normals[e, 2]
+        regular = vertex_regular[e]
+    lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * square)
+    return (nx * dx + ny * dy + nz * dz) / lengths if lengths > 0.0 else 0.0, regular
 
 
 @compiled(nogil=True)

@@ -6,6 +6,8 @@ a surface there, or the same surface given more than once. What lies in the midd
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -35,10 +37,11 @@ APART = 0.15
 
 
 def layered_faces(
-    features: FaceFeatures, band: FaceBand, phi: NDArray[np.float64], steps: NDArray[np.float64]
+    features: FaceFeatures, band: FaceBand, middle: Callable[[], NDArray[np.float64]], steps: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """(m,) faces that lie where faces contradict each other and φ = 0 runs in their middle.
 
+    φ is asked for where there are such faces only.
     At edges sharper than a cell φ = 0 is rounder than the faces are, and leaves them all on one side: there faces stay,
     layered or not.
     """
@@ -47,6 +50,7 @@ def layered_faces(
         return layered
     samples = _some(len(band.faces), MANY)
     gaps = _gaps(features, band, samples, steps)
+    phi = middle()
     places = np.clip(band.feet[:, 1:] / steps, 0, np.array(phi.shape) - 1)
     nodes, weights = interpolation_stencil(places, phi.shape)
     heights = np.einsum("ij,ij->i", phi.ravel()[nodes], weights)

@@ -15,17 +15,16 @@ from ...compiled import compiled
 from ...errors import OutsideError
 from ...geometry.face_band import nearest_in_band
 from ...geometry.face_features import FaceFeatures
-from ...geometry.nearest_faces import NearestFaces, feet_of_nodes, search_from
+from ...geometry.nearest_faces import NearestFaces, facing, feet_of_nodes, search_from, walk_to_nearest
+from ...geometry.point_triangle import foot_on_triangle
 from ...parallel import n_threads
-from .closest_points import distances_to_crossings, nearest_tiles, seed_edge_ends
+from .closest_points import circle_distance, nearest_tiles, seed_edge_ends
 from .wavefront import SMALL, sweep_lines
 
 BAND = 1.0
 """Half width, in cells, of the band in which every face near a node is looked at: at least half a cell's diagonal."""
 NEAR = 2.0
 """Cells from a face within which it tells the side."""
-PATIENCE = 8.0
-"""Cells from a face beyond which nodes do not search on until nothing nearer is found."""
 PLANES = 16
 """Planes of nodes that one thread goes through, each after the one before."""
 
@@ -152,33 +151,40 @@ def signed_distances(
         Samples whose faces tell a side; those of open sheets do not.
     """
     shape = surface.nearest.shape
-    values, confidence = np.empty(shape), np.empty(shape, dtype=np.float32)
+    values, confidence = np.empty(shape), np.ones(shape, dtype=np.float32)
     cell, reach = float(surface.steps.max()), float(np.linalg.norm(surface.steps))
-    near, patience = NEAR * cell, PATIENCE * cell
-    size = shape[1] * shape[2]
+    features = surface.features
+    told = np.ones(0, dtype=np.bool_) if telling is None else telling
 
     def planes(which: range) -> None:
-        points, candidates = np.empty((size, 3)), np.full((size, 2), -1, dtype=np.int32)
-        chosen, other = np.empty(size, dtype=np.int32), np.empty(size)
-        for i in which:
-            _candidates_of_plane(surface.owners, surface.nearest, i, surface.steps, points, candidates)
-            found = search_from(surface.features, points, candidates, shape[2], patience)
-            candidates[:, 1] = found.faces
-            distances = found.distances
-            told = found.regular & (distances < near)
-            if telling is not None:
-                told &= telling[surface.nearest[i].ravel()]
-            certain = np.ones(size, dtype=np.float32)
-            if len(surface.crossings):
-                np.subtract(-1, candidates[:, 0], out=chosen)
-                distances_to_crossings(points, chosen, surface.crossings, reach, other)
-                nearer = other < distances
-                told &= ~nearer
-                certain[nearer] = trusted[chosen[nearer]]
-                distances = np.minimum(distances, other)
-            behind = np.where(told, found.cosines < 0, inside[i].ravel())
-            values[i] = np.where(behind, -distances, distances).reshape(shape[1:])
-            confidence[i] = certain.reshape(shape[1:])
+        _distances_of_planes(
+            features.rows,
+            features.vertices,
+            features.faces,
+            features.across,
+            features.vertex_starts,
+            features.vertex_corners,
+            features.spokes,
+            features.edges,
+            features.face_normals,
+            features.edge_normals,
+            features.vertex_normals,
+            features.edge_regular,
+            features.vertex_regular,
+            surface.owners,
+            surface.nearest,
+            told,
+            surface.crossings,
+            trusted,
+            surface.steps,
+            (NEAR * cell) ** 2,
+            reach,
+            inside,
+            which.start,
+            which.stop,
+            values,
+            confidence,
+        )
 
     threads = n_threads() if surface.nearest.size >= SMALL else 1
     with ThreadPoolExecutor(threads) as pool:
@@ -188,23 +194,112 @@ def signed_distances(
     return values, confidence
 
 
-@compiled(nogil=True)
-def _candidates_of_plane(
+@compiled(nogil=True, error_model="numpy")
+def _distances_of_planes(
+    rows: NDArray[np.float64],
+    places: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    across: NDArray[np.int32],
+    starts: NDArray[np.int64],
+    around: NDArray[np.int32],
+    spokes: NDArray[np.float32],
+    edges: NDArray[np.int32],
+    face_normals: NDArray[np.float64],
+    edge_normals: NDArray[np.float64],
+    vertex_normals: NDArray[np.float64],
+    edge_regular: NDArray[np.bool_],
+    vertex_regular: NDArray[np.bool_],
     owners: NDArray[np.int32],
     nearest: NDArray[np.int32],
-    i: int,
+    telling: NDArray[np.bool_],
+    crossings: NDArray[np.float64],
+    trusted: NDArray[np.float32],
     steps: NDArray[np.float64],
-    points: NDArray[np.float64],
-    candidates: NDArray[np.int32],
+    near: float,
+    reach: float,
+    inside: NDArray[np.bool_],
+    first: int,
+    last: int,
+    values: NDArray[np.float64],
+    confidence: NDArray[np.float32],
 ) -> None:
-    """Positions of the nodes of one plane, and what owns the sample nearest to each."""
+    """See `signed_distances`; `near` is the square of a length.
+
+    What is nearest to the nodes before, along each axis, are candidates, too: they are often right.
+    """
     n1, n2 = nearest.shape[1:]
-    at = 0
-    for j in range(n1):
-        for k in range(n2):
-            points[at, 0], points[at, 1], points[at, 2] = i * steps[0], j * steps[1], k * steps[2]
-            candidates[at, 0] = owners[nearest[i, j, k]]
-            at += 1
+    away, side = np.zeros(4), np.empty(4)
+    plane = np.full((n1, n2), np.int32(-1))  # the last face at each place, of this plane or the one before
+    for i in range(first, last):
+        before = np.int32(-1)
+        for j in range(n1):
+            for k in range(n2):
+                x, y, z = i * steps[0], j * steps[1], k * steps[2]
+                sample = nearest[i, j, k]
+                own = owners[sample]
+                face, square, feature, fx, fy, fz = -1, np.inf, 0, x, y, z
+                for candidate in range(4):
+                    other = own
+                    if candidate == 0:
+                        other = plane[j - 1, k] if j > 0 else np.int32(-1)
+                    elif candidate == 1:
+                        other = before
+                    elif candidate == 3:
+                        other = plane[j, k]
+                    if other >= 0 and other != face:
+                        s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
+                        if s < square:
+                            face, square, feature, fx, fy, fz = other, s, which, u, v, w
+                if feature != 0:
+                    face, square, feature, fx, fy, fz = walk_to_nearest(
+                        rows,
+                        places,
+                        faces,
+                        across,
+                        starts,
+                        around,
+                        spokes,
+                        vertex_regular,
+                        x,
+                        y,
+                        z,
+                        face,
+                        square,
+                        feature,
+                        fx,
+                        fy,
+                        fz,
+                    )
+                before = face
+                plane[j, k] = face
+                distance, told = np.sqrt(square), square < near and (len(telling) == 0 or telling[sample])
+                if own < 0:
+                    c = -1 - own
+                    away[1], away[2], away[3] = x - crossings[c, 1], y - crossings[c, 2], z - crossings[c, 3]
+                    other_distance = circle_distance(crossings[c], away, side, reach)
+                    if other_distance < distance:
+                        distance, told = other_distance, False
+                        confidence[i, j, k] = trusted[c]
+                behind = inside[i, j, k]
+                if told:
+                    cosine, regular = facing(
+                        faces,
+                        edges,
+                        face_normals,
+                        edge_normals,
+                        vertex_normals,
+                        edge_regular,
+                        vertex_regular,
+                        face,
+                        feature,
+                        x - fx,
+                        y - fy,
+                        z - fz,
+                        square,
+                    )
+                    if regular:
+                        behind = cosine < 0.0
+                values[i, j, k] = -distance if behind else distance
 
 
 @compiled(nogil=True)
