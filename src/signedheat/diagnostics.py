@@ -253,12 +253,21 @@ class BoundsNothing(Note):
 
 @dataclass(frozen=True, eq=False)
 class GeodesicWindows(Note):
-    """Number of windows in the exact polyhedral distance."""
+    """Number of windows in the exact polyhedral distance.
+
+    Attributes
+    ----------
+    windows : int
+        Their number, a measure of the work.
+    cut_short : bool
+        Whether there were so many that some distances are lengths of paths along edges instead of shortest ones.
+    """
 
     windows: int
+    cut_short: bool = False
 
     def __str__(self) -> str:
-        return f"windows: {self.windows}"
+        return f"windows: {self.windows}" + ("; some distances are along edges, too long" if self.cut_short else "")
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,6 +98,10 @@ class UnreachedWarning(UserWarning):
     """A connected component of the domain has no source; the distance there is NaN."""
 
 
+class InexactWarning(UserWarning):
+    """A result that is farther from exact than it promises to be, and says so in its diagnostics."""
+
+
 def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning attributed to the line of user code that called this package."""
     package = __name__.partition(".")[0]

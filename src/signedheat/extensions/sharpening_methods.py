@@ -5,6 +5,7 @@ The error of the heat method is smooth and decreases slowly under refinement. Bo
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import singledispatch
 
@@ -19,7 +20,6 @@ from ..errors import OutsideError, SignedHeatError, SourceError, UnsupportedType
 from ..lowering.direct_integration import DirectIntegration
 from ..lowering.surface.source import SurfaceSource
 from ..operators.linear_elements import LinearElements
-from ..parallel import run_cancellable
 from ..progress import Progress
 
 
@@ -64,10 +64,8 @@ class Geodesic:
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """Distances with the signs of φ; connected components without a zero set keep their values."""
-        distance, notes = run_cancellable(
-            lambda: straight_distance(discretization, values, source, self.tolerance),
-            None if progress is None else lambda: progress(0.0, "sharpen"),
-        )
+        report = None if progress is None else lambda: progress(0.0, "sharpen")
+        distance, notes = straight_distance(discretization, values, source, self.tolerance, report)
         if not np.isfinite(distance).any():
             raise OutsideError(
                 "the field has one sign everywhere, hence no zero set to measure from",
@@ -82,9 +80,16 @@ class Geodesic:
 
 @singledispatch
 def straight_distance(
-    discretization: object, values: NDArray[np.float64], source: SourceTerm | None, tolerance: float
+    discretization: object,
+    values: NDArray[np.float64],
+    source: SourceTerm | None,
+    tolerance: float,
+    report: Callable[[], None] | None,
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-    """Distance of every unknown from the zero set of `values`, inf where there is none in its component; and notes."""
+    """Distance of every unknown from the zero set of `values`, inf where there is none in its component; and notes.
+
+    `report` is called every now and then; an exception that it raises ends the search.
+    """
     raise UnsupportedTypeError(f"there are no straight lines on a {type(discretization).__name__}", element="method")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from ..geometry.tet_clipping import barycentric
 from ..geometry.visibility import tet_neighbors
 from ..lowering.tets.discretization import TetDiscretization
 from ..operators.linear_elements import LinearElements
+from ..parallel import run_cancellable
 from ..progress import Progress
 from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
@@ -40,7 +42,11 @@ def _(field: TetField, method: Method | None = None, progress: Progress | None =
 
 @straight_distance.register
 def _(
-    lowered: TetDiscretization, values: NDArray[np.float64], source: SourceTerm | None, tolerance: float
+    lowered: TetDiscretization,
+    values: NDArray[np.float64],
+    source: SourceTerm | None,
+    tolerance: float,
+    report: Callable[[], None] | None,
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Any-angle distance from the zero set in space, around the boundary of the mesh.
 
@@ -58,16 +64,12 @@ def _(
     walls = FacePlanes(
         unknowns, tet_neighbors(mesh.faces), mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs
     )
-    distance, nearest, feet, hidden = any_angle_distance(
-        walls,
-        points,
-        *by_element(unknowns, len(values), 4),
-        triangles,
-        corners,
-        *by_element(corners, len(positions), 3),
-        owners,
-        nearest,
-        GRAZING * lowered.spacing,
+    tets_at, triangles_at = by_element(unknowns, len(values), 4), by_element(corners, len(positions), 3)
+    distance, nearest, feet, hidden = run_cancellable(
+        lambda: any_angle_distance(
+            walls, points, *tets_at, triangles, corners, *triangles_at, owners, nearest, GRAZING * lowered.spacing
+        ),
+        report,
     )
     reached = np.flatnonzero(np.isfinite(distance))
     tets, feet = owners[nearest[reached]], feet[reached]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +11,11 @@ from numpy.typing import NDArray
 from ..diagnostics import GeodesicWindows, Note
 from ..discretization import SourceTerm, discretize
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
-from ..errors import GeometryError, UnsupportedTypeError
+from ..errors import GeometryError, InexactWarning, UnsupportedTypeError, warn_user
 from ..fields.vertex_field import VertexField
 from ..geometry.components import connected_components
 from ..geometry.curve_segments import CurveSegments, interpolation_at
-from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
+from ..geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line, window_limit
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in, concatenated, incident_faces
 from ..lowering.surface.discretization import SurfaceDiscretization
@@ -63,24 +64,38 @@ def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> NDArray[
 
 @straight_distance.register
 def _(
-    surface: SurfaceDiscretization, values: NDArray[np.float64], source: SourceTerm | None, tolerance: float
+    surface: SurfaceDiscretization,
+    values: NDArray[np.float64],
+    source: SourceTerm | None,
+    tolerance: float,
+    report: Callable[[], None] | None,
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Polyhedral distance from the zero set of the values and from unoriented sources."""
     unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
     if not isinstance(source, SurfaceSource) or not unsided:
-        distance, windows = distance_to_zero_line(surface.triangles, values, tolerance)
-        return distance, (GeodesicWindows(int(windows)),)
+        distance, windows = distance_to_zero_line(surface.triangles, values, tolerance, report)
+        return distance, (told(surface.triangles, windows),)
     # Unoriented curves run along edges of refined triangles, whose first vertices are those of the surface.
-    near, windows = distance_to_segments(source.triangles, unsided, tolerance)
+    near, windows = distance_to_segments(source.triangles, unsided, tolerance, report)
+    note = told(source.triangles, windows)
     near = near[: len(values)]
     if source.oriented:
         sided = np.concatenate(
             [interpolation_at(source.triangles, part.nodes).indices for part in source.parts if part.oriented]
         )
         lines = without_halos(surface.triangles, values, near < HALO * surface.spacing, sided[sided < len(values)])
-        distance, more = distance_to_zero_line(surface.triangles, lines, tolerance)
-        near, windows = np.minimum(near, distance), windows + more
-    return near, (GeodesicWindows(int(windows)),)
+        distance, more = distance_to_zero_line(surface.triangles, lines, tolerance, report)
+        also = told(surface.triangles, more)
+        near, note = np.minimum(near, distance), GeodesicWindows(windows + more, note.cut_short or also.cut_short)
+    return near, (note,)
+
+
+def told(triangles: IntrinsicMesh, windows: int) -> GeodesicWindows:
+    """The note on a search with so many windows, and a warning if it was cut short."""
+    note = GeodesicWindows(windows, cut_short=windows >= window_limit(triangles))
+    if note.cut_short:
+        warn_user(f"exact distance was cut short: {note}", InexactWarning)
+    return note
 
 
 def without_halos(
@@ -109,7 +124,10 @@ def without_halos(
 
 
 def distance_to_segments(
-    triangles: IntrinsicMesh, parts: list[CurveSegments], tolerance: float
+    triangles: IntrinsicMesh,
+    parts: list[CurveSegments],
+    tolerance: float,
+    report: Callable[[], None] | None = None,
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to curves along edges and to points anywhere; and the number of windows."""
     nodes = concatenated([part.nodes for part in parts])
@@ -124,4 +142,5 @@ def distance_to_segments(
         faces,
         (weights * triangles.corner_positions[faces]).sum(axis=1),
         tolerance,
+        report,
     )

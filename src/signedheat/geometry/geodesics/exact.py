@@ -10,24 +10,30 @@ stays in proportion to the number of faces.
 
 from __future__ import annotations
 
-import heapq
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
 
-from ...compiled import compiled
 from ..intrinsic_mesh import IntrinsicMesh
-from .initial_windows import Faces, GeodesicSources, initial_windows, propagate_across
-from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, hit, merge, outrun, put, ray, trim
+from .initial_windows import MADE, WANTED, Faces, GeodesicSources, Search
+from .propagation_kernels import ROUND, continue_search, start_search
 
-_ROUND = 1e-10
+WINDOWS_PER_HALFEDGE = 300
+"""A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual."""
 
+Report: TypeAlias = Callable[[], None]
+"""Called every tenth of a second or so; an exception that it raises ends the search."""
 
+_CHUNK = 1 << 16
 _NO_ID, _NO_POINT = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.complex128)
 
 
 def distance_to_zero_line(
-    triangles: IntrinsicMesh, values: NDArray[np.float64], tolerance: float = 1e-4
+    triangles: IntrinsicMesh, values: NDArray[np.float64], tolerance: float = 1e-4, report: Report | None = None
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to the zero set of a function that is linear in every face; and the number of windows.
 
@@ -39,19 +45,20 @@ def distance_to_zero_line(
         The function at the vertices; faces with a NaN corner contain no part of the zero set.
     tolerance : float
         Windows are merged where that changes distances by less than this fraction of the edge; 0 is exact.
+    report : callable, optional
+        Called between short stretches of work; an exception that it raises ends the search.
 
     Returns
     -------
     (n,) float
         inf where the zero set is not connected to the vertex.
     int
-        Number of windows, a measure of the work.
+        Number of windows, a measure of the work. If it is as large as `window_limit`, the search was cut short, and
+        some distances are lengths of paths that run along edges from where it ended.
     """
-    faces = Faces.of(triangles)
-    values = cleared(triangles, values, 1e-7 * float(faces.lengths.mean()))
-    return _propagate(
-        faces, is_pseudosource(triangles), GeodesicSources(values, _NO_ID, _NO_ID, _NO_ID, _NO_POINT), tolerance
-    )
+    values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
+    sources = GeodesicSources(values, _NO_ID, _NO_ID, _NO_ID, _NO_POINT)
+    return _distances(triangles, is_pseudosource(triangles), sources, tolerance, report)
 
 
 def distance_to_edges_and_points(
@@ -61,6 +68,7 @@ def distance_to_edges_and_points(
     faces: NDArray[np.int64],
     positions: NDArray[np.complex128],
     tolerance: float = 1e-4,
+    report: Report | None = None,
 ) -> tuple[NDArray[np.float64], int]:
     """Distance of every vertex to some edges, vertices, and points inside faces; and the number of windows.
 
@@ -75,10 +83,10 @@ def distance_to_edges_and_points(
     [4.0, 0.0, 5.0]
     """
     pseudosources = is_pseudosource(triangles)
-    sources = np.concatenate([np.asarray(vertices, dtype=np.int64), triangles.edges.vertices[edges].ravel()])
-    pseudosources[sources] = True
-    sources = GeodesicSources(np.ones(triangles.n_vertices), edges, sources, faces, positions)
-    return _propagate(Faces.of(triangles), pseudosources, sources, tolerance)
+    ends = np.concatenate([np.asarray(vertices, dtype=np.int64), triangles.edges.vertices[edges].ravel()])
+    pseudosources[ends] = True
+    sources = GeodesicSources(np.ones(triangles.n_vertices), edges, ends, faces, positions)
+    return _distances(triangles, pseudosources, sources, tolerance, report)
 
 
 def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
@@ -103,131 +111,47 @@ def is_pseudosource(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
     return special
 
 
-@compiled(nogil=True)
-def _reach(v, length, heap, distance, pseudosources):
-    """Record a path of this length to a vertex; if paths can bend around it (a pseudosource), queue it."""
-    if length < distance[v] * (1.0 - 1e-14):
-        distance[v] = length
-        if pseudosources[v]:
-            heapq.heappush(heap, (length, -1 - v))
+def window_limit(triangles: IntrinsicMesh) -> int:
+    """Number of windows after which a search is cut short."""
+    return WINDOWS_PER_HALFEDGE * 3 * triangles.n_faces
 
 
-@compiled(nogil=True)
-def _collect(state, latest, halfedge, at_tail, at_head, length, slack, tolerance):
-    """The windows queued for a halfedge, in order along it, trimmed against each other and merged where possible."""
-    windows, following, _ = state
-    count, number = 0, latest[halfedge]
-    while number >= 0:
-        count += 1
-        number = following[number]
-    chosen = np.empty((count, 6))
-    count, number = 0, latest[halfedge]
-    while number >= 0:
-        if not outrun(windows[number], at_tail, at_head, length, slack):
-            k = count
-            while k > 0 and chosen[k - 1, S0] > windows[number, S0]:
-                put(chosen[k - 1], chosen, k)
-                k -= 1
-            put(windows[number], chosen, k)
-            count += 1
-        number = following[number]
-    latest[halfedge] = -1
-    if tolerance == 0.0:
-        return chosen, count
-    kept = 0
-    for k in range(count):
-        if kept > 0:
-            trim(chosen[kept - 1], chosen[k])
-            if chosen[kept - 1, S1] <= chosen[kept - 1, S0]:
-                kept -= 1
-        if chosen[k, S1] <= chosen[k, S0]:
-            continue
-        if kept > 0 and merge(chosen[kept - 1], chosen[k], length, tolerance):
-            continue
-        put(chosen[k], chosen, kept)
-        kept += 1
-    return chosen, kept
+def _distances(
+    triangles: IntrinsicMesh,
+    pseudosources: NDArray[np.bool_],
+    sources: GeodesicSources,
+    tolerance: float,
+    report: Report | None,
+) -> tuple[NDArray[np.float64], int]:
+    """Distances from sources, and the number of windows; in short calls of kernels, between which it can be ended."""
+    faces, slack, limit = Faces.of(triangles), ROUND + 2.0 * tolerance, window_limit(triangles)
+    search = Search.start(triangles.n_faces, pseudosources, room=1024)
+    start_search(faces, sources, search, slack)
+    while search.counts[WANTED]:
+        search = Search.start(triangles.n_faces, pseudosources, room=2 * len(search.windows))
+        start_search(faces, sources, search, slack)
+    while search.queue.size[0] > 0 and search.counts[MADE] < limit:
+        if report is not None:
+            report()
+        if search.counts[WANTED]:
+            search = search.larger()
+            search.counts[WANTED] = 0
+        continue_search(faces, search, slack, tolerance, min(search.counts[MADE] + _CHUNK, limit))
+    if search.queue.size[0] > 0:
+        return _along_edges(triangles, search.distance), limit
+    return search.distance, min(int(search.counts[MADE]), limit - 1)
 
 
-@compiled(nogil=True)
-def _propagate(faces, pseudosources, sources, tolerance):
-    n = len(pseudosources)
-    distance = np.full(n, np.inf)
-    heap = [(0.0, 0)]
-    heap.pop()
-    state = (np.empty((1024, 6)), np.empty(1024, dtype=np.int64), len(heap))  # len(heap) is 0; a literal compiles twice
-    latest = np.full(3 * len(faces.vertices), -1, dtype=np.int64)  # window queued for each halfedge; others follow it
-    slack = _ROUND + 2.0 * tolerance
-    state = initial_windows(faces, sources, state, heap, latest, distance, slack)
-    for v in range(n):
-        if pseudosources[v] and distance[v] < np.inf:
-            heapq.heappush(heap, (distance[v], -1 - v))
-
-    while len(heap) > 0:
-        key, halfedge = heapq.heappop(heap)
-        if halfedge < 0:  # a pseudosource
-            v = -1 - halfedge
-            if key > distance[v]:
-                continue
-            for k in range(faces.first_corner[v], faces.first_corner[v + 1]):
-                face, corner = faces.corners[k] // 3, faces.corners[k] % 3
-                source = faces.positions[face, corner]
-                for step in range(1, 3):
-                    other = (corner + step) % 3
-                    length = key + abs(faces.positions[face, other] - source)
-                    _reach(faces.vertices[face, other], length, heap, distance, pseudosources)
-                side = (corner + 1) % 3
-                state = propagate_across(
-                    faces, state, heap, latest, distance, face, side, POINT, 0.0, 1.0, source, 0j, key, slack
-                )  # fmt: skip
-            continue
-
-        face, side = halfedge // 3, halfedge % 3
-        edge = faces.edges[face, side]
-        length = faces.lengths[edge]
-        tail, head = faces.edge_vertices[edge]
-        here, n_here = _collect(
-            state, latest, halfedge, distance[tail], distance[head], length, slack * length, tolerance
-        )
-        a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
-        ahead = faces.forward[face, side]
-        origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)
-        up = 1j if ahead else -1j  # faces lie to the left of their sides
-        apex = (faces.positions[face, (side + 2) % 3] - origin) * unit.conjugate()
-        cx, cy = apex.real, abs(apex.imag)
-        tail_side, head_side = ((side + 2) % 3, (side + 1) % 3) if ahead else ((side + 1) % 3, (side + 2) % 3)
-        for k in range(n_here):
-            w = here[k]
-            s0, s1 = w[S0], w[S1]
-            d0x, d0y = ray(w, s0)
-            d1x, d1y = ray(w, s1)
-            left = d0x * cy - d0y * (cx - s0)  # negative: the ray leaves the apex to its right
-            right = d1x * cy - d1y * (cx - s1)
-            if (
-                left > 0.0
-            ):  # the apex lies outside the visible sector, perhaps in a gap between windows: by way of a window's end
-                to_apex = arrival(w, s0, 0.0) + np.hypot(cx - s0, cy)
-            elif right < 0.0:
-                to_apex = arrival(w, s1, 0.0) + np.hypot(cx - s1, cy)
-            else:
-                to_apex = arrival(w, cx, cy)
-            _reach(faces.vertices[face, (side + 2) % 3], to_apex, heap, distance, pseudosources)
-            turned = unit * (w[P] + up * w[Q])
-            source, normal = (origin, turned) if w[KIND] == BEAM else (origin + turned, 0j)
-            if left < 0.0:  # visible on the side from tail to apex
-                t0 = hit(s0, d0x, d0y, 0.0, 0.0, cx, cy)
-                t1 = hit(s1, d1x, d1y, 0.0, 0.0, cx, cy) if right < 0.0 else 1.0
-                t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
-                state = propagate_across(
-                    faces, state, heap, latest, distance, face, tail_side, w[KIND], t0, t1, source, normal, w[SIGMA],
-                    slack,
-                )  # fmt: skip
-            if right > 0.0:  # visible on the side from apex to head
-                t0 = hit(s0, d0x, d0y, cx, cy, length, 0.0) if left > 0.0 else 0.0
-                t1 = hit(s1, d1x, d1y, cx, cy, length, 0.0)
-                t0, t1 = (1.0 - t1, 1.0 - t0) if ahead else (t0, t1)
-                state = propagate_across(
-                    faces, state, heap, latest, distance, face, head_side, w[KIND], t0, t1, source, normal, w[SIGMA],
-                    slack,
-                )  # fmt: skip
-    return distance, state[2]
+def _along_edges(triangles: IntrinsicMesh, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The least of these distances and of those along edges from other vertices."""
+    n, known = len(distance), np.flatnonzero(np.isfinite(distance))
+    tails, heads = triangles.edges.vertices.T
+    rows, columns = np.concatenate([tails, np.full(len(known), n)]), np.concatenate([heads, known])
+    lengths = np.concatenate([triangles.lengths_of_edges, distance[known]]) + 1e-300  # SciPy drops edges of length 0
+    order = np.lexsort([lengths, columns, rows])
+    rows, columns, lengths = rows[order], columns[order], lengths[order]
+    first = np.ones(len(rows), dtype=bool)  # the shortest of the edges that join two vertices
+    first[1:] = (np.diff(rows) != 0) | (np.diff(columns) != 0)
+    graph = csr_matrix((lengths[first], (rows[first], columns[first])), shape=(n + 1, n + 1))
+    result: NDArray[np.float64] = dijkstra(graph, directed=False, indices=n)[:n]
+    return result

@@ -78,6 +78,49 @@ def trim(a, b):
 
 
 @compiled(nogil=True)
+def trim_by(old, w, slack):
+    """Trim a window to where it is nearer, by more than `slack`, than an older one; from the middle nothing is cut."""
+    low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
+    if not high > low:
+        return
+    first = arrival(old, low, 0.0) - arrival(w, low, 0.0) <= slack
+    last = arrival(old, high, 0.0) - arrival(w, high, 0.0) <= slack
+    if first and last:
+        middle = 0.5 * (low + high)
+        if arrival(old, middle, 0.0) - arrival(w, middle, 0.0) > slack:
+            return
+        if low <= w[S0]:
+            w[S0] = high
+        elif high >= w[S1]:
+            w[S1] = low
+        return
+    if (first and low > w[S0]) or (last and high < w[S1]) or not (first or last):
+        return
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        if (arrival(old, middle, 0.0) - arrival(w, middle, 0.0) <= slack) == first:
+            low = middle
+        else:
+            high = middle
+    if first:
+        w[S0] = low
+    else:
+        w[S1] = high
+
+
+@compiled(nogil=True)
+def outdoes(w, old):
+    """Whether a window covers another one and is nearer at its ends and in its middle."""
+    if w[S0] > old[S0] or w[S1] < old[S1]:
+        return False
+    for k in range(3):
+        x = old[S0] + 0.5 * k * (old[S1] - old[S0])
+        if arrival(w, x, 0.0) > arrival(old, x, 0.0):
+            return False
+    return True
+
+
+@compiled(nogil=True)
 def merge(a, b, length, tolerance):
     """Merge window b into a, if they are neighbours and one wave approximates both; whether it was done."""
     if abs(a[S1] - b[S0]) > 1e-6 * length:
@@ -113,6 +156,16 @@ def merge(a, b, length, tolerance):
     for i in range(6):
         a[i] = merged[i]
     return True
+
+
+@compiled(nogil=True)
+def straighten(w):
+    """Make a wave straight, nowhere nearer at the edge, which would pass its focus in the face ahead."""
+    x, y = ray(w, 0.5 * (w[S0] + w[S1]))
+    norm = np.sqrt(x * x + y * y)
+    begin, end = arrival(w, w[S0], 0.0), arrival(w, w[S1], 0.0)
+    w[P], w[Q], w[KIND] = x / norm, y / norm, BEAM
+    w[SIGMA] = max(begin - w[S0] * w[P], end - w[S1] * w[P])
 
 
 @compiled(nogil=True)
