@@ -1,7 +1,8 @@
-"""Threads: their number, and jobs that run on a thread of their own so that they can be cancelled."""
+"""Threads: their number, and jobs on threads of their own so that they can be cancelled or limited in time."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, TimeoutError
@@ -83,3 +84,40 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
             if future.done():  # the timeout is the job's own
                 raise
             report()
+
+
+def run_limited(job: Callable[[], Any], seconds: float) -> Any:
+    """Run a job on a thread of its own, and stop it if it takes longer; returns the job's result.
+
+    For code of others in plain Python that may run for ever on odd input: it is stopped at the next of its steps. What
+    a step does inside another language is not interrupted, but no longer waited for.
+
+    Raises
+    ------
+    TimeoutError
+        If the job takes longer.
+
+    Examples
+    --------
+    >>> run_limited(lambda: 6 * 7, 10.0)
+    42
+    """
+    future: Future[Any] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(job())
+        except BaseException as error:
+            future.set_exception(error)
+
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        return future.result(seconds)
+    except TimeoutError:
+        if future.done():  # the timeout is the job's own
+            raise
+        raise TimeoutError(f"it takes more than {seconds:.0f} seconds") from None
+    finally:
+        if not future.done() and thread.ident is not None:
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit))

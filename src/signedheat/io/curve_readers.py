@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -85,6 +86,8 @@ def read_segments(path: PathLike, lines: list[list[str]], domain: EmbeddedSurfac
     offset, edges = 1, None
     for number, words in enumerate(lines, start=1):
         if words[:1] == ["#offset"] and len(words) > 1:
+            if not re.fullmatch(r"[-+]?\d{1,18}", words[1]):
+                raise damaged(path, number, words, "the offset is no whole number")
             offset = int(words[1])
         if not words or words[0].startswith("#") or words[0] == "n":
             continue
@@ -173,7 +176,7 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
             else:
                 raise ValueError(f"the kind '{group['kind']}' is none of {SIGNED}, {UNSIGNED}, {POINTS}")
         return groups
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         if isinstance(error, (FileFormatError, SourceError)):
             raise
         raise FileFormatError(
@@ -195,7 +198,8 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
     for number, words in enumerate((line.split() for line in text(path).splitlines()), start=1):
         try:
             if words[:1] == ["v"]:
-                vertices.append([float(word) for word in words[1:4]])
+                x, y, z = words[1:4]
+                vertices.append([float(x), float(y), float(z)])
             elif words[:1] in (["l"], ["p"]):
                 ids = [int(word.split("/")[0]) for word in words[1:]]
                 ids = [i - 1 if i > 0 else len(vertices) + i for i in ids]

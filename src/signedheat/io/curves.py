@@ -33,7 +33,7 @@ from .curve_readers import (
     read_obj,
     read_text,
 )
-from .files import PathLike, extension, replacing, unknown_extension
+from .files import PathLike, extension, reading, replacing, unknown_extension
 
 
 def read_curves(path: PathLike, domain: EmbeddedSurface, strict: bool = False) -> list[CurveOrPoints]:
@@ -77,13 +77,11 @@ def read_curves(path: PathLike, domain: EmbeddedSurface, strict: bool = False) -
     """
     if extension(path) not in READERS:
         raise unknown_extension(path, READERS, "curves")
-    try:
+    with reading(path):
         found = READERS[extension(path)](path, domain)
         sources = [source if isinstance(source, Curve) else placed(source, domain) for source in found]
         if strict:
             refuse_gaps(sources, domain.triangulation)
-    except SourceError as error:
-        raise error.at(path) from error
     if not sources:
         raise FileFormatError(
             "there is no curve and no point",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +17,9 @@ from ..fields.tet_field import TetField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..packages import lazy_module, require
-from .files import PathLike, contents, ensure_writable, extension, replacing, unknown_extension
+from .arrays import read_npy, read_npz
+from .files import PathLike, contents, ensure_writable, extension, reading, replacing, unknown_extension
+from .nrrd_files import read_image
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
 from .tets import TET_FIELD_FORMATS, load_tet_field, save_tet_field
 from .vtk_xml import read_vti, write_vti
@@ -144,8 +145,13 @@ def load_field(path: PathLike) -> Field:
     if extension(path) not in _FORMATS:
         raise unknown_extension(path, _FORMATS, "a field")
     _, read = _FORMATS[extension(path)]
+    with reading(path):
+        return _field_of(read(path), path)
+
+
+def _field_of(parts: Parts, path: PathLike) -> GridField:
+    values, origin, spacing, *mask = parts
     try:
-        values, origin, spacing, *mask = read(path)
         if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
             raise FileFormatError(
                 f"the values are no real numbers but {values.dtype}: it holds no field",
@@ -174,23 +180,15 @@ def _write_npz(field: GridField, path: Path) -> None:
 
 
 def _read_npz(path: PathLike) -> Parts:
-    try:
-        with np.load(io.BytesIO(contents(path)), allow_pickle=False) as file:
-            solid = [file["mask"]] if "mask" in file else []
-            return file["values"], file["origin"], file["spacing"], *solid
-    except KeyError as error:
+    found = read_npz(path, ("values", "origin", "spacing", "mask"))
+    lacking = [name for name in ("values", "origin", "spacing") if name not in found]
+    if lacking:
         raise FileFormatError(
-            f"{error}: a field has values, origin and spacing",
+            f"it has no {lacking[0]}: a field has values, origin and spacing",
+            element=lacking[0],
             path=path,
-        ) from error
-    except FileFormatError:
-        raise
-    except Exception as error:
-        raise FileFormatError(
-            f"it is no .npz file, or is truncated ({error})",
-            remedy="write it again",
-            path=path,
-        ) from error
+        )
+    return found["values"], found["origin"], found["spacing"], *([found["mask"]] if "mask" in found else [])
 
 
 def _write_npy(field: GridField, path: Path) -> None:
@@ -199,26 +197,11 @@ def _write_npy(field: GridField, path: Path) -> None:
 
 
 def _read_npy(path: PathLike) -> Parts:
-    try:
-        values = np.load(io.BytesIO(contents(path)), allow_pickle=False)
-    except ValueError as error:
-        raise FileFormatError(
-            f"it is no .npy file, or is truncated ({error})",
-            remedy="write it again",
-            path=path,
-        ) from error
-    beside = Path(path).with_suffix(".json")
-    try:
-        about = json.loads(contents(beside))
+    values, beside = read_npy(path), Path(path).with_suffix(".json")
+    text = contents(beside)
+    with reading(beside):
+        about = json.loads(text)
         return values, np.array(about["origin"], dtype=np.float64), np.array(about["spacing"], dtype=np.float64)
-    except (ValueError, KeyError, TypeError) as error:
-        if isinstance(error, FileFormatError):
-            raise
-        raise FileFormatError(
-            f"origin and spacing cannot be read ({error})",
-            remedy="write them again",
-            path=beside,
-        ) from error
 
 
 def _write_vti(field: GridField, path: Path) -> None:
@@ -240,16 +223,7 @@ def _write_nrrd(field: GridField, path: Path) -> None:
 
 
 def _read_nrrd(path: PathLike) -> Parts:
-    contents(path)
-    read = nrrd.read
-    try:
-        values, header = read(str(path), index_order="F")
-    except Exception as error:
-        raise FileFormatError(
-            f"it is no NRRD file, or is truncated ({error})",
-            remedy="write it again",
-            path=path,
-        ) from error
+    values, header = read_image(path)
     directions = np.atleast_2d(header.get("space directions", np.diag(header.get("spacings", np.ones(values.ndim)))))
     spacing = np.diag(directions) if directions.shape == (values.ndim, values.ndim) else np.zeros(values.ndim)
     if not np.array_equal(directions, np.diag(spacing)):

@@ -1,20 +1,30 @@
-"""File names, contents, and atomic replacement of files."""
+"""The one place where files are opened, sized and replaced.
+
+Whatever is read is a regular file that fits into memory, and whatever goes wrong in a parser is an error that names the
+file. Whatever is written is written beside, with the permissions that it will have, and renamed when it is whole.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
-from collections.abc import Collection, Iterator
+import stat
+import warnings
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FileFormatError
+from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
+from ..memory import available_memory
+from ..parallel import run_limited
 
 PathLike = str | os.PathLike[str]
+T = TypeVar("T")
 
 
 def extension(path: PathLike) -> str:
@@ -33,6 +43,60 @@ def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> F
     )
 
 
+@contextmanager
+def reading(path: PathLike) -> Iterator[None]:
+    """Whatever goes wrong within, however a parser puts it, becomes an error that names the file.
+
+    Raises
+    ------
+    SignedHeatError
+        Those raised within; about this file, unless they name another.
+    MemoryLimitError
+        If what the file announces does not fit into memory.
+    FileFormatError
+        For everything else: the file is damaged.
+    """
+    try:
+        with np.errstate(all="ignore"):  # values are looked at by the shapes and fields that are made of them
+            yield
+    except SignedHeatError as error:
+        if error.path is not None:
+            raise
+        raise error.at(path) from error
+    except MemoryError as error:
+        raise MemoryLimitError(
+            "what it announces does not fit into memory",
+            remedy="check that it is not damaged",
+            path=path,
+        ) from error
+    except Exception as error:  # parsers, ours and those of others, meet damage with exceptions of any type
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FileFormatError(
+            f"it is damaged, or of another kind ({reason:.200})",
+            remedy="write or download it again",
+            path=path,
+        ) from error
+
+
+def parsed_by_others(parse: Callable[[], T], size: int) -> T:
+    """What code of another package makes of a file of `size` bytes, without its warnings, and within a limit of time.
+
+    Raises
+    ------
+    TimeoutError
+        If it takes ten seconds, and one for each 100 kB, to which `reading` gives the name of the file.
+    """
+
+    def quietly() -> T:
+        with np.errstate(all="ignore"):
+            return parse()
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about files that are not closed, odd fields, and the like
+        result: T = run_limited(quietly, 10.0 + size / 1e5)
+    return result
+
+
 def contents(path: PathLike) -> bytes:
     """The bytes of a file.
 
@@ -40,9 +104,17 @@ def contents(path: PathLike) -> bytes:
     ------
     FileFormatError
         If it is missing, is not a regular file, cannot be read, or is empty.
+    MemoryLimitError
+        If it is larger than the memory that is free.
     """
     try:
-        data = Path(path).read_bytes()
+        # without waiting, as for the writer of a pipe, until it is known what it is
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise _no_file(path, status.st_mode)
+            ensure_fits(status.st_size, path)
+            data = file.read()
     except FileNotFoundError:
         raise FileFormatError(
             "there is no such file",
@@ -61,6 +133,10 @@ def contents(path: PathLike) -> bytes:
             remedy="check its permissions",
             path=path,
         ) from error
+    except ValueError as error:  # a name with a null character
+        if isinstance(error, SignedHeatError):
+            raise
+        raise FileFormatError(f"this is no name of a file ({error})", remedy="check the name", path=path) from error
     if not data:
         raise FileFormatError(
             "the file is empty",
@@ -68,6 +144,65 @@ def contents(path: PathLike) -> bytes:
             path=path,
         )
     return data
+
+
+def contents_beside(path: PathLike, name: str) -> bytes:
+    """The bytes of a file that another one names, which must lie in the same folder or below it.
+
+    Raises
+    ------
+    FileFormatError
+        If it lies elsewhere, or cannot be read.
+    """
+    folder = os.path.realpath(Path(path).parent)
+    named = os.path.realpath(os.path.join(folder, name))
+    if os.path.isabs(name) or os.path.commonpath([folder, named]) != folder:
+        raise FileFormatError(
+            f"it refers to {name!r}, outside its folder",
+            remedy="put both into one folder",
+            element=name,
+            path=path,
+        )
+    return contents(named)
+
+
+def ensure_fits(size: int, path: PathLike) -> None:
+    """Check before anything is allocated that so many bytes, which a file has or announces, are free.
+
+    Raises
+    ------
+    MemoryLimitError
+        If they are not.
+    """
+    free = available_memory()
+    if free is not None and size > free:
+        raise MemoryLimitError(
+            f"it holds {size / 1e9:.3g} GB, and {free / 1e9:.3g} GB of memory are free",
+            remedy="check that it is not damaged, or free some memory",
+            path=path,
+        )
+
+
+def unpacked(data: bytes, machine: Any, size: int) -> bytes:
+    """At most `size` bytes of what packed data become.
+
+    Examples
+    --------
+    >>> import zlib
+    >>> unpacked(zlib.compress(bytes(10**6)), zlib.decompressobj(), 3)
+    b'\\x00\\x00\\x00'
+    """
+    return bytes(machine.decompress(data, size)) if size else b""
+
+
+def _no_file(path: PathLike, mode: int) -> FileFormatError:
+    kinds = ((stat.S_ISDIR, "folder"), (stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
+    kind = next((name for test, name in kinds if test(mode)), "device")
+    return FileFormatError(
+        f"this is a {kind}",
+        remedy="name a regular file",
+        path=path,
+    )
 
 
 def text(path: PathLike) -> str:
@@ -94,29 +229,23 @@ def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> Non
     """
     if extension(path) not in known:
         raise unknown_extension(path, known, purpose)
-    if Path(path).is_dir():
-        raise FileFormatError(
-            "this is a folder",
-            remedy="name a file in it",
-            path=path,
-        )
     with _writing(path):
-        trial = _unused_name(path)
-        trial.touch(exist_ok=False)
-        trial.unlink()
+        os.unlink(_new_file(path))
 
 
 @contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
     """A temporary file to write to, which is renamed to `path` on success and removed otherwise.
 
+    It lies beside the file that `path` leads to, and has the permissions of that file, or those that new files have.
+
     Raises
     ------
     FileFormatError
-        If the file cannot be written; an existing file is then left unchanged.
+        If the file cannot be written, or is no regular file; what exists is then left unchanged.
     """
-    temporary = _unused_name(path)
     with _writing(path):
+        temporary = _new_file(path)
         try:
             yield temporary
             os.replace(temporary, os.path.realpath(path))
@@ -125,9 +254,23 @@ def replacing(path: PathLike) -> Iterator[Path]:
                 temporary.unlink()
 
 
-def _unused_name(path: PathLike) -> Path:
+def _new_file(path: PathLike) -> Path:
+    """An empty file of a name that is not used, beside what `path` leads to and with the same permissions."""
     real = Path(os.path.realpath(path))
-    return real.with_name(f".{real.stem}.{secrets.token_hex(4)}{real.suffix}")
+    status = os.stat(real) if real.exists() else None
+    if status is not None and not stat.S_ISREG(status.st_mode):
+        raise _no_file(path, status.st_mode)
+    if status is not None and not os.access(real, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    new = real.with_name(f".signedheat-{secrets.token_hex(8)}{real.suffix}")
+    # created for its owner alone, so that what is secret is so from the start
+    os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600 if status is not None else 0o666))
+    if status is not None:
+        with suppress(OSError):
+            os.chown(new, status.st_uid, status.st_gid)
+        with suppress(OSError):
+            os.chmod(new, stat.S_IMODE(status.st_mode))
+    return new
 
 
 @contextmanager

@@ -31,6 +31,12 @@ def read_off(path: PathLike) -> SurfaceShape:
             path=path,
         )
     n_vertices, n_faces = numbers(rows[0][:2], path, "counts", int).tolist()
+    if n_vertices < 0 or n_faces < 0:
+        raise FileFormatError(
+            f"{n_vertices} vertices and {n_faces} faces are announced: the file is damaged",
+            remedy="write or download it again",
+            path=path,
+        )
     lines = iter(rows[1:])
     vertex_rows = list(islice(records(lines, lambda row: 3), n_vertices))
     face_rows = list(islice(records(lines, lambda row: 1 + corner_count(row[0])), n_faces))
@@ -65,14 +71,15 @@ def read_off(path: PathLike) -> SurfaceShape:
 def records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
     """Lines joined until each holds as many words as its beginning asks for; more words on its last line stay."""
     for row in lines:
-        while len(row) < length(row) and (more := next(lines, None)) is not None:
-            row = row + more
+        wanted = length(row)
+        while len(row) < wanted and (more := next(lines, None)) is not None:
+            row += more
         yield row
 
 
 def corner_count(word: str) -> int:
     """Number of corners of a face; 0 for what is no number, which is refused later."""
-    return int(word) if word.isdigit() else 0
+    return int(word) if word.isdecimal() and len(word) < 19 else 0
 
 
 def write_off(shape: SurfaceShape, path: PathLike) -> bytes:

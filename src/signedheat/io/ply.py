@@ -27,6 +27,8 @@ _TYPES = {
     ]
     for name in names.split()
 }
+_INTEGERS = {name: code for name, code in _TYPES.items() if code[0] != "f"}
+"""What lists can be counted by."""
 
 
 @dataclass
@@ -37,14 +39,20 @@ class _Element:
     count: int
     properties: dict[str, str | tuple[str, str]] = field(default_factory=dict)
 
+    def add(self, name: str, kind: str | tuple[str, str]) -> None:
+        """Append a property, whose name must be new."""
+        if name in self.properties:
+            raise ValueError(name)
+        self.properties[name] = kind
+
 
 def read_ply(path: PathLike) -> SurfaceShape:
     """The faces of a PLY file, including triangle strips; or its points, with ``nx ny nz`` and ``area`` if present."""
     data = contents(path)
     form, elements, body = _header(data, path)
-    read_element = _text_reader(body, path) if form == "ascii" else _binary_reader(body, form, path)
+    read_element = _text_reader(body, path) if form == "ascii" else _BinaryReader(body, form, path).read
     tables = {element.name: read_element(element) for element in elements}
-    vertex = tables.get("vertex", {})
+    vertex = {name: column for name, column in tables.get("vertex", {}).items() if not isinstance(column, tuple)}
     if not {"x", "y", "z"} <= vertex.keys():
         raise FileFormatError(
             "there is no element 'vertex' with x, y and z: this holds no shape",
@@ -53,10 +61,13 @@ def read_ply(path: PathLike) -> SurfaceShape:
     vertices = _columns(vertex, "xyz")
     face = tables.get("face", {})
     lists = face.get("vertex_indices", face.get("vertex_index"))
+    if lists is not None and not isinstance(lists, tuple):
+        raise FileFormatError("the vertex ids of faces are no lists", remedy="write it again", path=path)
     if lists is not None and len(lists[1]):
         return assemble(vertices, *lists)
-    if "tristrips" in tables:
-        faces = _unrolled(next(iter(tables["tristrips"].values()))[0])
+    strips = next((column for column in tables.get("tristrips", {}).values() if isinstance(column, tuple)), None)
+    if strips is not None and len(strips[0]) >= 3:
+        faces = _unrolled(strips[0])
         return assemble(vertices, faces.ravel(), np.full(len(faces), 3))
     normals = _columns(vertex, ["nx", "ny", "nz"]) if {"nx", "ny", "nz"} <= vertex.keys() else None
     return PointCloud(vertices, normals, vertex.get("area"))
@@ -116,11 +127,11 @@ def _header(data: bytes, path: PathLike) -> tuple[str, list[_Element], bytes]:
                 case ["format"]:
                     form = words[1]
                 case ["element"]:
-                    elements.append(_Element(words[1], int(words[2])))
+                    elements.append(_Element(words[1], _count(words[2])))
                 case ["property"] if words[1] == "list":
-                    elements[-1].properties[words[4]] = (_TYPES[words[2]], _TYPES[words[3]])
+                    elements[-1].add(words[4], (_INTEGERS[words[2]], _TYPES[words[3]]))
                 case ["property"]:
-                    elements[-1].properties[words[2]] = _TYPES[words[1]]
+                    elements[-1].add(words[2], _TYPES[words[1]])
         except (IndexError, KeyError, ValueError):
             raise FileFormatError(
                 f"the header line '{line}' makes no sense: the file is damaged",
@@ -136,6 +147,13 @@ def _header(data: bytes, path: PathLike) -> tuple[str, list[_Element], bytes]:
     return form, elements, data[newline + 1 :]
 
 
+def _count(word: str) -> int:
+    """The number of rows of an element."""
+    if not word.isdecimal() or len(word) > 18:
+        raise ValueError(word)
+    return int(word)
+
+
 def _truncated(path: PathLike, element: _Element) -> FileFormatError:
     return FileFormatError(
         f"the data end within the {element.count} announced of element '{element.name}': the file is truncated",
@@ -144,69 +162,83 @@ def _truncated(path: PathLike, element: _Element) -> FileFormatError:
     )
 
 
-def _binary_reader(body: bytes, form: str, path: PathLike) -> Any:
-    order = "<" if form == "binary_little_endian" else ">"
-    at = 0
+@dataclass
+class _BinaryReader:
+    """Reads one element after another."""
 
-    def read(element: _Element) -> dict[str, Any]:
-        nonlocal at
-        lengths = _first_lengths(at, element)
-        row = np.dtype(
-            [
-                entry
-                for name, kind in element.properties.items()
-                for entry in (
-                    [(name, order + kind)]
-                    if isinstance(kind, str)
-                    else [(f"{name} count", order + kind[0]), (name, order + kind[1], (lengths[name],))]
-                )
-            ]
+    body: bytes
+    form: str
+    path: PathLike
+    at: int = 0
+
+    def __post_init__(self) -> None:
+        self.order = "<" if self.form == "binary_little_endian" else ">"
+
+    def read(self, element: _Element) -> dict[str, Any]:
+        """Columns by name; of lists, all entries in a row and their numbers."""
+        if not element.properties:
+            return {}
+        lists = {name: kind for name, kind in element.properties.items() if isinstance(kind, tuple)}
+        smallest = sum(
+            int(kind[1]) if isinstance(kind, str) else int(kind[0][1]) for kind in element.properties.values()
         )
-        if len(body) - at >= row.itemsize * element.count:  # try: all lists have the length of the first
-            rows = np.frombuffer(body, row, element.count, at)
-            if all((rows[f"{name} count"] == length).all() for name, length in lengths.items()):
-                at += row.itemsize * element.count
-                counted = {name: np.full(element.count, length) for name, length in lengths.items()}
-                return {
-                    name: (rows[name].astype(np.int64).ravel(), counted[name]) if name in counted else rows[name]
-                    for name in element.properties
-                }
-        if not lengths:
-            raise _truncated(path, element)
-        return _row_by_row(element)
+        if element.count * smallest > len(self.body) - self.at:
+            raise _truncated(self.path, element)
+        table = self._all_alike(element, lists)
+        return self._row_by_row(element) if table is None else table
 
-    def one(code: str, position: int, count: int = 1) -> NDArray[Any]:
-        return np.frombuffer(body, order + code, count, position)
+    def _all_alike(self, element: _Element, lists: dict[str, tuple[str, str]]) -> dict[str, Any] | None:
+        """The table if all lists have the length of the first, which is quick; otherwise nothing."""
+        lengths = self._first_lengths(element)
+        entries: list[Any] = []
+        for number, (name, kind) in enumerate(element.properties.items()):
+            if isinstance(kind, str):
+                entries.append((f"value {number}", self.order + kind))
+            else:
+                entries.append((f"count {number}", self.order + kind[0]))
+                entries.append((f"value {number}", self.order + kind[1], (lengths[name],)))
+        row = np.dtype(entries)
+        if len(self.body) - self.at < row.itemsize * element.count:
+            return None
+        rows = np.frombuffer(self.body, row, element.count, self.at)
+        columns = {name: f"value {number}" for number, name in enumerate(element.properties)}
+        if any((rows[columns[name].replace("value", "count")] != lengths[name]).any() for name in lists):
+            return None
+        self.at += row.itemsize * element.count
+        return {
+            name: (rows[column].astype(np.int64).ravel(), np.full(element.count, lengths[name]))
+            if name in lists
+            else rows[column]
+            for name, column in columns.items()
+        }
 
-    def _first_lengths(position: int, element: _Element) -> dict[str, int]:
+    def _first_lengths(self, element: _Element) -> dict[str, int]:
         lengths: dict[str, int] = {}
+        position = self.at
         for name, kind in element.properties.items():
             if isinstance(kind, str):
                 position += int(kind[1])
                 continue
             size = int(kind[0][1])
-            enough = element.count > 0 and position + size <= len(body)
-            lengths[name] = max(0, int(one(kind[0], position)[0])) if enough else 0
+            enough = element.count > 0 and position + size <= len(self.body)
+            length = int(self._numbers(kind[0], position)[0]) if enough else 0
+            lengths[name] = length if 0 <= length <= len(self.body) else 0
             position += size + lengths[name] * int(kind[1][1])
         return lengths
 
-    def _row_by_row(element: _Element) -> dict[str, Any]:
-        nonlocal at
+    def _numbers(self, code: str, position: int, count: int = 1) -> NDArray[Any]:
+        return np.frombuffer(self.body, self.order + code, count, position)
+
+    def _row_by_row(self, element: _Element) -> dict[str, Any]:
         columns: dict[str, list[Any]] = {name: [] for name in element.properties}
         counts: dict[str, list[int]] = {name: [] for name in element.properties}
-        try:
-            for _ in range(element.count):
-                for name, kind in element.properties.items():
-                    length = 1
-                    if not isinstance(kind, str):
-                        length = int(one(kind[0], at)[0])
-                        at += int(kind[0][1])
-                        counts[name].append(length)
-                    code = kind if isinstance(kind, str) else kind[1]
-                    columns[name].append(one(code, at, length))
-                    at += length * int(code[1])
-        except ValueError:
-            raise _truncated(path, element) from None
+        for _ in range(element.count):
+            for name, kind in element.properties.items():
+                length, code = 1, kind if isinstance(kind, str) else kind[1]
+                if not isinstance(kind, str):
+                    length = int(self._one(kind[0], 1, element)[0])
+                    counts[name].append(length)
+                columns[name].append(self._one(code, length, element))
         return {
             name: np.concatenate(columns[name])
             if isinstance(kind, str)
@@ -214,13 +246,21 @@ def _binary_reader(body: bytes, form: str, path: PathLike) -> Any:
             for name, kind in element.properties.items()
         }
 
-    return read
+    def _one(self, code: str, length: int, element: _Element) -> NDArray[Any]:
+        """The next numbers."""
+        size = length * int(code[1])
+        if length < 0 or self.at + size > len(self.body):
+            raise _truncated(self.path, element)
+        self.at += size
+        return self._numbers(code, self.at - size, length)
 
 
 def _text_reader(body: bytes, path: PathLike) -> Any:
     lines = iter([line for line in body.decode("ascii", errors="replace").splitlines() if line.strip()])
 
     def read(element: _Element) -> dict[str, Any]:
+        if not element.properties:
+            return {}
         rows = [line.split() for _, line in zip(range(element.count), lines, strict=False)]
         if len(rows) < element.count:
             raise _truncated(path, element)
@@ -234,6 +274,8 @@ def _text_reader(body: bytes, path: PathLike) -> Any:
                     continue
                 counts = numbers([row[k] for row, k in zip(rows, starts, strict=True)], path, f"'{name}'", int)
                 ends = [k + 1 + n for k, n in zip(starts, counts.tolist(), strict=True)]
+                if any(n < 0 for n in counts.tolist()):
+                    raise IndexError
                 if any(len(row) < end for row, end in zip(rows, ends, strict=True)):
                     raise IndexError
                 flat = [word for row, k, end in zip(rows, starts, ends, strict=True) for word in row[k + 1 : end]]

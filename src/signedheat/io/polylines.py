@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from ..domains.polyline import Polyline
 from ..errors import FileFormatError, GeometryError
 from ..packages import lazy_module
-from .files import PathLike, contents, extension, replacing, unknown_extension
+from .files import PathLike, contents, extension, parsed_by_others, reading, replacing, unknown_extension
 from .point_lists import read_point_lists, write_point_lists
 
 svgpathtools = lazy_module("svgpathtools", "SVG drawings")
@@ -54,7 +55,8 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     """
     if extension(path) not in POLYLINE_FORMATS:
         raise unknown_extension(path, POLYLINE_FORMATS, "polylines in the plane")
-    lists = read_svg(path) if extension(path) == ".svg" else read_point_lists(path, 2)
+    with reading(path):
+        lists = read_svg(path) if extension(path) == ".svg" else read_point_lists(path, 2)
     lines = []
     for number, (points, closed) in enumerate(lists):
         try:
@@ -95,25 +97,8 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
 
 def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
     """Points of each subpath, and whether it is closed."""
-    contents(path)
-    conversions = {**svgpathtools.document.CONVERSIONS, "circle": clockwise_ellipse, "ellipse": clockwise_ellipse}
-    try:
-        whole_paths = svgpathtools.Document(str(path)).paths(path_conversions=conversions)
-        subpaths = [part for whole in whole_paths for part in whole.continuous_subpaths()]
-        found = []
-        for subpath in subpaths:
-            pieces = [
-                [0.0] if isinstance(s, svgpathtools.Line) else np.arange(CURVE_PIECES) / CURVE_PIECES for s in subpath
-            ]
-            places = [s.point(t) for s, ts in zip(subpath, pieces, strict=True) for t in ts]
-            closed = abs(subpath.end - subpath.start) <= 1e-9 * max(map(abs, places), default=0.0)
-            found.append((np.array(places if closed else [*places, subpath.end]), closed))
-    except Exception as error:  # the parser raises exceptions of any type
-        raise FileFormatError(
-            f"it is no SVG drawing, or is damaged ({error})",
-            remedy="write it again",
-            path=path,
-        ) from error
+    data = contents(path)
+    found = parsed_by_others(lambda: _subpaths(data), len(data))
     if not found:
         raise FileFormatError(
             "there is no line in the drawing",
@@ -121,6 +106,22 @@ def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
             path=path,
         )
     return [(np.stack([points.real, -points.imag], axis=1), closed) for points, closed in found]
+
+
+def _subpaths(data: bytes) -> list[tuple[NDArray[np.complex128], bool]]:
+    """Complex points of each subpath, and whether it is closed."""
+    conversions = {**svgpathtools.document.CONVERSIONS, "circle": clockwise_ellipse, "ellipse": clockwise_ellipse}
+    whole_paths = svgpathtools.Document(BytesIO(data)).paths(path_conversions=conversions)
+    subpaths = [part for whole in whole_paths for part in whole.continuous_subpaths()]
+    found = []
+    for subpath in subpaths:
+        pieces = [
+            [0.0] if isinstance(s, svgpathtools.Line) else np.arange(CURVE_PIECES) / CURVE_PIECES for s in subpath
+        ]
+        places = [s.point(t) for s, ts in zip(subpath, pieces, strict=True) for t in ts]
+        closed = abs(subpath.end - subpath.start) <= 1e-9 * max(map(abs, places), default=0.0)
+        found.append((np.array(places if closed else [*places, subpath.end]), closed))
+    return found
 
 
 def clockwise_ellipse(element: Any) -> str:

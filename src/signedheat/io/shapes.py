@@ -8,16 +8,14 @@ from ..domains.digital_surface import DigitalSurface
 from ..domains.exchange import save_shape
 from ..domains.kinds import Shape
 from ..domains.tet_mesh import TetMesh
-from ..errors import GeometryError
 from .elements import SurfaceShape
-from .files import PathLike, extension, replacing, unknown_extension
+from .files import PathLike, extension, reading, replacing, unknown_extension
 from .glb import read_glb
 from .obj import read_obj, write_obj, write_pc
 from .off import read_off, write_off
 from .ply import read_ply, write_ply
 from .stl import read_stl, write_stl
-from .tets import MODULES as TET_FORMATS
-from .tets import read_tets, write_tets
+from .tets import TET_FORMATS, read_tets, write_tets
 from .volumes import read_volume
 from .vtk_xml import read_vtp, write_vtp
 from .xyz import read_xyz, write_xyz
@@ -89,10 +87,8 @@ def read(path: PathLike) -> Shape:
     reader = READERS.get(extension(path))
     if reader is None:
         raise unknown_extension(path, READERS, "a shape")
-    try:
+    with reading(path):
         return reader(path)
-    except GeometryError as error:
-        raise error.at(path) from error
 
 
 def save(shape: Shape, path: PathLike) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from typing import Any
-from zipfile import BadZipFile, ZipFile, is_zipfile
 
 import numpy as np
 
@@ -18,8 +17,9 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..fields.vertex_field import VertexField
+from .arrays import names_in_npz, read_npz
 from .elements import SurfaceShape, faces_of, points_of
-from .files import PathLike, contents, extension, replacing, unknown_extension
+from .files import PathLike, extension, reading, replacing, unknown_extension
 from .vtk_xml import _Writer
 
 NAME = "signed_distance"
@@ -47,9 +47,8 @@ def _on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
 
 def load_vertex_field(path: PathLike) -> VertexField:
     """Read what `save_vertex_field` wrote to an ``.npz`` file."""
-    try:
-        with np.load(io.BytesIO(contents(path)), allow_pickle=False) as file:
-            arrays = dict(file)
+    arrays = read_npz(path, ("vertices", "values", "faces", "offsets", "normals"))
+    with reading(path):
         vertices, values = arrays["vertices"], arrays["values"]
         if "offsets" in arrays:
             domain: SurfaceShape = PolygonMesh(vertices, np.split(arrays["faces"], arrays["offsets"][1:-1]))
@@ -57,19 +56,6 @@ def load_vertex_field(path: PathLike) -> VertexField:
             domain = TriangleMesh(vertices, arrays["faces"])
         else:
             domain = PointCloud(vertices, arrays.get("normals"))
-    except KeyError as error:
-        raise FileFormatError(
-            f"{error}: a field on a surface has values and vertices",
-            path=path,
-        ) from error
-    except FileFormatError:
-        raise
-    except (ValueError, OSError, EOFError, BadZipFile) as error:
-        raise FileFormatError(
-            f"it is no .npz file, or is damaged ({error})",
-            remedy="write it again",
-            path=path,
-        ) from error
     if values.shape != (len(vertices),):
         raise FileFormatError(
             f"{values.shape} values for {len(vertices)} vertices: the file is damaged",
@@ -81,10 +67,7 @@ def load_vertex_field(path: PathLike) -> VertexField:
 
 def is_vertex_field(path: PathLike) -> bool:
     """Whether `load_vertex_field` can read a file."""
-    if extension(path) != ".npz" or not is_zipfile(path):
-        return False
-    with ZipFile(path) as file:
-        return {"values.npy", "vertices.npy"} <= set(file.namelist())
+    return extension(path) == ".npz" and {"values", "vertices"} <= names_in_npz(path)
 
 
 def write_npz(field: VertexField[SurfaceShape]) -> bytes:

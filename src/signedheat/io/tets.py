@@ -1,4 +1,7 @@
-"""Reading and writing of tet meshes, and of fields on them, by meshio."""
+"""Reading and writing of tet meshes, and of fields on them; meshio reads Medit, Gmsh and legacy VTK, and writes.
+
+What meshio reads is parsed within a limit of time: on some damaged files it does not end by itself.
+"""
 
 from __future__ import annotations
 
@@ -14,20 +17,23 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
 from ..fields.tet_field import TetField
 from ..packages import require
-from .files import PathLike, contents, extension, replacing, unknown_extension
+from .files import PathLike, contents, extension, parsed_by_others, reading, replacing, unknown_extension
+from .tetgen_files import read_tetgen, write_tetgen
+from .vtu import read_vtu
 
 NAME = "signed_distance"
 
 MODULES = {
-    ".ele": "tetgen",
     ".mesh": "medit",
     ".meshb": "medit",
     ".msh": "gmsh",
-    ".node": "tetgen",
     ".vtk": "vtk",
     ".vtu": "vtu",
 }
-"""meshio's module for each extension. TetGen's ``.node`` and ``.ele`` files are read and written as a pair."""
+"""meshio's module for each extension."""
+TETGEN = frozenset({".ele", ".node"})
+"""Extensions of the files of TetGen, which are read and written as a pair."""
+TET_FORMATS = frozenset(MODULES) | TETGEN
 
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 
@@ -42,6 +48,8 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     GeometryError
         If it has neither tets nor faces.
     """
+    if extension(path) in TETGEN:
+        return read_tetgen(path)
     mesh = _load(path)
     kinds = {block.type for block in mesh.cells}
     if "tetra" in kinds:
@@ -57,6 +65,8 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
 
 def write_tets(mesh: TetMesh, path: PathLike) -> None:
     """Write a tet mesh, in the format given by the extension."""
+    if extension(path) in TETGEN:
+        return write_tetgen(mesh, path)
     _store(mesh.to_meshio(), path)
 
 
@@ -75,58 +85,39 @@ def load_tet_field(path: PathLike) -> TetField:
     FileFormatError
         If the file is missing or damaged, or has no tets with such values.
     """
-    mesh = _load(path)
-    if NAME not in mesh.point_data:
-        raise FileFormatError(
-            f"it has no point data '{NAME}': it was not written as a field",
-            path=path,
-        )
-    try:
-        return TetField(TetMesh.from_meshio(mesh), np.asarray(mesh.point_data[NAME], dtype=np.float64))
-    except GeometryError as error:
-        raise FileFormatError(error.cause, remedy=error.remedy, element=error.element, path=path) from error
+    if extension(path) not in TET_FIELD_FORMATS:
+        raise unknown_extension(path, TET_FIELD_FORMATS, "a field on tets")
+    with reading(path):
+        mesh = _load(path)
+        if NAME not in mesh.point_data:
+            raise FileFormatError(
+                f"it has no point data '{NAME}': it was not written as a field",
+                path=path,
+            )
+        values = np.asarray(mesh.point_data[NAME], dtype=np.float64)
+        try:
+            return TetField(TetMesh.from_meshio(mesh), values)
+        except GeometryError as error:
+            raise FileFormatError(error.cause, remedy=error.remedy, element=error.element, path=path) from error
 
 
 def _load(path: PathLike) -> Any:
-    module = _module(path)
-    for part in _parts(path):
-        contents(part)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about unclosed files
-            return module.read(str(path))
-    except Exception as error:  # meshio raises exceptions of any type
-        reason = str(error) or type(error).__name__
-        raise FileFormatError(
-            f"the file is damaged, or is of another kind ({reason})",
-            path=path,
-        ) from error
+    if extension(path) == ".vtu":
+        return read_vtu(path, (NAME,))
+    module, size = _module(path), len(contents(path))
+    return parsed_by_others(lambda: module.read(str(path)), size)
 
 
 def _store(mesh: Any, path: PathLike) -> None:
     module = _module(path)
     with replacing(path) as temporary:
-        if module.__name__.endswith("tetgen"):
-            with replacing(Path(path).with_suffix(".node")) as nodes, replacing(Path(path).with_suffix(".ele")) as tets:
-                _write(module, temporary.with_suffix(".node"), mesh)
-                temporary.with_suffix(".node").replace(nodes)
-                temporary.with_suffix(".ele").replace(tets)
-                temporary.write_bytes((nodes if extension(path) == ".node" else tets).read_bytes())
-        else:
-            _write(module, temporary, mesh)
+        _write(module, temporary, mesh)
 
 
 def _write(module: Any, path: Path, mesh: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         module.write(str(path), mesh)
-
-
-def _parts(path: PathLike) -> list[Path]:
-    """The files that belong to a path: two for TetGen's formats."""
-    if MODULES[extension(path)] == "tetgen":
-        return [Path(path).with_suffix(".node"), Path(path).with_suffix(".ele")]
-    return [Path(path)]
 
 
 def _module(path: PathLike) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid
 from ..errors import FileFormatError
 from ..packages import lazy_module
+from .arrays import read_npy
 from .fields import _read_npy, _read_nrrd
-from .files import PathLike, contents, extension, unknown_extension
+from .files import PathLike, contents, ensure_fits, extension, reading, unknown_extension
 from .vtk_xml import read_vti
 
 Image = lazy_module("PIL.Image", "pictures as masks")
@@ -108,7 +110,8 @@ def _read(
     reader = readers.get(extension(path))
     if reader is None:
         raise unknown_extension(path, readers, what)
-    values, origin, spacing = reader(path)
+    with reading(path):
+        values, origin, spacing = reader(path)
     if values.dtype.kind not in "biuf":
         raise FileFormatError(
             f"the values are no real numbers but {values.dtype}: it holds no image",
@@ -121,29 +124,20 @@ def _read_plain_npy(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], 
     """An array, with origin and spacing from the ``.json`` of the same name, if there is one."""
     if Path(path).with_suffix(".json").exists():
         return _read_npy(path)
-    try:
-        values = np.load(io.BytesIO(contents(path)), allow_pickle=False)
-    except ValueError as error:
-        raise FileFormatError(
-            f"it is no .npy file, or is truncated ({error})",
-            remedy="write it again",
-            path=path,
-        ) from error
+    values = read_npy(path)
     return values, np.zeros(values.ndim), np.ones(values.ndim)
 
 
 def _read_picture(path: PathLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Brightness from 0 to 1, indexed [x, y]; transparent pixels count as white."""
-    try:
-        picture = Image.open(io.BytesIO(contents(path))).convert("RGBA")
-        white = Image.new("RGBA", picture.size, "white")
-        brightness = np.asarray(Image.alpha_composite(white, picture).convert("L")) / 255
-    except (OSError, Image.DecompressionBombError) as error:
-        raise FileFormatError(
-            f"it is no picture, or is damaged ({error})",
-            remedy="write it again",
-            path=path,
-        ) from error
+    data = contents(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about pictures that are large: they are compared with the memory
+        opened = Image.open(io.BytesIO(data))
+        ensure_fits(16 * opened.width * opened.height, path)
+        picture = opened.convert("RGBA")
+    white = Image.new("RGBA", picture.size, "white")
+    brightness = np.asarray(Image.alpha_composite(white, picture).convert("L")) / 255
     return brightness[::-1].T, np.zeros(2), np.ones(2)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import math
 import zlib
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
 from .elements import SurfaceShape, assemble, faces_of, points_of
-from .files import PathLike, contents, numbers
+from .files import PathLike, contents, ensure_fits, numbers, unpacked
 
 _TYPES = {
     "Int8": "i1",
@@ -59,7 +60,7 @@ def write_vti(
 
 def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
     """Values (first scalar array), origin and spacing of image data."""
-    root, arrays = _parse(path, "ImageData")
+    root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
     extent = numbers(image.get("WholeExtent", "").split() if image is not None else [], path, "extent", int)
     if (
@@ -81,6 +82,13 @@ def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray
             path=path,
         )
     shape = extent[1::2] - extent[::2] + 1
+    n_nodes = math.prod(shape.tolist())
+    if shape.min() < 1 or abs(extent).max() >= 2**53:
+        raise FileFormatError(
+            f"its extent is {' '.join(map(str, extent.tolist()))}: it is damaged",
+            remedy="write or download it again",
+            path=path,
+        )
     dimension = 3 if shape[2] > 1 else 2 if shape[1] > 1 else 1
     spacing = numbers(image.get("Spacing", "1 1 1").split(), path, "spacing")
     origin = numbers(image.get("Origin", "0 0 0").split(), path, "origin")
@@ -94,12 +102,13 @@ def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray
             remedy="save them as point data",
             path=path,
         )
-    values = arrays.of(element)
-    if values.size != shape.prod():
+    if element.get("NumberOfComponents", "1") not in ("1", ""):
         raise FileFormatError(
-            f"{values.size} values for {shape.prod()} nodes: it is truncated or no scalar",
+            f"'{element.get('Name')}' has {element.get('NumberOfComponents')} numbers at each node",
+            remedy="save a scalar",
             path=path,
         )
+    values = arrays.of(element, n_nodes)
     return values.reshape(shape[:dimension], order="F"), origin[:dimension], spacing[:dimension]
 
 
@@ -127,28 +136,37 @@ def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:
 
 def read_vtp(path: PathLike) -> SurfaceShape:
     """The polygons of all pieces, or the points if there is no polygon."""
-    root, arrays = _parse(path, "PolyData")
+    root, arrays = parse(path, "PolyData")
     points, corners, counts, normals, areas, n_points = [], [], [], [], [], 0
     for piece in root.iterfind("PolyData/Piece"):
-        table = {
-            (group.tag, element.get("Name")): arrays.of(element)
-            for group in piece
-            for element in group.iter("DataArray")
-        }
-        if int(piece.get("NumberOfStrips", 0)):
+        table = {(group.tag, element.get("Name")): element for group in piece for element in group.iter("DataArray")}
+        if arrays.count(piece, "NumberOfStrips"):
             raise FileFormatError(
                 "there are triangle strips",
                 remedy="turn them into triangles before saving",
                 path=path,
             )
-        own = next((values for (tag, _), values in table.items() if tag == "Points"), np.empty(0)).reshape(-1, 3)
-        offsets = table.get(("Polys", "offsets"), np.empty(0)).astype(np.int64)
-        corners.append(table.get(("Polys", "connectivity"), np.empty(0)).astype(np.int64) + n_points)
-        counts.append(np.diff(offsets, prepend=0))
-        normals.append(table.get(("PointData", "Normals"), np.empty(0)).reshape(-1, 3))
-        areas.append(table.get(("PointData", "area"), np.empty(0)))
-        points.append(own.astype(np.float64))
-        n_points += len(own)
+        n_own, n_faces = arrays.count(piece, "NumberOfPoints"), arrays.count(piece, "NumberOfPolys")
+        xyz = next((element for (tag, _), element in table.items() if tag == "Points"), None)
+        offsets = arrays.of(table.get(("Polys", "offsets")), n_faces).astype(np.int64)
+        if n_faces == 0 and piece.get("NumberOfPolys") is None and piece.find("Polys/DataArray") is not None:
+            raise FileFormatError("it does not announce NumberOfPolys", element="NumberOfPolys", path=path)
+        steps = np.diff(offsets, prepend=0)
+        if (steps < 0).any():
+            raise FileFormatError(
+                "its offsets decrease: it is damaged",
+                remedy="write or download it again",
+                path=path,
+            )
+        n_corners = int(offsets[-1]) if n_faces else 0
+        corners.append(arrays.of(table.get(("Polys", "connectivity")), n_corners).astype(np.int64) + n_points)
+        counts.append(steps)
+        has_faces = bool(n_faces)  # data at the points matter to points alone
+        for name, columns, found in (("Normals", 3, normals), ("area", 1, areas)):
+            if not has_faces and (element := table.get(("PointData", name))) is not None:
+                found.append(arrays.of(element, columns * n_own))
+        points.append(arrays.of(xyz, 3 * n_own).astype(np.float64).reshape(-1, 3))
+        n_points += n_own
     if not n_points:
         raise FileFormatError(
             "there are no points: the file holds no shape",
@@ -157,8 +175,8 @@ def read_vtp(path: PathLike) -> SurfaceShape:
     positions = np.concatenate(points)
     if any(len(c) for c in counts):
         return assemble(positions, np.concatenate(corners), np.concatenate(counts))
-    directions, sizes = np.concatenate(normals), np.concatenate(areas)
-    return PointCloud(positions, directions if len(directions) else None, sizes if len(sizes) else None)
+    directions = np.concatenate(normals).reshape(-1, 3) if normals else None
+    return PointCloud(positions, directions, np.concatenate(areas) if areas else None)
 
 
 def _words(values: Any) -> str:
@@ -204,8 +222,22 @@ class _Arrays:
     encoding: str
     appended: bytes
 
-    def of(self, element: ElementTree.Element) -> NDArray[Any]:
-        """The numbers of a DataArray element."""
+    def count(self, piece: ElementTree.Element, name: str) -> int:
+        """A number that a piece announces, 0 by default."""
+        word = piece.get(name, "0").strip()
+        if not word.isdecimal() or len(word) > 18:
+            raise FileFormatError(
+                f"{name} is {word!r}: it is damaged",
+                remedy="write or download it again",
+                element=name,
+                path=self.path,
+            )
+        return int(word)
+
+    def of(self, element: ElementTree.Element | None, count: int) -> NDArray[Any]:
+        """The `count` numbers of a DataArray element; no more than these are unpacked."""
+        if element is None:
+            return self._counted(np.empty(0), count)
         code = _TYPES.get(element.get("type", ""))
         if code is None:
             raise FileFormatError(
@@ -215,32 +247,46 @@ class _Arrays:
             )
         form, inline = element.get("format"), (element.text or "").split()
         if form == "ascii":
-            return numbers(inline, self.path, "values").astype(code)
+            return self._counted(numbers(inline, self.path, "values").astype(code), count)
+        size = count * np.dtype(code).itemsize
+        ensure_fits(size, self.path)
         try:
             if form == "binary":
-                data = self._block("".join(inline).encode(), is_base64=True)
+                data = self._block("".join(inline).encode(), True, size)
             else:
-                data = self._block(self.appended[int(element.get("offset", 0)) :], self.encoding == "base64")
-            return np.frombuffer(data, self.order + code).astype(code, copy=False)
+                start = int(element.get("offset", 0))
+                data = self._block(memoryview(self.appended)[max(start, 0) :], self.encoding == "base64", size)
+            values = np.frombuffer(data, self.order + code)
         except (ValueError, IndexError, zlib.error, binascii.Error) as error:
             raise FileFormatError(
                 f"an array cannot be decoded ({error}): the file is truncated",
                 remedy="write or download it again",
                 path=self.path,
             ) from error
+        return self._counted(values, count).astype(code, copy=False)
 
-    def _block(self, data: bytes, is_base64: bool) -> bytes:
-        """The bytes of one block: sizes, then data; in base 64 each of the two is encoded separately."""
+    def _counted(self, values: NDArray[Any], count: int) -> NDArray[Any]:
+        if values.size != count:
+            raise FileFormatError(
+                f"an array has {values.size} numbers, where {count} are announced: it is truncated or damaged",
+                remedy="write or download it again",
+                path=self.path,
+            )
+        return values
+
+    def _block(self, data: bytes | memoryview, is_base64: bool, size: int) -> bytes | memoryview:
+        """The bytes of one array, `size` or too few: sizes, then data; in base 64 each of the two by itself."""
         width = self.header.itemsize
 
-        def take(start: int, size: int) -> tuple[bytes, int]:
+        def take(start: int, length: int) -> tuple[bytes | memoryview, int]:
             if not is_base64:
-                part, end = data[start : start + size], start + size
+                part: bytes | memoryview = data[start : start + length]
+                end = start + length
             else:
-                end = start + 4 * -(-size // 3)
-                part = base64.b64decode(data[start:end])[:size]
-            if len(part) < size:
-                raise ValueError(f"{len(part)} of {size} bytes are there")
+                end = start + 4 * -(-length // 3)
+                part = base64.b64decode(data[start:end])[:length]
+            if len(part) < length:
+                raise ValueError(f"{len(part)} of {length} bytes are there")
             return part, end
 
         def sizes(count: int) -> tuple[list[int], int]:
@@ -248,7 +294,9 @@ class _Arrays:
             return np.frombuffer(part, self.header).tolist(), end
 
         if self.compressor is None:
-            (size,), at = sizes(1)
+            (announced,), at = sizes(1)
+            if announced != size:
+                raise ValueError(f"it has {announced} bytes instead of {size}")
             return (take(0, width + size)[0])[width:] if is_base64 else take(at, size)[0]
         if "ZLib" not in self.compressor:
             raise FileFormatError(
@@ -257,13 +305,22 @@ class _Arrays:
                 path=self.path,
             )
         n_blocks = sizes(1)[0][0]
+        if n_blocks * width > len(data):
+            raise ValueError(f"{n_blocks} blocks are announced")
         packed, at = sizes(3 + n_blocks)
-        everything, _ = take(at, sum(packed[3:]))
         ends = np.cumsum([0, *packed[3:]]).tolist()
-        return b"".join(zlib.decompress(everything[a:b]) for a, b in pairwise(ends))
+        everything, _ = take(at, ends[-1])
+        parts, left = [], size
+        for begin, end in pairwise(ends):
+            parts.append(unpacked(everything[begin:end], zlib.decompressobj(), left + 1))
+            left -= len(parts[-1])
+            if left < 0:
+                raise ValueError(f"it has more than {size} bytes")
+        return b"".join(parts)
 
 
-def _parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
+def parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
+    """The root element of a file of some kind, and what decodes the arrays in it."""
     data = contents(path)
     mark = data.find(b"<AppendedData")
     appended, encoding = b"", "raw"
@@ -287,5 +344,12 @@ def _parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
             path=path,
         )
     order = "<" if root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
-    header = np.dtype(order + _TYPES[root.get("header_type", "UInt32")])
+    width = {"UInt32": "u4", "UInt64": "u8"}.get(root.get("header_type", "UInt32"))
+    if width is None:
+        raise FileFormatError(
+            f"its header_type '{root.get('header_type')}' is none that VTK has: it is damaged",
+            remedy="write or download it again",
+            path=path,
+        )
+    header = np.dtype(order + width)
     return root, _Arrays(path, order, header, root.get("compressor"), encoding, appended)

@@ -1,0 +1,77 @@
+"""NumPy's ``.npy`` and ``.npz``: an array is allocated after its size has been compared with that of its data."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Collection
+from typing import IO, Any
+from zipfile import ZipFile
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError
+from .files import PathLike, contents, ensure_fits, reading
+
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+
+
+def read_npy(path: PathLike) -> NDArray[Any]:
+    """The array of a ``.npy`` file."""
+    data = contents(path)
+    with reading(path):
+        return _array(io.BytesIO(data), len(data), path)
+
+
+def read_npz(path: PathLike, wanted: Collection[str]) -> dict[str, NDArray[Any]]:
+    """Those of the wanted arrays of a ``.npz`` file that are there."""
+    data = contents(path)
+    with reading(path), ZipFile(io.BytesIO(data)) as archive:
+        members = {info.filename: info for info in archive.infolist()}
+        found = {}
+        for name in wanted:
+            if info := members.get(f"{name}.npy"):
+                with archive.open(info) as file:
+                    found[name] = _array(file, info.file_size, path)
+        return found
+
+
+def names_in_npz(path: PathLike) -> set[str]:
+    """Names of the arrays in a ``.npz`` file."""
+    data = contents(path)
+    with reading(path), ZipFile(io.BytesIO(data)) as archive:
+        return {name.removesuffix(".npy") for name in archive.namelist()}
+
+
+def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
+    """An array of numbers, from a file of `size` bytes."""
+    version = npy.read_magic(file)
+    if version not in _HEADERS:
+        raise FileFormatError(f"its version {version} of NumPy's format is not known", path=path)
+    shape, is_fortran, dtype = _HEADERS[version](file)
+    if dtype.kind not in "biufc":
+        raise FileFormatError(
+            f"the values are no numbers but {dtype}",
+            remedy="save numbers",
+            path=path,
+        )
+    announced, there = math.prod(shape) * dtype.itemsize, size - file.tell()
+    if not 0 <= announced <= there or min(shape, default=0) < 0:
+        raise FileFormatError(
+            f"an array of shape {shape} needs {announced} bytes, of which {there} are there: the file is truncated",
+            remedy="write or download it again",
+            path=path,
+        )
+    ensure_fits(announced, path)
+    values = np.empty(shape, dtype, order="F" if is_fortran else "C")
+    flat = memoryview(values.ravel(order="K").view(np.uint8)) if announced else memoryview(b"")
+    at = 0
+    while at < announced:
+        part = file.read(min(announced - at, 1 << 24))
+        if not part:
+            raise FileFormatError("the data end early", remedy="write or download it again", path=path)
+        flat[at : at + len(part)] = part
+        at += len(part)
+    return values

@@ -1,0 +1,294 @@
+"""Where files are opened, sized and replaced: what is no regular file, permissions, references, bombs, time."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import os
+import stat
+import struct
+import threading
+import time
+import zlib
+from base64 import b64encode
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.io import files
+from signedheat.io.files import ensure_writable, replacing
+from signedheat.parallel import run_limited
+
+BALL = samples.sphere(1)
+posix = pytest.mark.skipif(os.name != "posix", reason="pipes and permissions of POSIX")
+
+
+def leftovers(folder):
+    return [path.name for path in folder.iterdir() if path.name.startswith(".")]
+
+
+@posix
+@pytest.mark.parametrize("ending", ["stl", "npz", "nrrd", "msh", "svg", "glb", "node"])
+def test_pipes_and_devices_are_not_read(tmp_path, ending):
+    pipe = tmp_path / f"pipe.{ending}"
+    os.mkfifo(pipe)
+    read = {"npz": sh.load_field, "nrrd": sh.load_field, "svg": sh.read_polylines}.get(ending, sh.read)
+    with pytest.raises(sh.FileFormatError) as caught:
+        read(pipe)
+    assert caught.value.path is not None and caught.value.remedy
+    device = tmp_path / f"device.{ending}"
+    device.symlink_to("/dev/zero")
+    with pytest.raises(sh.FileFormatError):
+        read(device)
+
+
+@posix
+@pytest.mark.parametrize("kind", ["device", "pipe", "folder"])
+def test_what_is_no_regular_file_is_not_replaced(tmp_path, kind):
+    target, link = tmp_path / "target.stl", tmp_path / "link.stl"
+    if kind == "pipe":
+        os.mkfifo(target)
+    elif kind == "folder":
+        target.mkdir()
+    link.symlink_to(target if kind != "device" else "/dev/null")
+    for path in (link, *([target] if kind != "device" else [])):
+        before = stat.S_IFMT(path.stat().st_mode)
+        with pytest.raises(sh.FileFormatError):
+            sh.save(BALL, path)
+        with pytest.raises(sh.FileFormatError):
+            ensure_writable(path, {".stl"}, "a shape")
+        assert stat.S_IFMT(path.stat().st_mode) == before
+    assert not leftovers(tmp_path)
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o664])
+def test_permissions_stay(tmp_path, mode):
+    path = tmp_path / "ball.stl"
+    path.touch()
+    path.chmod(mode)
+    with replacing(path) as temporary:
+        assert stat.S_IMODE(temporary.stat().st_mode) == mode
+        temporary.write_bytes(b"new")
+    assert stat.S_IMODE(path.stat().st_mode) == mode and path.read_bytes() == b"new"
+
+
+@posix
+def test_new_files_obey_the_mask(tmp_path):
+    before = os.umask(0o077)
+    try:
+        sh.save(BALL, tmp_path / "ball.stl")
+        sh.GridField(sh.Grid([0, 0], 1.0, [2, 2]), np.eye(2)).save(tmp_path / "phi.nrrd")
+    finally:
+        os.umask(before)
+    assert {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()} == {0o600}
+
+
+@posix
+def test_links_lead_to_the_file_that_is_replaced(tmp_path):
+    (tmp_path / "there").mkdir()
+    real, link = tmp_path / "there" / "ball.ply", tmp_path / "ball.ply"
+    link.symlink_to(real)
+    sh.save(BALL, link)
+    assert link.is_symlink() and real.is_file() and not real.is_symlink()
+    assert sh.read(real).n_faces == BALL.n_faces and not leftovers(tmp_path)
+
+
+def test_an_interrupt_leaves_nothing(tmp_path):
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path / "ball.stl") as temporary:
+        temporary.write_bytes(b"half")
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_as_long_as_they_may_be(tmp_path):
+    path = tmp_path / ("x" * 251 + ".stl")
+    sh.save(BALL, path)
+    assert sh.read(path).n_faces == BALL.n_faces
+
+
+def nrrd(folder, name, extra, data=b""):
+    path = folder / name
+    head = "NRRD0004\ntype: double\ndimension: 3\nsizes: 2 2 2\nendian: little\n" + extra + "\n"
+    path.write_bytes(head.encode() + data)
+    return path
+
+
+@posix
+def test_an_image_names_files_in_its_folder_only(tmp_path):
+    values = np.arange(8.0)
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    for folder in (tmp_path, inner):
+        (folder / "data.raw").write_bytes(values.tobytes())
+    os.mkfifo(inner / "pipe.raw")
+    (inner / "link.raw").symlink_to(tmp_path / "data.raw")
+    good = nrrd(inner, "good.nrrd", "encoding: raw\ndata file: data.raw\n")
+    np.testing.assert_array_equal(sh.load_field(good).values.ravel(order="F"), values)
+    for name in (tmp_path / "data.raw", "../data.raw", "pipe.raw", "link.raw", "absent.raw"):
+        with pytest.raises(sh.FileFormatError):
+            sh.load_field(nrrd(inner, "bad.nrrd", f"encoding: raw\ndata file: {name}\n"))
+
+
+def packed_vtk(n_bytes):
+    """A VTK array of zeros in one block, which announces as many bytes as it has."""
+    data = zlib.compress(bytes(n_bytes), 9)
+    head = struct.pack("<4I", 1, n_bytes, n_bytes, len(data))
+    return f"{b64encode(head).decode()}{b64encode(data).decode()}"
+
+
+def bomb(folder, ending, size=1 << 28):
+    """A small file that becomes `size` bytes when it is unpacked, though it announces 8 numbers or points."""
+    path = folder / f"bomb.{ending}"
+    array = f'<DataArray type="Float64" NumberOfComponents="%d" format="binary" Name="x">{packed_vtk(size)}</DataArray>'
+    head = '<VTKFile type="%s" byte_order="LittleEndian" header_type="UInt32" compressor="vtkZLibDataCompressor">'
+    if ending == "vti":
+        body = f'<ImageData WholeExtent="0 1 0 1 0 1"><Piece Extent="0 1 0 1 0 1"><PointData>{array % 1}</PointData>'
+        path.write_text(head % "ImageData" + body + "</Piece></ImageData></VTKFile>")
+    elif ending in ("vtp", "vtu"):
+        kind = {"vtp": "PolyData", "vtu": "UnstructuredGrid"}[ending]
+        body = f'<{kind}><Piece NumberOfPoints="8" NumberOfPolys="0" NumberOfCells="0"><Points>{array % 3}</Points>'
+        path.write_text(head % kind + body + f"</Piece></{kind}></VTKFile>")
+    elif ending == "nrrd":
+        nrrd(folder, path.name, "encoding: gzip\n", gzip.compress(bytes(size)))
+    elif ending == "npz":
+        with ZipFile(path, "w", ZIP_DEFLATED) as file:
+            for name in ("values", "origin", "spacing"):
+                buffer = io.BytesIO()
+                np.save(buffer, np.zeros((2, 2, 2)))
+                file.writestr(f"{name}.npy", buffer.getvalue() + bytes(size))
+    return path
+
+
+@posix
+@pytest.mark.parametrize("ending", ["vti", "vtp", "vtu", "nrrd", "npz"])
+def test_no_more_is_unpacked_than_is_announced(tmp_path, ending):
+    import resource
+
+    path = bomb(tmp_path, ending)
+    assert path.stat().st_size < 1_500_000
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    read = sh.read if ending in ("vtp", "vtu") else sh.load_field
+    try:
+        read(path)
+    except sh.SignedHeatError as error:
+        assert error.path is not None
+    grown = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+    assert grown < 1 << 26
+
+
+@pytest.mark.parametrize("ending", ["vti", "nrrd", "npy"])
+def test_what_is_announced_is_compared_with_the_memory_that_is_free(tmp_path, ending, monkeypatch):
+    field = sh.GridField(sh.Grid([0, 0, 0], 1.0, [40, 40, 40]), np.zeros((40, 40, 40)))
+    field.save(tmp_path / f"phi.{ending}")
+    monkeypatch.setattr(files, "available_memory", lambda: 8 * 40**3 - 1)
+    with pytest.raises(sh.MemoryLimitError) as caught:
+        sh.load_field(tmp_path / f"phi.{ending}")
+    assert caught.value.remedy and caught.value.path
+
+
+@pytest.mark.parametrize("shape", ["(1099511627776,)", "(2, -4)", "(1099511627776, 0)", "(2**40,)"])
+def test_arrays_that_announce_more_than_there_is(tmp_path, shape):
+    head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    (tmp_path / "phi.npy").write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + head.encode() + bytes(64))
+    (tmp_path / "phi.json").write_text(json.dumps({"origin": [0, 0], "spacing": [1, 1]}))
+    with pytest.raises(sh.SignedHeatError) as caught:
+        sh.load_field(tmp_path / "phi.npy")
+    assert caught.value.path
+
+
+HEADER = "ply\nformat binary_little_endian 1.0\n{}end_header\n"
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+
+
+@pytest.mark.parametrize(
+    "header, body",
+    [
+        (
+            f"element vertex 1\n{XYZ}element face 4294967295\nproperty list char int vertex_indices\n",
+            bytes(12) + b"\xff",
+        ),
+        (f"element vertex 1\n{XYZ}element face 2\nproperty list char int vertex_indices\n", bytes(12) + b"\xff\xff"),
+        (f"element vertex 99999999999999999\n{XYZ}", bytes(12)),
+        (f"element vertex -1\n{XYZ}", bytes(12)),
+        (f"element vertex 1\n{XYZ}property float x\n", bytes(16)),
+        (f"element vertex 1\n{XYZ}element nothing 99999999999999\n", bytes(12)),
+        ("element vertex 1\nproperty list uchar float x\nproperty float y\nproperty float z\n", bytes(9)),
+        (f"element vertex 1\n{XYZ}element face 1\nproperty float vertex_indices\n", bytes(16)),
+        (f"element vertex 1\n{XYZ}element face 1\nproperty list float int vertex_indices\n", bytes(20)),
+    ],
+)
+def test_odd_headers_of_ply(tmp_path, header, body):
+    (tmp_path / "odd.ply").write_bytes(HEADER.format(header).encode() + body)
+    begin = time.process_time()
+    try:
+        assert isinstance(sh.read(tmp_path / "odd.ply"), sh.PointCloud)
+    except sh.SignedHeatError as error:
+        assert error.path
+    assert time.process_time() - begin < 2
+
+
+@pytest.mark.parametrize("ending", ["node", "ele"])
+def test_tetgen_files_with_comments_and_ids_from_one(tmp_path, ending):
+    (tmp_path / "one.node").write_text(
+        "# points\n\n4 3 1 0 # four\n1 0 0 0 .5\n2 1 0 0 .5\n3 0 1 0 .5\n4 0 0 1 .5\n# end\n"
+    )
+    (tmp_path / "one.ele").write_text("1 4 0\n1 1 2 3 4\n")
+    mesh = sh.read(tmp_path / f"one.{ending}")
+    assert mesh.tets.tolist() == [[0, 1, 2, 3]] and mesh.vertices[3].tolist() == [0, 0, 1]
+    mesh.save(tmp_path / f"two.{ending}")
+    again = sh.read(tmp_path / f"two.{ending}")
+    np.testing.assert_array_equal(again.vertices, mesh.vertices)
+    np.testing.assert_array_equal(again.tets, mesh.tets)
+
+
+@pytest.mark.parametrize(
+    "content", ["# nothing\n", "# a\n# b", "3 3\n", "x y\n", "1 3 0 0\n0 1 1\n", "-1 3 0 0\n", "1 2 0 0\n0 1 1 1"]
+)
+def test_damaged_tetgen_files(tmp_path, content):
+    (tmp_path / "bad.node").write_text(content)
+    (tmp_path / "bad.ele").write_text("1 4 0\n0 0 1 2 3\n")
+    with pytest.raises(sh.SignedHeatError) as caught:
+        sh.read(tmp_path / "bad.ele")
+    assert caught.value.path and caught.value.path.endswith("bad.node")
+
+
+def test_parsers_of_others_are_stopped():
+    steps = 0
+
+    def forever():
+        nonlocal steps
+        while True:
+            steps += 1
+
+    with pytest.raises(TimeoutError):
+        run_limited(forever, 0.2)
+    deadline = time.monotonic() + 20
+    while len([t for t in threading.enumerate() if "run" in t.name]) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    before = steps
+    time.sleep(0.1)
+    assert steps == before
+
+
+def test_concurrent_writers_of_one_file(tmp_path):
+    path = tmp_path / "ball.ply"
+    shapes = [samples.sphere(n) for n in (1, 2)]
+
+    def write(k):
+        for _ in range(20):
+            sh.save(shapes[k], path)
+
+    writers = [threading.Thread(target=write, args=(k,)) for k in (0, 1)]
+    sh.save(shapes[0], path)
+    for writer in writers:
+        writer.start()
+    while any(writer.is_alive() for writer in writers):
+        assert sh.read(path).n_faces in {shape.n_faces for shape in shapes}
+    for writer in writers:
+        writer.join()
+    assert [p.name for p in tmp_path.iterdir()] == ["ball.ply"]
