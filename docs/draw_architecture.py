@@ -19,7 +19,11 @@ FLOORS = [
     ("domains", "frozen data: meshes, polygons, points, voxels, tets, grids, curves", "#d3e8ea"),
     ("operators   linear", "sparse matrices, matrix-free stencils, factorisations, Krylov", "#c9dcee"),
     ("geometry", "arrays in, arrays out: intrinsic meshes, geodesics, flips, clipping", "#bccfe8"),
-    ("cache compiled diagnostics errors frozen memory packages parallel progress slots", "used by all", "#d9d9e3"),
+    (
+        "cache compiled diagnostics errors frozen memory packages parallel progress reprs slots",
+        "used by all",
+        "#d9d9e3",
+    ),
 ]
 FLOW = [
     (6, "shapes, curves, grids"),

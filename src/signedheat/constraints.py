@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .discretization import Integration, Levels, SourceTerm
 from .errors import ConstraintError
+from .reprs import ShortRepr
 
 
 @runtime_checkable
@@ -82,8 +83,8 @@ class EachComponent:
         return integration.fit(divergence, source, Levels(np.zeros(len(source.weights)), source.components))
 
 
-@dataclass(frozen=True)
-class LevelValues:
+@dataclass(frozen=True, repr=False)
+class LevelValues(ShortRepr):
     """Given levels: φ = ``values[k]`` on the k-th source, as for the contour lines of a map (Eq. 14 with ``A φ = c``).
 
     Parameters

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .frozen import Frozen
+from .reprs import ShortRepr
 
 AnyNote = TypeVar("AnyNote", bound="Note")
 
 
-@dataclass(frozen=True, eq=False)
-class Note(Frozen):
+@dataclass(frozen=True, eq=False, repr=False)
+class Note(Frozen, ShortRepr):
     """A note on a computation; ``str(note)`` is its text."""
 
     def as_dict(self) -> dict[str, object]:
@@ -24,7 +25,7 @@ class Note(Frozen):
         return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values.items()}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SampledSource(Note):
     """The source on a grid, merged in its cells: number of samples, fractions of the area outside and cancelled."""
 
@@ -39,7 +40,7 @@ class SampledSource(Note):
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OutsideMesh(Note):
     """Sources that leave the tet mesh: their indices, and the fraction of the area of each that is dropped."""
 
@@ -51,7 +52,7 @@ class OutsideMesh(Note):
         return "; ".join(f"source {k} outside the mesh: {100 * part:.3g} % of its area, left out" for k, part in told)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ShapeOriented(Note):
     """How the faces of a shape were oriented; fractions are of its area. The values are those of `Orientation`."""
 
@@ -78,7 +79,7 @@ class ShapeOriented(Note):
         return "; ".join(text for value, text in told if value) or "faces are oriented as they were given"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TetsTurned(Note):
     """Number of tets given with negative volume, which have been turned."""
 
@@ -88,7 +89,7 @@ class TetsTurned(Note):
         return f"tets turned: {self.tets_turned}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EdgesLengthened(Note):
     """Length that mollification has added to every edge, so that no triangle is flat."""
 
@@ -98,7 +99,7 @@ class EdgesLengthened(Note):
         return f"added to edge lengths: {self.added_to_edge_lengths:.3g}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LargeAngles(Note):
     """Fraction of angles above 120°, if it is 1 % or more: an intrinsic triangulation is then more accurate."""
 
@@ -108,7 +109,7 @@ class LargeAngles(Note):
         return f"{self.large_angles:.0%} of the angles exceed 120°"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class VerticesAdded(Note):
     """Number of vertices added so that sources run along edges."""
 
@@ -118,7 +119,7 @@ class VerticesAdded(Note):
         return f"vertices added for sources: {self.vertices_added}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class IntrinsicTriangles(Note):
     """The intrinsic triangulation on which distance was computed: summary of its angles."""
 
@@ -128,7 +129,7 @@ class IntrinsicTriangles(Note):
         return f"intrinsic triangulation: {self.intrinsic_triangulation}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PointsLeftOut(Note):
     """Points of a cloud that coincide with earlier ones, and points without a triangle."""
 
@@ -139,7 +140,7 @@ class PointsLeftOut(Note):
         return f"{self.duplicate_points} duplicate points; {len(self.points_without_triangles)} without triangles"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SlopeErrors(Note):
     """Root mean square of ``|∇φ| − 1`` over the domain, before and after sharpening."""
 
@@ -150,7 +151,7 @@ class SlopeErrors(Note):
         return f"slope error before: {self.slope_error_before:.3g}; after: {self.slope_error_after:.3g}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SharpenedToShape(Note):
     """Fraction of the faces left out because they lie in layers, and of the zero set that stands in for faces."""
 
@@ -163,7 +164,7 @@ class SharpenedToShape(Note):
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OrientedPoints(Note):
     """Number of normals of a point cloud that were fitted, and that were turned."""
 
@@ -174,7 +175,7 @@ class OrientedPoints(Note):
         return f"{self.normals_fitted} normals fitted, {self.normals_turned} turned"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LeftOut(Note):
     """What a union leaves out of a shape.
 
@@ -205,7 +206,7 @@ class LeftOut(Note):
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CompletedArea(Note):
     """How much of the zero set stands in for missing surface.
 
@@ -231,7 +232,7 @@ class CompletedArea(Note):
         return f"{told}, most of it between {lower} and {upper}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReachesBox(Note):
     """The zero set leaves the grid, where it is cut off: fraction of the nodes on the walls that are inside."""
 
@@ -241,7 +242,7 @@ class ReachesBox(Note):
         return f"the surface reaches the walls of the grid, of which {self.inside_on_walls:.1%} are inside"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BoundsNothing(Note):
     """Fraction of the area that has the same side on both sides: distance to it is positive all around."""
 
@@ -251,7 +252,7 @@ class BoundsNothing(Note):
         return f"{self.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GeodesicWindows(Note):
     """Number of windows in the exact polyhedral distance.
 
@@ -270,7 +271,7 @@ class GeodesicWindows(Note):
         return f"windows: {self.windows}" + ("; some distances are along edges, too long" if self.cut_short else "")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RoundCorners(Note):
     """Number of vertices whose path to the zero set bends around the boundary of the mesh."""
 
@@ -280,7 +281,7 @@ class RoundCorners(Note):
         return f"round corners: {self.round_corners}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ConvexRounds(Note):
     """Number of iterations and final residual of the convex method of sharpening."""
 
@@ -291,7 +292,7 @@ class ConvexRounds(Note):
         return f"{self.rounds} rounds, residual {self.residual:.3g}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Jumps(Note):
     """Objective of a piecewise distance with its lower bound, and the size of its jumps.
 
@@ -323,8 +324,8 @@ class Jumps(Note):
         return f"{cut}; within {self.gap:.2%} of the least objective"
 
 
-@dataclass(frozen=True)
-class Diagnostics:
+@dataclass(frozen=True, repr=False)
+class Diagnostics(ShortRepr):
     """Timings, diffusion time, and notes on the computation of a field.
 
     Attributes

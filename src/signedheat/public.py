@@ -37,6 +37,7 @@ from .extensions.sharpening_methods import Convex, Geodesic
 from .extensions.solid_distance import solid_distance
 from .extensions.tetrahedralize import tetrahedralize
 from .extensions.uniting import unite
+from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
 from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField
 from .fields.tet_field import TetField
@@ -53,6 +54,7 @@ from .io import (
     write_polylines,
 )
 from .solver import SignedHeatSolver, signed_distance
+from .visualization import new_figure as _new_figure  # noqa: F401  provides notebooks, windows and Polyscope
 
 __all__ = [
     "ConstraintError",
@@ -114,6 +116,9 @@ __all__ = [
     "sharpen",
     "shell",
     "signed_distance",
+    "smooth_difference",
+    "smooth_intersection",
+    "smooth_union",
     "solid_distance",
     "tetrahedralize",
     "thicken",

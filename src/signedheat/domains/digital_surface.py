@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.surfels import Surfels, boundary_surfels, corrected_normals
+from .display import Displayed, to_pyvista
 from .polygon_mesh import PolygonMesh
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
 from .validation import frozen
 
+if TYPE_CHECKING:
+    import pyvista
+
 
 @dataclass(frozen=True, eq=False)
-class DigitalSurface(Surface):
+class DigitalSurface(Displayed, Surface):
     """The boundary of a set of voxels, as a domain that approximates the smooth surface that was digitised.
 
     Parameters
@@ -139,6 +144,11 @@ class DigitalSurface(Surface):
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         return self.squares._triangle_mask(face_mask)
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """As a `pyvista.PolyData`: the faces of the voxels."""
+        made: pyvista.PolyData = to_pyvista(self)
+        return made
 
     def __repr__(self) -> str:
         return f"DigitalSurface({' × '.join(map(str, self.volume.shape))} voxels, radius={self.radius:.3g})"

@@ -6,6 +6,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ..slots import Slot
+from .display import Displayed
 
 if TYPE_CHECKING:
     import meshio
@@ -24,7 +25,7 @@ shape_to: Slot[[str, object], Any] = Slot("shape_to")
 """Arguments: name of a package, shape. Returns an object of that package."""
 
 
-class Exchangeable(Generic[Trimesh]):
+class Exchangeable(Displayed, Generic[Trimesh]):
     """A shape that can be saved, and converted from and to objects of trimesh, PyVista, meshio and Open3D.
 
     Vertices and faces keep their number and order. Each package is optional, and imported when it is needed.

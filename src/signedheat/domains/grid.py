@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..frozen import Frozen
+from ..reprs import short
+from .display import Displayed, to_pyvista
 from .validation import frozen
 
 ROOM = 0.2
 """Share of its longest side by which a shape is padded on every side."""
 if TYPE_CHECKING:
+    import pyvista
     from typing_extensions import TypeVar
 
     Dimension = TypeVar("Dimension", bound=int, default=int, covariant=True)
@@ -27,7 +30,7 @@ else:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid(Frozen, Generic[Dimension]):
+class Grid(Displayed, Frozen, Generic[Dimension]):
     """Nodes at ``origin + index * spacing``, in any number of dimensions.
 
     Parameters
@@ -139,7 +142,7 @@ class Grid(Frozen, Generic[Dimension]):
         Examples
         --------
         >>> Grid.around([[0, 0, 0], [1, 2, 4]], resolution=7, padding=1.0)
-        Grid(origin=[-1.0, -1.0, -1.0], spacing=[1.0, 1.0, 1.0], shape=(4, 5, 7))
+        Grid(origin=[-1, -1, -1], spacing=1, shape=(4, 5, 7))
         """
         lower, upper = np.asarray(bounds, dtype=np.float64)
         longest = float((upper - lower).max())
@@ -199,9 +202,15 @@ class Grid(Frozen, Generic[Dimension]):
         inside: NDArray[np.bool_] = np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
         return inside
 
+    def to_pyvista(self) -> pyvista.ImageData:
+        """As a `pyvista.ImageData`, with boolean point data ``solid`` if nodes are; a grid in the plane has z = 0."""
+        made: pyvista.ImageData = to_pyvista(self)
+        return made
+
     def __repr__(self) -> str:
         solid = "" if self.mask is None else f", {int(self.mask.sum())} solid nodes"
-        return f"Grid(origin={self.origin.tolist()}, spacing={self.spacing.tolist()}, shape={self.shape}{solid})"
+        step = self.spacing[0] if np.ptp(self.spacing) <= 1e-12 * self.spacing[0] else self.spacing
+        return f"Grid(origin={short(self.origin)}, spacing={short(step)}, shape={self.shape}{solid})"
 
 
 def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = ROOM) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 from numbers import Real
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,9 +28,13 @@ from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.mollification import mollify
 from ..progress import Progress, Stopwatch
 from .curves import CurveOrPoints, CurvesAndPoints
+from .display import Displayed, to_pyvista
 from .segments import segments_of, segments_of_each
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
+
+if TYPE_CHECKING:
+    import pyvista
 
 MARGIN = 1e-14
 """Margin of the triangle inequalities, relative to the mean length, to which flat triangles are mollified."""
@@ -40,7 +44,7 @@ LARGEST_ANGLE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
-class IntrinsicTriangulation(Frozen):
+class IntrinsicTriangulation(Displayed, Frozen):
     """An intrinsic triangulation of a mesh, made by `intrinsic_delaunay`; a domain like the mesh itself.
 
     The first vertices are those of the mesh, with the same ids. Sources are given on the mesh; fields have values at
@@ -184,6 +188,11 @@ class IntrinsicTriangulation(Frozen):
         if isinstance(source, CurveSegments):
             return seen
         return transfer_segments(seen, self.refinement, self.history, self.base)
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """As a `pyvista.PolyData` of the mesh."""
+        made: pyvista.PolyData = to_pyvista(self)
+        return made
 
     def __repr__(self) -> str:
         return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,11 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..frozen import Frozen
 from ..geometry.marching import level_lines
+from .display import Displayed, to_pyvista
 from .validation import finite_rows
+
+if TYPE_CHECKING:
+    import pyvista
 
 
 @dataclass(frozen=True, eq=False)
-class Polyline(Frozen):
+class Polyline(Displayed, Frozen):
     """Points in the plane, joined in order by straight segments; φ is positive to the left.
 
     A closed polyline that runs clockwise has φ < 0 inside, like a shape whose normals point outward.
@@ -128,6 +133,11 @@ class Polyline(Frozen):
     def reversed(self) -> Polyline:
         """The polyline in opposite direction, for which φ has the opposite sign."""
         return Polyline(self.points[::-1], self.closed)
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """As a `pyvista.PolyData`, a line with z = 0."""
+        made: pyvista.PolyData = to_pyvista(self)
+        return made
 
     def __repr__(self) -> str:
         return f"Polyline({self.n_points} points, {'closed' if self.closed else 'open'})"

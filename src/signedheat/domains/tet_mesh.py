@@ -18,6 +18,7 @@ from ..geometry.components import element_components
 from ..geometry.tet_faces import FaceTable, face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
 from ..packages import lazy_module
+from .display import Displayed
 from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
 from .validation import element_ids, finite_rows, frozen
@@ -31,7 +32,7 @@ else:
 
 
 @dataclass(frozen=True, eq=False)
-class TetMesh(Frozen):
+class TetMesh(Displayed, Frozen):
     """Tetrahedra in space.
 
     Parameters

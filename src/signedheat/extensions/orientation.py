@@ -19,6 +19,7 @@ from ..geometry.part_orientation import PartOrientation, Parts, orient_parts
 from ..geometry.soup_orientation import disagreeing_with_neighbors, odds_at_corners
 from ..geometry.stabbing_lines import LineCrossings, aimed_lines, joined, stabbing_lines
 from ..geometry.surface_parts import SurfaceParts
+from ..reprs import ShortRepr
 from .mesh_faces import Mesh, MeshFaces
 
 SoupSigns = Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.integer]]
@@ -40,8 +41,8 @@ SMALL = 0.03
 """Share of the area up to which a part that lines tell nothing of asks its neighbours."""
 
 
-@dataclass(frozen=True, eq=False)
-class Orientation(Frozen):
+@dataclass(frozen=True, eq=False, repr=False)
+class Orientation(Frozen, ShortRepr):
     """How a mesh was oriented, and what was found on the way.
 
     Attributes

@@ -11,10 +11,11 @@ from ..domains.point_cloud import PointCloud
 from ..errors import GeometryError
 from ..geometry.axis_orientation import fitted_outward, outward_signs
 from ..geometry.plane_fits import fit_planes, noise_scale
+from ..reprs import ShortRepr
 
 
-@dataclass(frozen=True, eq=False)
-class PointOrientation:
+@dataclass(frozen=True, eq=False, repr=False)
+class PointOrientation(ShortRepr):
     """What orienting a point cloud did.
 
     Attributes

@@ -22,6 +22,7 @@ from ..geometry.refining import split_at_edges
 from ..lowering.area_elements import AreaSamples, grid_around, sample_on_grid
 from ..operators.grid.face_values import ranges_on_faces, values_at
 from ..operators.grid.winding import winding_numbers
+from ..reprs import ShortRepr
 
 Shape = TriangleMesh | PolygonMesh | PointCloud
 
@@ -45,8 +46,8 @@ MARGIN = 0.02
 """Share of an edge that a cut keeps from its ends."""
 
 
-@dataclass(frozen=True, eq=False)
-class Union:
+@dataclass(frozen=True, eq=False, repr=False)
+class Union(ShortRepr):
     """A shape without what lies inside other bodies of it.
 
     Attributes

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import Generic, Literal, overload
+from typing import TYPE_CHECKING, Generic, Literal, overload
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
+from ..domains.display import Displayed, to_pyvista
 from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
@@ -20,12 +21,16 @@ from ..frozen import Frozen
 from ..geometry.marching import closed_surface, level_lines
 from ..operators.grid.exact_surface import ExactSurface
 from ..parallel import in_chunks
+from .booleans import Combinable
 from .closest_points import ClosestPoints, closest_points
 from .files import save_field
 
+if TYPE_CHECKING:
+    import pyvista
+
 
 @dataclass(frozen=True, eq=False)
-class GridField(Frozen, Generic[Dimension]):
+class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     """Signed distance at the nodes of a grid.
 
     Parameters
@@ -236,6 +241,15 @@ class GridField(Frozen, Generic[Dimension]):
             )
         return self.contour(distance)
 
+    def with_values(self, values: NDArray[np.float64]) -> GridField[Dimension]:
+        """Other values on the same grid, without the diagnostics, confidence and surface of these."""
+        return GridField(self.grid, values)
+
+    def to_pyvista(self) -> pyvista.ImageData:
+        """As a `pyvista.ImageData` with point data ``signed_distance``; a field in the plane has z = 0."""
+        made: pyvista.ImageData = to_pyvista(self)
+        return made
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format given by its extension; `signedheat.load_field` reads it."""
         save_field(self, path)
@@ -297,4 +311,4 @@ class GridField(Frozen, Generic[Dimension]):
 
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
-        return f"GridField({self.grid!r}, values from {low:g} to {high:g})"
+        return f"GridField({self.grid!r}, values from {low:.4g} to {high:.4g})"

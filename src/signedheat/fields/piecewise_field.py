@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics
 from ..domains.curves import Curve, SurfacePoints
+from ..domains.display import Displayed, to_pyvista
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
@@ -23,6 +24,8 @@ from .vertex_field import VertexField
 
 if TYPE_CHECKING:
     from os import PathLike
+
+    import pyvista
 
 
 FAR = 3.0
@@ -61,11 +64,11 @@ class Cut(Frozen):
         return float(np.average(self.jumps.mean(axis=1), weights=self.steps))
 
     def __repr__(self) -> str:
-        return f"Cut({len(self.vertices)} vertices, length {self.length:g}, mean jump {self.height:g})"
+        return f"Cut({len(self.vertices)} vertices, length {self.length:.4g}, mean jump {self.height:.4g})"
 
 
 @dataclass(frozen=True, eq=False)
-class PiecewiseField(Frozen):
+class PiecewiseField(Displayed, Frozen):
     """Signed distance that is linear in every triangle and may be discontinuous across edges.
 
     Attributes
@@ -192,13 +195,18 @@ class PiecewiseField(Frozen):
         """The level set φ = level as curves on the surface, with greater values to their left; they end at the cut."""
         return self.split().contour(level)
 
+    def to_pyvista(self) -> pyvista.PolyData:
+        """As a `pyvista.PolyData` with point data ``signed_distance`` on `split`, so that the jumps show."""
+        surface: pyvista.PolyData = to_pyvista(self)
+        return surface
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write the field on `split`, so that viewers show the jump, in the format given by the extension."""
         self.split().save(path)
 
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
-        return f"PiecewiseField({self.domain!r}, values from {low:g} to {high:g}, {len(self.cut)} cuts)"
+        return f"PiecewiseField({self.domain!r}, values from {low:.4g} to {high:.4g}, {len(self.cut)} cuts)"
 
 
 def chains(edges: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
+from ..domains.display import Displayed, to_pyvista
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
@@ -19,11 +21,15 @@ from ..geometry.box_tree import BoxTree
 from ..geometry.marching_tets import closed_level_set
 from ..geometry.nearest import nearest_on_triangles
 from ..geometry.tet_clipping import Planes, barycentric, containing_tets
+from .booleans import Combinable
 from .files import save_field
+
+if TYPE_CHECKING:
+    import pyvista
 
 
 @dataclass(frozen=True, eq=False)
-class TetField(Frozen):
+class TetField(Displayed, Combinable, Frozen):
     """Signed distance at the vertices of a tet mesh, linear on every tet.
 
     Parameters
@@ -176,6 +182,15 @@ class TetField(Frozen):
             )
         return self.contour(distance)
 
+    def with_values(self, values: NDArray[np.float64]) -> TetField:
+        """Other values on the same mesh, without the diagnostics and the source of these."""
+        return TetField(self.mesh, values)
+
+    def to_pyvista(self) -> pyvista.UnstructuredGrid:
+        """As a `pyvista.UnstructuredGrid` with point data ``signed_distance``."""
+        made: pyvista.UnstructuredGrid = to_pyvista(self)
+        return made
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write mesh and values to a ``.vtu``, ``.vtk`` or ``.msh`` file; `signedheat.load_field` reads it."""
         save_field(self, path)
@@ -226,7 +241,7 @@ class TetField(Frozen):
 
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values)) for f in (np.fmin, np.fmax))
-        return f"TetField({self.mesh!r}, values from {low:g} to {high:g})"
+        return f"TetField({self.mesh!r}, values from {low:.4g} to {high:.4g})"
 
 
 def _checked(points: ArrayLike) -> NDArray[np.float64]:

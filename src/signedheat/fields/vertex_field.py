@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
 from ..domains.curves import Curve, SurfacePoints
+from ..domains.display import Displayed, to_pyvista
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.kinds import EmbeddedSurface, SurfaceDomain
 from ..domains.projection import closest_points
@@ -20,9 +21,11 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_rows
 from ..errors import OutsideError
 from ..frozen import Frozen
+from .booleans import Combinable
 from .files import save_field
 
 if TYPE_CHECKING:
+    import pyvista
     from typing_extensions import TypeVar
 
     Surface = TypeVar("Surface", bound=SurfaceDomain, default=SurfaceDomain, covariant=True)
@@ -35,7 +38,7 @@ Embedded = TypeVar("Embedded", bound=EmbeddedSurface)
 
 
 @dataclass(frozen=True, eq=False)
-class VertexField(Frozen, Generic[Surface]):
+class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     """Signed distance at the vertices of a surface, linear on its triangles.
 
     Attributes
@@ -137,6 +140,15 @@ class VertexField(Frozen, Generic[Surface]):
         result: list[Curve] = field.domain.level_set(field.values, level)
         return result
 
+    def with_values(self, values: NDArray[np.float64]) -> VertexField[Surface]:
+        """Other values on the same surface, without the diagnostics and the source of these."""
+        return VertexField(self.domain, values)
+
+    def to_pyvista(self) -> pyvista.PolyData:
+        """As a `pyvista.PolyData` with point data ``signed_distance``: triangles, polygons or points."""
+        made: pyvista.PolyData = to_pyvista(self)
+        return made
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write the surface with φ at its vertices, in the format given by the extension.
 
@@ -162,6 +174,10 @@ class VertexField(Frozen, Generic[Surface]):
     def restrict(self) -> VertexField[EmbeddedSurface]:
         """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself."""
         return self._embedded
+
+    def __repr__(self) -> str:
+        low, high = (float(f.reduce(self.values)) for f in (np.fmin, np.fmax))
+        return f"VertexField({self.domain!r}, values from {low:.4g} to {high:.4g})"
 
     @property
     def _embedded(self) -> VertexField[EmbeddedSurface]:

@@ -30,18 +30,18 @@ def save_vertex_field(field: VertexField, path: PathLike) -> None:
     writer = WRITERS.get(extension(path))
     if writer is None:
         raise unknown_extension(path, WRITERS, "a field on a surface")
-    content = writer(_on_simple_surface(field))
+    content = writer(on_simple_surface(field))
     with replacing(path) as temporary:
         temporary.write_bytes(content)
 
 
-def _on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
+def on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
     """The field on a surface that files support: voxel faces become triangles."""
     domain = field.domain
     if isinstance(domain, TriangleMesh | PolygonMesh | PointCloud):
         return VertexField(domain, field.values)
     if isinstance(domain, IntrinsicTriangulation):
-        return _on_simple_surface(field.restrict())
+        return on_simple_surface(field.restrict())
     return VertexField(domain.triangulation, domain.on_triangulation(field.values))
 
 

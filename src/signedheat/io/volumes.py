@@ -97,7 +97,7 @@ def read_mask(
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     np.save(f"{folder}/wall.npy", np.array([[0, 0, 0], [0, 1, 1]]))
     ...     read_mask(f"{folder}/wall.npy", spacing=0.5)
-    Grid(origin=[0.0, 0.0], spacing=[0.5, 0.5], shape=(2, 3), 2 solid nodes)
+    Grid(origin=[0, 0], spacing=0.5, shape=(2, 3), 2 solid nodes)
     """
     values, first, steps = _read(path, MASK_READERS, "a mask")
     solid = values < level if extension(path) in PICTURES else values > level

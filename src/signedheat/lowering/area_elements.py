@@ -154,7 +154,7 @@ def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = 
     Examples
     --------
     >>> grid_around([PointCloud([[0, 0, 0], [1, 2, 4]])], 7, padding=1.0)
-    Grid(origin=[-1.0, -1.0, -1.0], spacing=[1.0, 1.0, 1.0], shape=(4, 5, 7))
+    Grid(origin=[-1, -1, -1], spacing=1, shape=(4, 5, 7))
     """
     return Grid.around(bounds_around(shapes), resolution, padding)
 

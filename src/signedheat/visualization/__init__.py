@@ -1,5 +1,8 @@
 """Pictures of fields and shapes; no display is needed."""
 
+from . import interactive as _interactive  # noqa: F401  provides windows
+from . import notebook as _notebook  # noqa: F401  provides what notebooks show
+from . import polyscope_scenes as _polyscope_scenes  # noqa: F401  provides views in Polyscope
 from .figures import PICTURE_FORMATS, ensure_picture_writable, new_figure
 from .scenes import draw_shape, save_scene
 from .slices import draw_plane, draw_slices, save_slices

@@ -1,0 +1,127 @@
+"""Shapes and fields in windows and notebooks, by PyVista."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from ..domains.display import plotter_of
+from ..domains.grid import Grid
+from ..domains.polyline import Polyline
+from ..domains.tet_mesh import TetMesh
+from ..errors import GeometryError, OutsideError
+from ..fields.grid_field import GridField
+from ..fields.piecewise_field import PiecewiseField
+from ..fields.tet_field import TetField
+from ..fields.vertex_field import VertexField
+from ..io.surface_fields import NAME
+from ..packages import lazy_module
+from .colors import INSIDE_TO_OUTSIDE, isolines_between
+from .scenes import INSIDE, OUTSIDE
+
+pyvista = lazy_module("pyvista", "windows")
+mpl_colors = lazy_module("matplotlib.colors", "pictures")
+
+BODY = "#d8d2c0"
+LINE = "#1a1a1a"
+
+
+@plotter_of.provide
+def plotter_with(thing: object) -> Any:
+    """A `pyvista.Plotter` in which a shape or a field is drawn."""
+    plotter = pyvista.Plotter()
+    add(thing, plotter)
+    plotter.add_axes()
+    return plotter
+
+
+@singledispatch
+def add(thing: Any, plotter: Any) -> None:
+    """Draw something; by default a shape, with its inner sides in another colour."""
+    if isinstance(thing, TetMesh):
+        thing = thing.boundary
+    mesh = thing.to_pyvista()
+    if not mesh.faces.size:
+        plotter.add_mesh(mesh, color=BODY, render_points_as_spheres=True, point_size=5, line_width=3)
+        return
+    plotter.add_mesh(mesh, color=OUTSIDE, backface_params={"color": INSIDE})
+
+
+@add.register
+def _(line: Polyline, plotter: Any) -> None:
+    plotter.add_mesh(line.to_pyvista(), color=LINE, line_width=3)
+    plotter.view_xy()
+
+
+@add.register
+def _(grid: Grid, plotter: Any) -> None:
+    image = grid.to_pyvista()
+    plotter.add_mesh(image.outline(), color=LINE)
+    if grid.mask is not None:
+        plotter.add_mesh(image.threshold(0.5, scalars="solid"), color="#b9b9b9", show_scalar_bar=False)
+
+
+@add.register
+def _(field: GridField, plotter: Any) -> None:
+    image, look = field.to_pyvista(), _look(field.values)
+    if field.grid.dimension == 2:
+        _add_colors(plotter, image, look)
+        _add_isolines(plotter, image, look)
+        plotter.view_xy()
+        return
+    _add_section(plotter, image, look)
+    _add_zero_set(plotter, field)
+
+
+@add.register
+def _(field: TetField, plotter: Any) -> None:
+    _add_section(plotter, field.to_pyvista(), _look(field.values))
+    _add_zero_set(plotter, field)
+
+
+@add.register(VertexField)
+@add.register(PiecewiseField)
+def _(field: VertexField | PiecewiseField, plotter: Any) -> None:
+    surface, look = field.to_pyvista(), _look(field.values)
+    _add_colors(plotter, surface, look, point_size=6, render_points_as_spheres=True)
+    if surface.faces.size:
+        _add_isolines(plotter, surface, look)
+
+
+def _look(values: Any) -> dict[str, Any]:
+    """Colours centred on zero, and isolines."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    reach = max(abs(low), abs(high), 1e-300)
+    colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
+    return {"reach": reach, "colors": colors, "levels": isolines_between(low, high)[0], "zero": low < 0 < high}
+
+
+def _add_colors(plotter: Any, mesh: Any, look: dict[str, Any], **options: Any) -> None:
+    bar = {"title": "signed distance", "n_labels": 5, "fmt": "%.3g"}
+    limits = (-look["reach"], look["reach"])
+    plotter.add_mesh(
+        mesh, scalars=NAME, cmap=look["colors"], clim=limits, nan_color="#b9b9b9", scalar_bar_args=bar, **options
+    )
+
+
+def _add_isolines(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
+    for levels, width in ((look["levels"], 1.0), ([0.0] if look["zero"] else [], 4.0)):
+        lines = mesh.contour(list(levels), scalars=NAME) if len(levels) else None
+        if lines is not None and lines.n_points:
+            plotter.add_mesh(lines, color=LINE, line_width=width, show_scalar_bar=False)
+
+
+def _add_zero_set(plotter: Any, field: Any) -> None:
+    with suppress(OutsideError, GeometryError):  # there may be no surface
+        plotter.add_mesh(field.contour(0.0).to_pyvista(), color=BODY, opacity=0.6)
+
+
+def _add_section(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
+    """The section across y through the middle of the box."""
+    plotter.add_mesh(mesh.outline(), color=LINE)
+    section = mesh.slice(normal="y")
+    _add_colors(plotter, section, look, lighting=False)
+    _add_isolines(plotter, section, look)

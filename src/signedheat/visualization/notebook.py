@@ -1,0 +1,139 @@
+"""What notebooks show of shapes and fields: a line of text and a small picture."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from functools import singledispatch
+from typing import Any
+
+import numpy as np
+
+from ..domains.digital_surface import DigitalSurface
+from ..domains.display import html_of
+from ..domains.grid import Grid
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.polyline import Polyline
+from ..domains.tet_mesh import TetMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import MissingPackageError
+from ..fields.grid_field import GridField
+from ..fields.piecewise_field import PiecewiseField
+from ..fields.tet_field import TetField
+from ..fields.vertex_field import VertexField
+from ..io.surface_fields import on_simple_surface
+from ..packages import lazy_module
+from .figures import new_figure
+from .scenes import draw_shape
+from .slices import draw_plane, draw_slices, telling_layer
+from .surfaces import draw_surface
+
+pillow = lazy_module("PIL.Image", "pictures")
+
+SIDE = 3.4
+"""Of the picture, in inches."""
+DPI = 90
+N_COLORS = 96
+SECTION_NODES = 80
+"""Nodes along the longest side of a section through tets."""
+
+
+@html_of.provide
+def as_html(thing: object) -> str:
+    """A line of text and, where there is something to see and matplotlib is installed, a picture of it."""
+    text = f"<code>{html.escape(repr(thing))}</code>"
+    try:
+        figure = new_figure(SIDE * 1.25, SIDE)
+        drawn = draw(thing, figure.add_subplot())
+    except MissingPackageError:
+        return text
+    if not drawn:
+        return text
+    data = base64.b64encode(_small_png(figure)).decode()
+    return f'{text}<br><img alt="{html.escape(type(thing).__name__)}" src="data:image/png;base64,{data}">'
+
+
+def _small_png(figure: Any) -> bytes:
+    """The picture in few colours, which a notebook keeps with every output."""
+    whole, small = io.BytesIO(), io.BytesIO()
+    figure.savefig(whole, dpi=DPI, format="png")
+    pillow.open(whole).convert("RGB").quantize(N_COLORS).save(small, format="png", optimize=True)
+    return small.getvalue()
+
+
+@singledispatch
+def draw(thing: Any, axes: Any) -> bool:
+    """Draw something into axes; whether there was anything to draw."""
+    return False
+
+
+@draw.register(TriangleMesh)
+@draw.register(PolygonMesh)
+@draw.register(PointCloud)
+def _(shape: TriangleMesh | PolygonMesh | PointCloud, axes: Any) -> bool:
+    positions = shape.points if isinstance(shape, PointCloud) else shape.vertices
+    if positions.shape[1] != 3:
+        return False
+    draw_shape(shape, axes)
+    return True
+
+
+@draw.register
+def _(shape: TetMesh, axes: Any) -> bool:
+    return draw(shape.boundary, axes)
+
+
+@draw.register
+def _(shape: DigitalSurface, axes: Any) -> bool:
+    return draw(shape.squares, axes)
+
+
+@draw.register
+def _(line: Polyline, axes: Any) -> bool:
+    points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
+    axes.plot(*points.T, color="#d4145a", linewidth=2.0)
+    axes.set_aspect("equal")
+    return True
+
+
+@draw.register
+def _(field: GridField, axes: Any) -> bool:
+    if field.grid.dimension not in (2, 3) or np.isnan(field.values).all():
+        return False
+    if field.grid.dimension == 2:
+        draw_plane(field, axes)
+    else:
+        draw_slices(field, [axes], across=(_best_axis(field),))
+    return True
+
+
+@draw.register
+def _(field: TetField, axes: Any) -> bool:
+    grid = Grid.around(np.delete(field.mesh.bounds, 1, axis=1), SECTION_NODES, padding=0.0)
+    points = np.insert(grid.points.reshape(-1, 2), 1, field.mesh.bounds[:, 1].mean(), axis=1)
+    draw_plane(GridField(grid, field(points).reshape(grid.shape)), axes)
+    axes.set(ylabel="z")
+    return True
+
+
+@draw.register
+def _(field: VertexField, axes: Any) -> bool:
+    simple = on_simple_surface(field)
+    if isinstance(simple.domain, PointCloud) and simple.domain.points.shape[1] != 3:
+        return False
+    draw_surface(simple, axes)
+    return True
+
+
+@draw.register
+def _(field: PiecewiseField, axes: Any) -> bool:
+    return draw(field.split(), axes)
+
+
+def _best_axis(field: GridField) -> int:
+    """The axis across which a slice shows most of the inside; of equal ones y, then z."""
+    inside = field.values < 0
+    counts = [int(inside.take(telling_layer(field, axis), axis).sum()) for axis in range(3)]
+    return max((1, 2, 0), key=lambda axis: counts[axis])

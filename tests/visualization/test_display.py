@@ -1,0 +1,164 @@
+"""What shapes and fields look like in notebooks, in PyVista and in Polyscope, and as text."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+import subprocess
+import sys
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+
+BALL = samples.sphere(2)
+GRID = sh.Grid((-1.5, -1.2, -1.2), 0.2, (16, 13, 13))
+SQUARE = sh.Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
+PLANE = sh.Grid((-0.5, -0.5), 0.1, (21, 16))
+TETS = sh.tetrahedralize(BALL, resolution=3)
+VOXELS = sh.DigitalSurface(np.linalg.norm(np.indices((9, 9, 9)) - 4.0, axis=0) < 3.5)
+
+
+def height(points):
+    return points[..., 0] - 0.3
+
+
+def piecewise():
+    return sh.piecewise_distance(BALL, [BALL.polyline([[1.0, 0, 0.2], [0, 1.0, 0.1]])])
+
+
+THINGS = {
+    "mesh": lambda: samples.with_flipped_faces(BALL, 0.2),
+    "polygons": lambda: VOXELS.squares,
+    "points": lambda: samples.oriented_points(BALL, 800),
+    "voxels": lambda: VOXELS,
+    "tets": lambda: TETS,
+    "line": lambda: SQUARE,
+    "field on a grid": lambda: sh.GridField(GRID, np.linalg.norm(GRID.points, axis=-1) - 1),
+    "field of one sign": lambda: sh.GridField(GRID, np.linalg.norm(GRID.points, axis=-1) + 1),
+    "field in the plane": lambda: sh.GridField(PLANE, height(PLANE.points)),
+    "field on tets": lambda: sh.TetField(TETS, height(TETS.vertices)),
+    "field on a mesh": lambda: sh.VertexField(BALL, height(BALL.vertices)),
+    "field on voxels": lambda: sh.VertexField(VOXELS, height(VOXELS.vertices) - 4),
+    "piecewise field": piecewise,
+}
+BARE = {
+    "grid": lambda: GRID,
+    "walls": lambda: sh.Grid((0, 0), 1.0, (5, 5), mask=np.eye(5, dtype=bool)),
+    "triangulation": lambda: sh.intrinsic_delaunay(BALL),
+}
+
+
+@pytest.mark.parametrize("make", [*THINGS.values(), *BARE.values()], ids=[*THINGS, *BARE])
+def test_text_is_short(make):
+    thing = make()
+    assert len(repr(thing)) < 160
+    assert not re.search(r"\d\.\d{9}|array\(", repr(thing))
+
+
+def test_notes_and_results_are_short_text_too():
+    field = sh.solid_distance(samples.with_flipped_faces(BALL, 0.2), resolution=16)
+    for thing in (field.diagnostics, *field.diagnostics.notes, sh.orientation(BALL), sh.LevelValues(np.arange(99) / 7)):
+        assert not re.search(r"\d\.\d{9}|array\(|object at", repr(thing))
+    assert repr(sh.LevelValues([1 / 3, 2.0])) == "LevelValues(values=(0.3333, 2))"
+
+
+@pytest.mark.parametrize("make", THINGS.values(), ids=THINGS)
+def test_notebooks_show_a_small_picture(make):
+    thing = make()
+    shown = thing._repr_html_()
+    [data] = re.findall(r'src="data:image/png;base64,([^"]+)"', shown)
+    picture = matplotlib.image.imread(io.BytesIO(base64.b64decode(data)))[..., :3]
+    assert picture.std() > 0.05 and max(picture.shape) < 600 and len(shown) < 90_000
+    assert type(thing).__name__ in shown
+
+
+@pytest.mark.parametrize("make", BARE.values(), ids=BARE)
+def test_what_has_no_picture_is_text(make):
+    assert make()._repr_html_() == f"<code>{make()!r}</code>"
+
+
+def test_text_is_escaped():
+    grid = sh.Grid((0, 0, 0, 0), 1.0, (2, 2, 2, 2))
+    assert "<img" not in sh.GridField(grid, np.zeros(grid.shape))._repr_html_()
+
+
+def test_without_matplotlib_notebooks_show_text():
+    code = (
+        "import sys; sys.modules['matplotlib'] = None\n"
+        "import signedheat as sh; print(sh.Polyline([[0, 0], [1, 1]])._repr_html_())"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "<code>Polyline(2 points, open)</code>"
+
+
+@pytest.mark.parametrize("name", [name for name in THINGS if "field" in name])
+def test_fields_go_to_pyvista_with_their_values(name):
+    pytest.importorskip("pyvista")
+    field = THINGS[name]()
+    thing = field.to_pyvista()
+    values = thing.point_data["signed_distance"]
+    if isinstance(field, sh.GridField | sh.TetField):  # PyVista's own interpolation finds the same value at each point
+        d = getattr(field.domain, "dimension", 3)
+        assert np.abs(field(np.asarray(thing.points)[:, :d]) - values).max() < (
+            1e-12 if d == 2 or "grid" in name else 0.3
+        )
+    assert float(np.nanmin(values)) == pytest.approx(np.nanmin(field.values), abs=0.4)
+    assert len(values) == thing.n_points
+
+
+def test_grids_go_to_pyvista_with_their_walls():
+    pytest.importorskip("pyvista")
+    walls = BARE["walls"]()
+    image = walls.to_pyvista()
+    assert image.dimensions == (5, 5, 1)
+    solid = np.asarray(image.points)[image.point_data["solid"]]
+    assert np.array_equal(solid[:, 0], solid[:, 1]) and len(solid) == 5
+    with pytest.raises(sh.GeometryError) as told:
+        sh.Grid((0.0,), 1.0, (4,)).to_pyvista()
+    assert told.value.element == "grid"
+
+
+@pytest.mark.parametrize("make", [*THINGS.values(), *BARE.values()], ids=[*THINGS, *BARE])
+def test_pyvista_draws_everything(make, monkeypatch):
+    pyvista = pytest.importorskip("pyvista")
+    monkeypatch.setattr(pyvista, "OFF_SCREEN", True)
+    plotter = make().plotter()
+    plotter.window_size = (200, 160)
+    assert np.asarray(plotter.screenshot(return_img=True)).std() > 5
+    plotter.close()
+
+
+def test_plot_shows_and_returns_what_pyvista_returns(monkeypatch):
+    pyvista = pytest.importorskip("pyvista")
+    monkeypatch.setattr(pyvista.Plotter, "show", lambda self: ("shown", len(self.actors)))
+    shown, actors = THINGS["field on a grid"]().plot()
+    assert shown == "shown" and actors > 3
+
+
+def test_everything_goes_to_polyscope():
+    pytest.importorskip("polyscope")
+    code = """
+import sys; sys.path.insert(0, "tests/visualization"); sys.path.insert(0, "tests")
+import polyscope, test_display as cases, signedheat as sh
+polyscope.init("openGL_mock")
+kinds = {}
+for name, make in cases.THINGS.items():
+    try:
+        kinds[name] = type(make().to_polyscope(name)).__name__
+    except sh.UnsupportedTypeError as error:
+        assert error.remedy and error.element
+        kinds[name] = "refused"
+print(kinds)
+"""
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found.stderr
+    kinds = eval(found.stdout.strip().splitlines()[-1])
+    assert kinds["mesh"] == kinds["field on a mesh"] == kinds["piecewise field"] == "SurfaceMesh"
+    assert kinds["points"] == "PointCloud" and kinds["line"] == "CurveNetwork"
+    assert kinds["field on a grid"] == "VolumeGrid" and kinds["field on tets"] == kinds["tets"] == "VolumeMesh"
+    assert kinds["field in the plane"] == "refused"
