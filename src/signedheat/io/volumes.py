@@ -60,7 +60,8 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
             f"the image has {values.ndim} axes, and a volume has 3",
             path=path,
         )
-    return DigitalSurface(values if level is None else values > level, spacing, origin, radius)
+    with reading(path):
+        return DigitalSurface(values if level is None else values > level, spacing, origin, radius)
 
 
 def read_mask(
@@ -101,7 +102,8 @@ def read_mask(
     """
     values, first, steps = _read(path, MASK_READERS, "a mask")
     solid = values < level if extension(path) in PICTURES else values > level
-    return Grid(first if origin is None else origin, steps if spacing is None else spacing, solid.shape, solid)
+    with reading(path):
+        return Grid(first if origin is None else origin, steps if spacing is None else spacing, solid.shape, solid)
 
 
 def _read(

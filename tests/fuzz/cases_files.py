@@ -1,0 +1,258 @@
+"""Every reader of files, on files that were right before they were damaged: `files STL`, `files fields`, …"""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import tempfile
+import zlib
+from base64 import b64encode
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import signedheat as sh
+from fuzz.frame import Wrong, family
+from fuzz.mutations import damaged
+from signedheat import samples
+from signedheat.io.obj import read_obj_lines
+
+Files = dict[str, bytes]
+"""Contents by name; the first is the one that is read."""
+
+
+@dataclass(frozen=True)
+class Damaged:
+    """A damaged file, and what reads it."""
+
+    path: Path
+    read: Callable[[Path], Any]
+
+
+def build(kind: str, random: np.random.Generator, folder: Path) -> Damaged:
+    """One of the files of a kind, and those beside it: one of them is damaged."""
+    read, variants = KINDS[kind]
+    files = dict(variants()[int(random.integers(0, len(variants())))])
+    hit = list(files)[int(random.integers(0, len(files)))] if random.random() < 0.3 else next(iter(files))
+    files[hit] = damaged(random, files[hit])
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    return Damaged(folder / next(iter(files)), read)
+
+
+def check(subject: Damaged) -> str:
+    """It is read, and everything in it is finite; or it is refused by an error that names the file."""
+    try:
+        found = subject.read(subject.path)
+    except sh.SignedHeatError as error:
+        if error.path is None:
+            raise Wrong("refused without the file's name", str(error)) from error
+        raise
+    for shape in found if isinstance(found, list) else [found]:
+        points = getattr(shape, "vertices", getattr(shape, "points", None)) if not isinstance(shape, sh.Grid) else None
+        if points is not None and not np.isfinite(points).all():
+            raise Wrong("not finite", repr(shape))
+    return "read"
+
+
+def written(save: Callable[[Path], Any], *names: str) -> Files:
+    """What a writer writes."""
+    with tempfile.TemporaryDirectory() as folder:
+        save(Path(folder) / names[0])
+        return {name: (Path(folder) / name).read_bytes() for name in names}
+
+
+BALL = samples.sphere(1)
+SQUARES = sh.DigitalSurface(np.ones((2, 2, 2), dtype=bool)).squares
+CLOUD = sh.PointCloud(BALL.vertices, BALL.vertices)
+TETS = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], [[0, 1, 2, 3], [1, 2, 3, 4]])
+GRID = sh.Grid([0.0, 0.0, 0.0], [0.5, 0.5, 0.25], [3, 4, 5])
+FIELD = sh.GridField(GRID, np.random.default_rng(0).normal(size=GRID.shape))
+CURVES = [BALL.path([0, 1]), sh.SurfacePoints([0, 1], [[0.2, 0.3, 0.5], [0, 0, 1]])]
+
+
+def shapes(ending: str) -> list[Files]:
+    """Triangles, polygons and points, as far as a format holds them."""
+    name, found = f"shape.{ending}", []
+    for shape in (BALL, SQUARES, CLOUD):
+        try:
+            found.append(written(shape.save, name))
+        except sh.FileFormatError:
+            continue
+    return found
+
+
+@cache
+def stl() -> list[Files]:
+    """Binary and text."""
+    facets = BALL.vertices[BALL.faces].tolist()
+    corners = ["\n".join(f"vertex {x} {y} {z}" for x, y, z in facet) for facet in facets]
+    rows = [f"facet normal 0 0 0\nouter loop\n{three}\nendloop\nendfacet" for three in corners]
+    return [*shapes("stl"), {"shape.stl": "\n".join(["solid x", *rows, "endsolid x\n"]).encode()}]
+
+
+@cache
+def ply() -> list[Files]:
+    """Binary of both orders, and text."""
+    body = "".join(" ".join(map(str, p)) + "\n" for p in BALL.vertices.tolist())
+    faces = "".join("3 " + " ".join(map(str, f)) + "\n" for f in BALL.faces.tolist())
+    head = f"ply\nformat {{}} 1.0\nelement vertex {BALL.n_vertices}\n"
+    head += "property float x\nproperty float y\nproperty float z\n"
+    head += f"element face {BALL.n_faces}\nproperty list uchar int vertex_indices\nend_header\n"
+    mixed = b"".join(bytes([len(p)]) + np.array(p, ">i4").tobytes() for p in [*SQUARES.polygons, [0, 1, 2]])
+    big = head.replace(f"vertex {BALL.n_vertices}", f"vertex {SQUARES.n_vertices}")
+    big = big.replace(f"face {BALL.n_faces}", f"face {len(SQUARES.polygons) + 1}").format("binary_big_endian")
+    strips = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement "
+    strips += "tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n4 0 1 2 3\n"
+    return [
+        *shapes("ply"),
+        {"shape.ply": (head.format("ascii") + body + faces).encode()},
+        {"shape.ply": big.encode() + SQUARES.vertices.astype(">f4").tobytes() + mixed},
+        {"shape.ply": strips.encode()},
+    ]
+
+
+@cache
+def texts() -> list[Files]:
+    """OBJ, OFF, XYZ, PC."""
+    return [file for ending in ("obj", "off", "xyz", "pc") for file in shapes(ending)]
+
+
+@cache
+def vtp() -> list[Files]:
+    """Appended, and packed in base 64."""
+    points = vtk_array("P", np.array(TETS.vertices))
+    cells = vtk_array("connectivity", np.array([0, 1, 2, 1, 2, 3])) + vtk_array("offsets", np.array([3, 6]))
+    text = (
+        '<VTKFile type="PolyData" byte_order="LittleEndian" header_type="UInt32" compressor="vtkZLibDataCompressor">'
+        f'<PolyData><Piece NumberOfPoints="5" NumberOfPolys="2"><Points>{points}</Points><Polys>{cells}</Polys>'
+        "</Piece></PolyData></VTKFile>"
+    )
+    return [*shapes("vtp"), {"shape.vtp": text.encode()}]
+
+
+def vtk_array(name: str, values: np.ndarray) -> str:
+    """A packed array of VTK."""
+    data, kind = values.tobytes(), {"f": "Float64", "i": "Int64"}[values.dtype.kind]
+    packed = zlib.compress(data)
+    head = np.array([1, len(data), len(data), len(packed)], "<u4").tobytes()
+    text = b64encode(head).decode() + b64encode(packed).decode()
+    return f'<DataArray type="{kind}" Name="{name}" format="binary">{text}</DataArray>'
+
+
+@cache
+def gltf() -> list[Files]:
+    """GLB, and glTF with its buffers."""
+    scene = sh.samples.sphere(1).to_trimesh().scene()
+    files = {name: bytes(data) for name, data in scene.export(file_type="gltf").items()}
+    main = files.pop("model.gltf")
+    return [{"shape.glb": scene.export(file_type="glb")}, {"model.gltf": main, **files}]
+
+
+@cache
+def tets() -> list[Files]:
+    """Every format of tets, in text and binary."""
+    mesh, found = TETS.to_meshio({"signed_distance": np.arange(5.0)}), []
+    for ending, options in (
+        ("mesh", {}), ("meshb", {}), ("vtu", {}), ("vtu", {"binary": False}), ("vtu", {"compression": None}),
+        ("vtk", {}), ("vtk", {"binary": False}), ("msh", {"file_format": "gmsh"}), ("msh", {"file_format": "gmsh22"}),
+        ("msh", {"file_format": "gmsh", "binary": False}), ("msh", {"file_format": "gmsh22", "binary": False}),
+    ):  # fmt: skip
+        text_of_gmsh = options.get("binary") is False and ending == "msh"  # meshio cannot read values from it
+        one = TETS.to_meshio() if text_of_gmsh else mesh
+        found.append(written(lambda path, one=one, options=options: one.write(path, **options), f"shape.{ending}"))
+    pair = written(TETS.save, "shape.node", "shape.ele")
+    return [*found, pair, dict(reversed(pair.items()))]
+
+
+@cache
+def fields() -> list[Files]:
+    """Every format of fields on grids and surfaces."""
+    raw = written(FIELD.save, "field.nrrd")["field.nrrd"]
+    head, _, values = raw.partition(b"\n\n")
+    packed = {name: head.replace(b"raw", name.encode()) + b"\n\n" for name in ("gzip", "bzip2", "ascii")}
+    numbers = " ".join(map(str, FIELD.values.ravel(order="F").tolist())).encode()
+    on_ball = sh.VertexField(BALL, BALL.vertices[:, 0])
+    apart = head + b"\ndata file: field.raw\n\n"
+    return [
+        *[written(FIELD.save, f"field.{ending}") for ending in ("npz", "vti", "nrrd")],
+        written(FIELD.save, "field.npy", "field.json"),
+        written(on_ball.save, "field.npz"),
+        {"field.nrrd": packed["gzip"] + gzip.compress(values)},
+        {"field.nrrd": packed["bzip2"] + bz2.compress(values)},
+        {"field.nrrd": packed["ascii"] + numbers},
+        {"field.nrrd": apart, "field.raw": values},
+    ]
+
+
+@cache
+def volumes() -> list[Files]:
+    """Voxels."""
+    voxels = np.zeros((3, 3, 3), dtype=np.uint8)
+    voxels[1, 1, 1] = 1
+    field = sh.GridField(sh.Grid([0, 0, 0], 1, voxels.shape), voxels.astype(float))
+    array = written(lambda path: np.save(path, voxels), "voxels.npy")
+    return [array, *[written(field.save, f"voxels.{ending}") for ending in ("vti", "nrrd")]]
+
+
+@cache
+def masks() -> list[Files]:
+    """Pictures."""
+    from PIL import Image
+
+    pixels = np.random.default_rng(1).integers(0, 2, (12, 9), dtype=np.uint8) * 255
+    return [written(Image.fromarray(pixels).save, f"mask.{ending}") for ending in ("png", "bmp", "tif")]
+
+
+@cache
+def lines() -> list[Files]:
+    """Polylines in the plane."""
+    square = sh.Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
+    drawing = """<svg xmlns="http://www.w3.org/2000/svg"><g transform="translate(3 4) rotate(30)"><path
+    d="M0 0 C 1 2 3 4 5 6 A 3 4 5 0 1 7 8 Q 1 1 2 2 Z m 3 3 h 4 v -5"/><rect x="1" y="2" width="3" height="4"/></g>
+    <circle cx="1" cy="2" r="3"/><ellipse cx="0" cy="0" rx="2" ry="1"/><polyline points="0,0 1,1 2,0"/></svg>"""
+    files = [written(lambda path: sh.write_polylines(path, [square, square]), f"lines.{e}") for e in ("svg", "csv")]
+    return [*files, {"lines.svg": drawing.encode()}]
+
+
+@cache
+def curves() -> list[Files]:
+    """Curves and points on a surface."""
+    files = [written(lambda path: sh.write_curves(path, CURVES, BALL), f"curves.{e}") for e in ("txt", "json", "obj")]
+    table = "x,y,z\n" + "".join(",".join(map(str, p)) + "\n" for p in BALL.vertices[[0, 1, 2]].tolist())
+    segments = "#offset 0\nv 0\nv 1\ne 2 0.5\nf 1 0.2 0.3\nl 0 1 2\nl 2 3\n"
+    return [
+        *files,
+        {"curves.csv": table.encode()},
+        {"curves.txt": segments.encode()},
+        {"curves.json": b'{"polylines": [{"points": [[0, 0, 1], [0, 1, 0], [1, 0, 0]], "closed": true}]}'},
+    ]
+
+
+KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
+    "STL": (sh.read, stl),
+    "PLY": (sh.read, ply),
+    "texts": (sh.read, texts),
+    "VTP": (sh.read, vtp),
+    "glTF": (sh.read, gltf),
+    "tets": (sh.read, tets),
+    "tet fields": (sh.load_field, lambda: [f for f in tets() if b"signed_distance" in next(iter(f.values()))]),
+    "fields": (sh.load_field, fields),
+    "volumes": (sh.read, volumes),
+    "masks": (sh.read_mask, masks),
+    "lines": (sh.read_polylines, lines),
+    "curves": (lambda path: sh.read_curves(path, BALL), curves),
+    "line elements": (read_obj_lines, lambda: [f for f in curves() if "curves.obj" in f]),
+}
+
+for _kind in KINDS:
+    family(
+        f"files {_kind}",
+        lambda random, folder, kind=_kind: build(kind, random, folder),
+        check,
+        memory=1 << 28,
+    )
