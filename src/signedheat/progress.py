@@ -34,3 +34,19 @@ class Stopwatch:
         logger.info("%s: %.3f s", step, self.seconds[step])
         if self._progress is not None and len(self.seconds) == self._steps:
             self._progress(1.0, "done")
+
+
+def within(progress: Progress | None, start: float, stop: float) -> Progress | None:
+    """Progress of a part of a computation, from `start` to `stop` of the whole.
+
+    Examples
+    --------
+    >>> told = []
+    >>> within(lambda fraction, step: told.append(fraction), 0.5, 1.0)(0.5, "halfway")
+    >>> told
+    [0.75]
+    """
+    if progress is None:
+        return None
+    whole = progress
+    return lambda fraction, step: whole(start + fraction * (stop - start), step)

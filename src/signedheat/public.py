@@ -37,6 +37,7 @@ from .extensions.sharpening_methods import Convex, Geodesic
 from .extensions.solid_distance import solid_distance
 from .extensions.tetrahedralize import tetrahedralize
 from .extensions.uniting import unite
+from .fields.band_field import BandField
 from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
 from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField
@@ -57,6 +58,7 @@ from .solver import SignedHeatSolver, signed_distance
 from .visualization import new_figure as _new_figure  # noqa: F401  provides notebooks, windows and Polyscope
 
 __all__ = [
+    "BandField",
     "ConstraintError",
     "Convex",
     "Curve",

@@ -289,3 +289,22 @@ def test_module_runs_as_a_process(tmp_path, ball):
     done = subprocess.run([*command[:4], "missing.stl", "-o", output], capture_output=True, text=True)
     assert done.returncode == 1
     assert done.stderr == "signedheat: missing.stl: there is no such file: check the name\n"
+
+
+def test_bands_are_written_and_contoured(tmp_path, ball, capsys):
+    output, surface = str(tmp_path / "band.npz"), str(tmp_path / "offset.ply")
+    options = ["--resolution", "48", "--padding", "0.4", "--band", "0.2"]
+    summary = json.loads(succeed(capsys, "volume", ball, "-o", output, *options, "--json"))
+    assert summary["band"] == 0.2
+    assert summary["nodes"] == 512 * summary["blocks"]
+    band = sh.load_field(output)
+    assert isinstance(band, sh.BandField)
+    assert abs(band([[1.1, 0, 0]])[0] - 0.1) < 0.02
+    succeed(capsys, "contour", output, "0.1", "-o", surface)
+    one = sh.read(surface)
+    succeed(capsys, "offset", ball, "0.1", "-o", surface, *options)
+    other = sh.read(surface)
+    assert one.n_faces == other.n_faces
+    assert np.abs(one.vertices - other.vertices).mean() < 0.001  # the file does not know the shape
+    fail(capsys, "offset", ball, "0.3", "-o", surface, *options, code=2)
+    fail(capsys, "volume", ball, "-o", output, *options, "--plain", code=2)

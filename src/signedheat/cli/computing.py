@@ -25,6 +25,7 @@ from ..domains.grid import Grid, room_around
 from ..domains.tet_mesh import TetMesh
 from ..errors import SignedHeatError
 from ..extensions.solid_distance import solid_distance
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import read, read_mask, read_polylines
@@ -93,14 +94,25 @@ def constraint_of(word: str) -> Constraint:
 
 
 @overload
-def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField: ...
+def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField | BandField: ...
 @overload
 def compute(shape: Any, domain: TetMesh, arguments: Namespace) -> TetField: ...
-def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField:
+def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField | BandField:
     """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
-    field: GridField | TetField
+    field: GridField | TetField | BandField
     with ProgressBar(arguments.quiet or arguments.json) as progress:
-        if isinstance(domain, TetMesh) or domain.dimension == 3:
+        if isinstance(domain, Grid) and arguments.band is not None:
+            field = solid_distance(
+                shape,
+                domain,
+                band=arguments.band,
+                constraint=arguments.constraint,
+                diffusion=arguments.diffusion,
+                as_oriented=arguments.as_oriented,
+                keep_overlaps=arguments.keep_overlaps,
+                progress=progress,
+            )
+        elif isinstance(domain, TetMesh) or domain.dimension == 3:
             field = solid_distance(
                 shape,
                 domain,
@@ -131,7 +143,7 @@ def planar_distance(lines: Any, grid: Grid, arguments: Namespace, progress: Prog
     return sharpen(field)
 
 
-def told(field: GridField | TetField) -> list[str]:
+def told(field: GridField | TetField | BandField) -> list[str]:
     """What to know about a field before trusting it, a line for each thing."""
     lines = []
     for note in field.diagnostics.notes:
@@ -150,7 +162,12 @@ def told(field: GridField | TetField) -> list[str]:
     return lines
 
 
-def hint(field: GridField) -> str:
+def drawable(field: GridField | BandField) -> GridField:
+    """The field, or of one in a band the coarse one: slices are drawn through the whole box."""
+    return field.coarse if isinstance(field, BandField) else field
+
+
+def hint(field: GridField | BandField) -> str:
     """A further line of output about sources that may have been given twice, or nothing."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
@@ -164,7 +181,7 @@ def hint(field: GridField) -> str:
 
 def describe(field: Any) -> dict[str, Any]:
     """Key figures of a field, for ``--json``."""
-    if isinstance(field, GridField):
+    if isinstance(field, GridField | BandField):
         note = field.diagnostics.note(SampledSource)
         where = {
             "origin": field.grid.origin.tolist(),
@@ -173,6 +190,8 @@ def describe(field: Any) -> dict[str, Any]:
             "area_outside": note.area_outside if note else 0.0,
             "area_cancelled": note.area_cancelled if note else 0.0,
         }
+        if isinstance(field, BandField):
+            where |= {"band": field.width, "blocks": len(field.blocks), "nodes": field.n_nodes}
     else:
         where = {"n_vertices": len(field.values)}
     return {

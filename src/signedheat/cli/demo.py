@@ -22,6 +22,7 @@ DEFAULTS = {
     "keep_overlaps": False,
     "plain": False,
     "constraint": "zero-set",
+    "band": None,
     "diffusion": 1.0,
 }
 """What `compute` reads, where the demo has no options."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
 from ..visualization import ensure_picture_writable, save_slices
-from .computing import Summary, compute, describe, grid_for, hint, prefix_errors, read_source
+from .computing import Summary, compute, describe, drawable, grid_for, hint, prefix_errors, read_source
 from .usage.options import is_planar
 
 
@@ -31,7 +31,7 @@ def run(arguments: Namespace) -> Summary:
         else:
             save(what, output)
     if arguments.preview:
-        save_slices(field, arguments.preview, shape, arguments.distances)
+        save_slices(drawable(field), arguments.preview, shape, arguments.distances)
     written = [
         {"distance": distance, "output": output, **counts(what)}
         for distance, output, what in zip(arguments.distances, outputs, found, strict=True)

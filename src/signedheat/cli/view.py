@@ -8,6 +8,7 @@ from typing import Any
 
 from ..domains.tet_mesh import TetMesh
 from ..errors import FileFormatError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
@@ -15,7 +16,7 @@ from ..io import FIELD_FORMATS, load_field, read
 from ..io.files import extension
 from ..io.tets import TET_FIELD_FORMATS
 from ..visualization import ensure_picture_writable, save_scene, save_slices, save_surface
-from .computing import Summary, prefix_errors
+from .computing import Summary, drawable, prefix_errors
 from .tets import on_grid
 
 
@@ -26,8 +27,8 @@ def run(arguments: Namespace) -> Summary:
     with prefix_errors(arguments.file):
         if isinstance(thing, VertexField):
             save_surface(thing, arguments.output, up=up)
-        elif isinstance(thing, GridField):
-            save_slices(thing, arguments.output)
+        elif isinstance(thing, GridField | BandField):
+            save_slices(drawable(thing), arguments.output)
         elif isinstance(thing, TetField):
             save_slices(on_grid(thing), arguments.output)
         else:

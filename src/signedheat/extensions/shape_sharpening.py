@@ -130,6 +130,8 @@ def assemble(
         telling = tells(band.feet[:, 1:] / steps)
         votes = np.bincount(band.faces, np.where(telling, 1, -1), len(features.rows))
         telling, telling_faces = np.concatenate([telling, np.zeros(len(crossings), dtype=bool)]), votes > 0
+        silent = np.bincount(band.faces, minlength=len(votes)) == 0  # faces too small to be the nearest of any node
+        telling_faces[silent] = tells(features.corners[silent].reshape(-1, 3, 3).mean(axis=1) / steps)
     values, confidence = signed_distances(nearby, sides < 0, trusted, telling)
     surface = ExactSurface(features, crossings, np.array(grid.origin), steps, telling_faces)
     share = float(left_out.mean()) if n_faces else 0.0

@@ -22,6 +22,7 @@ from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
 from ..errors import CancellingNormalsError, SourceError, UnsupportedTypeError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import sampled
@@ -31,8 +32,10 @@ from ..method import diffuse, integrate, normalize
 from ..operators.grid.boundary_areas import distances_to_samples
 from ..operators.grid.face_values import values_at
 from ..operators.grid.line_winding import closed_winding_numbers
-from ..progress import Progress, Stopwatch
+from ..progress import Progress, Stopwatch, within
 from ..solver import SignedHeatSolver, checked
+from .band_plan import coarse_grid
+from .bands import band_around
 from .orientation import orientation
 from .point_orientation import orient_points
 from .shape_sharpening import Assembled, Fit, assemble, triangles_of
@@ -89,6 +92,21 @@ def solid_distance(
 @overload
 def solid_distance(
     shape: ShapeLike | Sequence[ShapeLike],
+    domain: Grid | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    band: float,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    progress: Progress | None = None,
+) -> BandField: ...
+@overload
+def solid_distance(
+    shape: ShapeLike | Sequence[ShapeLike],
     domain: TetMesh,
     *,
     constraint: Constraint | None = None,
@@ -105,13 +123,14 @@ def solid_distance(
     resolution: int = 128,
     spacing: ArrayLike | None = None,
     padding: float | None = None,
+    band: float | None = None,
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     as_oriented: bool = False,
     keep_overlaps: bool = False,
     plain: bool = False,
     progress: Progress | None = None,
-) -> GridField | TetField:
+) -> GridField | TetField | BandField:
     """Signed distance to a solid: to the shape where it is there, to what completes it where surface is missing.
 
     Orient the shape, unite its bodies, compute its generalized signed distance φ, decide what is inside, and measure
@@ -131,6 +150,9 @@ def solid_distance(
         Distance between its nodes, in place of `resolution`.
     padding : float, optional
         Room around the shape, in its units; by default a fifth of its longest side.
+    band : float, optional
+        Compute nodes of the grid only where distance is at most this, in units of length, and a coarse grid elsewhere:
+        for grids that are too fine to be computed whole.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft, optional
         What is imposed on φ at the faces; `ZeroSet` by default.
     diffusion : float
@@ -146,7 +168,7 @@ def solid_distance(
 
     Returns
     -------
-    GridField or TetField
+    GridField or TetField; BandField with a `band`
         φ < 0 inside. ``diagnostics.notes`` tells what was done, where there is something to tell: `ShapeOriented` or
         `OrientedPoints`, `LeftOut`, `CompletedArea`, `ReachesBox`, `BoundsNothing`.
 
@@ -173,6 +195,13 @@ def solid_distance(
         domain = Grid.around(bounds, resolution, padding, spacing)
     diffusion = positive_number(diffusion, "diffusion")
     steps = Steps(not as_oriented, not keep_overlaps, not plain, checked(constraint), diffusion)
+    if band is not None:
+        if not isinstance(domain, Grid) or domain.dimension != 3 or domain.mask is not None or plain:
+            raise UnsupportedTypeError(
+                "a band is computed around solids, on a grid in space without walls", remedy="leave out the band"
+            )
+        coarse = _on_grid(solid, coarse_grid(domain), steps, within(progress, 0.0, 0.5))
+        return band_around(coarse, domain, band, within(progress, 0.5, 1.0))
     if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
         return _on_grid(solid, domain, steps, progress)
     return _elsewhere(solid, domain, steps, progress)

@@ -231,6 +231,11 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             If φ does not take the value on the grid, or the offset leaves the grid although the shape itself does not:
             the grid then needs more padding.
         """
+        self.refuse_beyond_walls(distance)
+        return self.contour(distance)
+
+    def refuse_beyond_walls(self, distance: float) -> None:
+        """Raise `OutsideError` if what lies at a distance leaves the grid although the shape itself does not."""
         walls = self._wall_range()
         bounded = walls[0] > 0 or walls[1] < 0
         if bounded and walls[0] < distance < walls[1]:
@@ -239,7 +244,6 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
                 f"what lies at distance {distance:g} leaves the grid, which holds distances up to {limit:g}",
                 remedy=f"use a padding of more than {abs(distance):g}, or a larger diffusion where wide gaps stay open",
             )
-        return self.contour(distance)
 
     def with_values(self, values: NDArray[np.float64]) -> GridField[Dimension]:
         """Other values on the same grid, without the diagnostics, confidence and surface of these."""

@@ -3,6 +3,7 @@
 from . import interop as _interop  # noqa: F401  provides the exchange with other packages
 from . import pyvista_objects as _pyvista_objects  # noqa: F401  provides objects of PyVista
 from . import samples as _samples  # noqa: F401  provides the writing of samples
+from .bands import ensure_band_writable
 from .curves import CURVE_FORMATS, read_curves, write_curves
 from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable
@@ -15,6 +16,7 @@ __all__ = [
     "FIELD_FORMATS",
     "POLYLINE_FORMATS",
     "SHAPE_FORMATS",
+    "ensure_band_writable",
     "ensure_field_writable",
     "ensure_writable",
     "load_field",

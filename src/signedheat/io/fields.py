@@ -11,6 +11,7 @@ import numpy as np
 
 from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError
+from ..fields.band_field import BandField
 from ..fields.files import save_field as save_any_field
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
@@ -18,6 +19,7 @@ from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..packages import lazy_module, require
 from .arrays import read_npy, read_npz
+from .bands import is_band_field, load_band_field, save_band_field
 from .files import PathLike, contents, ensure_writable, extension, reading, replacing, unknown_extension
 from .nrrd_files import read_image
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
@@ -42,6 +44,8 @@ Parts = tuple[Any, ...]
 def _(field: object, path: PathLike) -> None:
     if isinstance(field, GridField):
         save_field(field, path)
+    elif isinstance(field, BandField):
+        save_band_field(field, path)
     elif isinstance(field, TetField):
         save_tet_field(field, path)
     elif isinstance(field, VertexField):
@@ -109,7 +113,7 @@ def ensure_field_writable(path: PathLike) -> None:
         require(*_NEEDED[extension(path)])
 
 
-def load_field(path: PathLike) -> Field:
+def load_field(path: PathLike) -> Field | BandField:
     """Read a field, exactly as it was written: values and transform.
 
     Parameters
@@ -117,11 +121,11 @@ def load_field(path: PathLike) -> Field:
     path : str or path
         A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file; images of other programs can be
         read if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets, a ``.npz`` file with
-        vertices a field on a surface.
+        vertices a field on a surface, one with blocks a field in a band.
 
     Returns
     -------
-    GridField, TetField or VertexField
+    GridField, TetField, VertexField or BandField
         The field; its diagnostics are empty.
 
     Raises
@@ -142,6 +146,8 @@ def load_field(path: PathLike) -> Field:
         return load_tet_field(path)
     if is_vertex_field(path):
         return load_vertex_field(path)
+    if is_band_field(path):
+        return load_band_field(path)
     if extension(path) not in _FORMATS:
         raise unknown_extension(path, _FORMATS, "a field")
     _, read = _FORMATS[extension(path)]

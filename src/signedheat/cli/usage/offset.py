@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from typing import Any
 
 from .options import add_command, add_grid_options, check_grid_options, finite
@@ -33,4 +34,12 @@ def add_to(commands: Any) -> None:
         "-o", "--output", required=True, metavar="OUT", help="surface: .stl .obj .ply .off .vtp; lines: .svg .csv"
     )
     add_grid_options(parser)
-    parser.set_defaults(check=check_grid_options)
+    parser.set_defaults(check=check_offset_options)
+
+
+def check_offset_options(arguments: Namespace) -> None:
+    """Reject options that contradict each other, and distances beyond a band."""
+    check_grid_options(arguments)
+    reach = max(abs(distance) for distance in arguments.distances)
+    if arguments.band is not None and reach > arguments.band:
+        arguments.parser.error(f"the band reaches to {arguments.band:g}, and the distances to {reach:g}")

@@ -46,6 +46,13 @@ def add_grid_options(parser: Parser) -> None:
     """Add the options of the grid and of the computation."""
     grid = add_room_options(parser)
     grid.add_argument(
+        "--band",
+        type=positive,
+        metavar="B",
+        help="fine nodes only up to this distance from the surface, in the units of the shape, and coarse ones beyond: "
+        "for grids too fine to be computed whole",
+    )
+    grid.add_argument(
         "--origin", type=finite, nargs="+", metavar="X", help="first node of a grid of your own: X Y Z, or X Y"
     )
     grid.add_argument(
@@ -83,7 +90,7 @@ def add_solid_options(parser: Parser) -> None:
     add_room_options(parser)
     add_repair_options(parser)
     add_method_options(parser)
-    parser.set_defaults(origin=None, grid_shape=None, mask=None, preview=None, plain=False)
+    parser.set_defaults(origin=None, grid_shape=None, mask=None, band=None, preview=None, plain=False)
 
 
 def add_method_options(parser: Parser) -> None:
@@ -194,7 +201,11 @@ def check_grid_options(arguments: argparse.Namespace) -> None:
     if arguments.mask is not None:
         if any(given is not None for given in (arguments.resolution, arguments.padding, arguments.grid_shape)):
             parser.error("--resolution, --padding and --shape do not go with --mask, whose nodes are the grid's")
+        if arguments.band is not None:
+            parser.error("--band does not go with --mask")
         return
+    if arguments.band is not None and (dimension == 2 or arguments.plain):
+        parser.error("--band is for shapes in space, and does not go with --plain")
     if own and (arguments.origin is None or arguments.grid_shape is None or spacing is None):
         parser.error("a grid of your own needs all of --origin, --spacing and --shape")
     if own and (arguments.resolution is not None or arguments.padding is not None):

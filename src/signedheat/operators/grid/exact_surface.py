@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -26,6 +26,14 @@ CLEARANCE = 1e-3
 """Fraction of a cell that points of a level keep from the nodes."""
 _BENDING = ((0, 0, 10), (1, 0, 12), (1, 1, 13), (2, 0, 15), (2, 1, 16), (2, 2, 17))
 """Row, column and place among the numbers of a crossing of its shape operator in space."""
+
+
+class NodeValues(Protocol):
+    """Values of nodes by their indices: an array, or what stands for one."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    def __getitem__(self, nodes: tuple[NDArray[np.int64], ...], /) -> NDArray[np.float64]: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +152,7 @@ class ExactSurface(Frozen):
         nearer = np.flatnonzero(nearer_faces(self.features.rows, tree.bounds, tree.items, points, faces, squares))
         return found.replaced(nearer, search_from(self.features, points[nearer], faces[nearer, None]))
 
-    def on_level(self, points: NDArray[np.float64], values: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    def on_level(self, points: NDArray[np.float64], values: NodeValues, level: float) -> NDArray[np.float64]:
         """Points on edges of the grid, where values of the nodes pass a level, moved along to where distance does.
 
         By regula falsi, halving the weight of an end that stays twice (Dowell & Jarratt 1971). The ends of an edge keep

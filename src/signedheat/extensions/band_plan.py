@@ -1,0 +1,212 @@
+"""What every tile of a band needs: the faces, and the coarse field that tells sides where no face does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..domains.grid import Grid
+from ..errors import GeometryError
+from ..fields.grid_field import GridField
+from ..geometry.face_features import FaceFeatures
+from ..operators.grid.block_distances import FaceTree
+from ..operators.grid.blocks import CUBE, SIDE
+
+TILE = SIDE * CUBE
+"""Nodes along each edge of a tile."""
+NEAR = 2.0
+"""Coarse cells from a face within which it tells the side."""
+FAR = 1.5
+"""Cells from any face beyond which a zero set stands in for missing surface."""
+COARSEST, FINEST = 257, 4
+"""Most nodes of the coarse grid along any axis, and least ratio of its spacing to that of the band."""
+LEAST = 2.0
+"""Cells that a band is wide on either side at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class BandPlan:
+    """A band around a shape, before any of its nodes has a value.
+
+    Attributes
+    ----------
+    grid : Grid
+        Of the band's nodes, few of which are there.
+    coarse : GridField
+        Distance on the whole box; first node at that of `grid`.
+    width : float
+        Distance up to which the band reaches on both sides, in units of length.
+    features : FaceFeatures
+        Faces, around the first node.
+    telling : (m,) bool
+        Those that tell a side.
+    ends : (e, 3) float
+        Places where the surface ends or tells no side, at most half a coarse cell apart, around the first node.
+    """
+
+    grid: Grid
+    coarse: GridField
+    width: float
+    features: FaceFeatures
+    telling: NDArray[np.bool_]
+    ends: NDArray[np.float64]
+
+    @property
+    def steps(self) -> NDArray[np.float64]:
+        """(3,) distance between the nodes."""
+        return self.grid.spacing
+
+    @property
+    def cell(self) -> float:
+        """The largest of them."""
+        return float(self.grid.spacing.max())
+
+    @property
+    def coarse_cell(self) -> float:
+        """The same of the coarse grid."""
+        return float(self.coarse.grid.spacing.max())
+
+    @cached_property
+    def faces(self) -> FaceTree | None:
+        """The faces in a tree; None if there are none."""
+        return FaceTree.of(self.features) if len(self.features.rows) else None
+
+    @cached_property
+    def open_places(self) -> scipy.spatial.cKDTree | None:
+        """Around which surface may have to be completed: `ends`, and what the coarse field completes."""
+        surface = self.coarse.surface
+        crossings = np.zeros((0, 3)) if surface is None else surface.crossings[:, 1:4]
+        places = np.concatenate([self.ends, crossings])
+        return scipy.spatial.cKDTree(places) if len(places) else None
+
+    @cached_property
+    def tiles(self) -> NDArray[np.int64]:
+        """(t, 3) first nodes, divided by `TILE`, of the tiles that hold blocks of the band."""
+        shape = -(-np.array(self.grid.shape) // TILE)
+        return self._near(np.argwhere(np.ones(shape, dtype=bool)), TILE)
+
+    def blocks_in(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(n, 3) places of the blocks that may hold nodes of the band, in a box of blocks [low, high)."""
+        limit = -(-np.array(self.grid.shape) // SIDE)
+        low, high = np.maximum(low, 0), np.minimum(high, limit)
+        size = CUBE
+        first, last = low // size, -(-high // size)
+        places = first + np.argwhere(np.ones(np.maximum(last - first, 0), dtype=bool))
+        inner = np.argwhere(np.ones((2, 2, 2), dtype=bool))
+        while True:
+            places = places[((places * size < high) & ((places + 1) * size > low)).all(axis=1)]
+            places = self._near(places, size * SIDE)
+            if size == 1:
+                return places
+            places = (2 * places[:, None] + inner).reshape(-1, 3)
+            size //= 2
+
+    def is_open(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> bool:
+        """Whether surface may have to be completed within reach of a box of blocks."""
+        if self.open_places is None:
+            return False
+        centre = 0.5 * (low + high) * SIDE * self.steps
+        radius = 0.5 * float(np.linalg.norm((high - low) * SIDE * self.steps))
+        near = self.open_places.query_ball_point(centre, radius + self.open_reach + 2 * SIDE * self.cell)
+        places = self.open_places.data[near]
+        excess = np.maximum(np.maximum(low * SIDE * self.steps - places, places - high * SIDE * self.steps), 0.0)
+        return bool((np.linalg.norm(excess, axis=1) <= self.open_reach + SIDE * self.cell).any())
+
+    @property
+    def reach(self) -> float:
+        """Distance from the surface up to which nodes are in the band: a contour at `width` has whole cells."""
+        return self.width + float(np.linalg.norm(self.steps))
+
+    @property
+    def open_reach(self) -> float:
+        """The same from open places, near which the finer surface need not be where the coarse one is."""
+        return self.reach + FAR * self.coarse_cell
+
+    def _near(self, places: NDArray[np.int64], size: int) -> NDArray[np.int64]:
+        """Those of some cubes of `size` nodes that may hold nodes of the band."""
+        if not len(places):
+            return places
+        centres = (places * size + 0.5 * (size - 1)) * self.steps
+        radius = 0.5 * float(np.linalg.norm((size - 1) * self.steps))
+        near = np.zeros(len(places), dtype=bool)
+        if self.faces is not None:
+            near = self.faces.distances(centres) <= self.reach + radius
+        if self.open_places is not None:
+            rest = np.flatnonzero(~near)
+            within = self.open_reach + radius
+            near[rest] = self.open_places.query(centres[rest], distance_upper_bound=within)[0] <= within
+            walls = np.flatnonzero(~near & self.at_walls(places, size))
+            near[walls] = self.coarse_function(centres[walls]) < self.reach + radius
+        return places[near]
+
+    def at_walls(self, places: NDArray[np.integer], size: int) -> NDArray[np.bool_]:
+        """Which of some cubes of `size` nodes hold nodes on the walls: where those are inside, contours are closed."""
+        last = (np.array(self.grid.shape) - 1) // size
+        return np.asarray(((places == 0) | (places == last)).any(axis=1))
+
+    def coarse_function(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) the coarse field at places around the first node."""
+        index = (points / self.coarse.grid.spacing).T
+        values: NDArray[np.float64] = scipy.ndimage.map_coordinates(self.coarse.values, index, order=1, mode="nearest")
+        return values
+
+
+def coarse_grid(grid: Grid) -> Grid:
+    """The grid of the coarse field for a band on a grid: its nodes are some of those, as far as they reach."""
+    factor = FINEST
+    while max(-(-(n - 1) // factor) for n in grid.shape) >= COARSEST:
+        factor *= 2
+    return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
+
+
+def plan_band(coarse: GridField, grid: Grid, band: float) -> BandPlan:
+    """The plan of a band of half width `band` on a grid, from the distance on its `coarse_grid`.
+
+    Raises
+    ------
+    GeometryError
+        If the band is no positive length.
+    """
+    if not (np.isfinite(band) and band > 0):
+        raise GeometryError(f"the band must be a positive length, not {band}", remedy="give its half width")
+    surface = coarse.surface
+    if surface is None:
+        raise GeometryError("the coarse field does not know its surface", remedy="measure to a solid")
+    features = surface.features
+    telling = np.ones(len(features.rows), dtype=bool) if surface.telling is None else surface.telling
+    telling = telling | _closed_parts(features)
+    width = max(float(band), LEAST * float(grid.spacing.max()))
+    ends = _ends(features, telling, 0.5 * float(coarse.grid.spacing.max()))
+    return BandPlan(grid, coarse, width, features, telling, ends)
+
+
+def _closed_parts(features: FaceFeatures) -> NDArray[np.bool_]:
+    """(m,) whether a face is part of a surface without ends."""
+    n = len(features.rows)
+    if n == 0:
+        return np.zeros(0, dtype=bool)
+    rows, other = np.repeat(np.arange(n), 3), features.across.ravel()
+    joined = other >= 0
+    graph = scipy.sparse.coo_matrix((joined[joined], (rows[joined], other[joined])), shape=(n, n))
+    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    is_open = np.bincount(label, weights=(features.across < 0).any(axis=1), minlength=count) > 0
+    return np.asarray(~is_open[label])
+
+
+def _ends(features: FaceFeatures, telling: NDArray[np.bool_], gap: float) -> NDArray[np.float64]:
+    """Samples, at most `gap` apart, of edges beyond which the surface does not go on, and of faces that do not tell."""
+    corners = features.corners.reshape(-1, 3, 3)
+    face, side = np.nonzero((features.across < 0) | ~telling[:, None])
+    start, stop = corners[face, side], corners[face, (side + 1) % 3]
+    counts = np.ceil(np.linalg.norm(stop - start, axis=1) / gap).astype(np.int64) + 1
+    which = np.repeat(np.arange(len(counts)), counts)
+    along = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)) / np.maximum(counts[which] - 1, 1)
+    places = start[which] + along[:, None] * (stop[which] - start[which])
+    if not len(places):
+        return np.zeros((0, 3))
+    kept: NDArray[np.float64] = places[np.unique(np.floor(places / gap).astype(np.int64), axis=0, return_index=True)[1]]
+    return kept

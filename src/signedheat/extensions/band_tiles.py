@@ -1,0 +1,174 @@
+"""The nodes of one tile of a band: exact distance to the faces that are there, and to what completes them.
+
+A tile is computed from its plan alone, and so is the same whatever else is computed, and where.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..operators.grid.block_distances import NODES, TOGETHER, block_points
+from ..operators.grid.blocks import CUBE, SIDE, Blocks
+from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
+from .band_plan import FAR, NEAR, BandPlan
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """Blocks of a band with their values.
+
+    Attributes
+    ----------
+    places : (n, 3) int32
+        First nodes of the blocks, divided by `SIDE`.
+    values : (n, 8, 8, 8) float32
+        Signed distance; NaN beyond the grid.
+    confidence : (n, 8, 8, 8) float16
+        As in `GridField`.
+    crossings : (c, 18) float
+        Points in the tile of what completes the surface: see `crossings_at`.
+    """
+
+    places: NDArray[np.int32]
+    values: NDArray[np.float32]
+    confidence: NDArray[np.float16]
+    crossings: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Blocks with distances to faces, and functions that are negative inside."""
+
+    blocks: Blocks
+    distances: NDArray[np.float64]
+    function: NDArray[np.float64]
+
+
+def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
+    """The blocks of a tile, given by its first node divided by `TILE`, that hold nodes of the band."""
+    low = np.asarray(tile, dtype=np.int64) * CUBE
+    high = low + CUBE
+    is_open = plan.is_open(low, high)
+    halo = 2 + int(plan.reach // (SIDE * float(plan.steps.min()))) if is_open else 0
+    blocks = Blocks.of(plan.blocks_in(low - halo, high + halo), plan.grid.shape)
+    sides = _sides(plan, blocks)
+    own = ((blocks.places >= low) & (blocks.places < high)).all(axis=1)
+    signs = np.where(sides.function[own] < 0, -1.0, 1.0)
+    distances, places = sides.distances[own], blocks.places[own]
+    confidence = np.ones(distances.shape, dtype=np.float16)
+    crossings = np.zeros((0, 18))
+    if is_open:
+        crossings = _crossings(plan, sides, low - halo, high + halo)
+        _completed(plan, places, distances, confidence, crossings)
+    values = (signs * distances).astype(np.float32).reshape(-1, SIDE, SIDE, SIDE)
+    confidence = confidence.reshape(values.shape)
+    _beyond(values, places, plan.grid.shape)
+    kept = np.nanmin(np.abs(values), axis=(1, 2, 3), initial=np.inf) <= plan.reach
+    kept |= plan.at_walls(places, SIDE) & (values < 0).any(axis=(1, 2, 3))
+    place = crossings[:, 1:4] / (SIDE * plan.steps)
+    inner = ((place >= low) & (place < high)).all(axis=1)
+    return Tile(places[kept], values[kept], confidence[kept], crossings[inner])
+
+
+def _beyond(values: NDArray[np.float32], places: NDArray[np.int32], shape: tuple[int, ...]) -> None:
+    """Nodes of the last blocks that are not on the grid have no value."""
+    for axis in range(3):
+        index = places[:, axis, None].astype(np.int64) * SIDE + np.arange(SIDE)
+        beside = np.flatnonzero((index >= shape[axis]).any(axis=1))
+        for row in beside:
+            np.moveaxis(values[row], axis, 0)[index[row] >= shape[axis]] = np.nan
+
+
+def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
+    """Distances to faces, (n, 512), and signed functions: what the nearest face tells, else the coarse field."""
+    n = len(blocks)
+    distances, function = np.full((n, NODES), np.inf), np.empty((n, NODES))
+    near = min(NEAR * plan.coarse_cell, plan.open_reach)
+    for begin in range(0, n, TOGETHER):
+        here = slice(begin, begin + TOGETHER)
+        points = block_points(blocks.places[here], plan.steps)
+        if plan.faces is None:
+            function[here] = plan.coarse_function(points).reshape(-1, NODES)
+            continue
+        found = plan.faces.search(points)
+        told = found.regular & (found.distances < near) & plan.telling[found.faces]
+        signed = np.where(found.cosines < 0, -found.distances, found.distances)
+        if not told.all():
+            signed[~told] = plan.coarse_function(points[~told])
+        distances[here] = found.distances.reshape(-1, NODES)
+        function[here] = signed.reshape(-1, NODES)
+    return _Sides(blocks, distances, function)
+
+
+def _crossings(plan: BandPlan, sides: _Sides, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(c, 18) points of the zero set of the sides, farther than `FAR` cells from any face: see `crossings_at`."""
+    first, shape = low * SIDE, tuple((high - low) * SIDE)
+    n = len(sides.blocks)
+    function = sides.blocks.window(sides.function.astype(np.float32).reshape(n, SIDE, SIDE, SIDE), first, shape)
+    distance = sides.blocks.window(sides.distances.astype(np.float32).reshape(n, SIDE, SIDE, SIDE), first, shape)
+    field = function.astype(np.float64)
+    edges = crossed_edges(field[None])
+    ends = edges[:, 1:4], edges[:, 1:4] + (edges[:, 4, None] == np.array([1, 2, 3]))
+    known = np.logical_and.reduce([np.isfinite(field[tuple(end.T)]) for end in ends])
+    away = np.maximum.reduce([distance[tuple(end.T)] for end in ends])
+    edges = edges[known & (away > FAR * plan.cell)]
+    result: NDArray[np.float64] = crossings_at(field[None], edges, np.array([1.0, *plan.steps]))
+    unknown = np.flatnonzero(~np.isfinite(result).all(axis=1))
+    result[unknown] = _straight(field, edges[unknown], plan.steps)
+    result[:, 1:4] += first * plan.steps
+    if plan.faces is None:
+        return result
+    return result[plan.faces.distances(np.ascontiguousarray(result[:, 1:4])) > FAR * plan.cell]
+
+
+def _straight(field: NDArray[np.float64], edges: NDArray[np.int32], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Crossings from the two ends of their edges alone, where not enough nodes around have a value."""
+    result = np.zeros((len(edges), 18))
+    axis = edges[:, 4] - 1
+    start = edges[:, 1:4].astype(np.int64)
+    stop = start + np.eye(3, dtype=np.int64)[axis]
+    here, there = field[tuple(start.T)], field[tuple(stop.T)]
+    result[:, 1:4] = (start + (here / (here - there))[:, None] * (stop - start)) * steps
+    result[np.arange(len(edges)), 5 + axis] = np.where(there > here, 1.0, -1.0)
+    return result
+
+
+def _completed(
+    plan: BandPlan,
+    places: NDArray[np.int32],
+    distances: NDArray[np.float64],
+    confidence: NDArray[np.float16],
+    crossings: NDArray[np.float64],
+) -> None:
+    """Take over distances to crossings where they are nearer than the faces."""
+    if not len(crossings) or not len(places):
+        return
+    tree = scipy.spatial.cKDTree(crossings[:, 1:4])
+    radius = 0.5 * (SIDE - 1) * float(np.linalg.norm(plan.steps))
+    centres = (places.astype(np.int64) * SIDE + 0.5 * (SIDE - 1)) * plan.steps
+    gap, _ = tree.query(centres)
+    rows = np.flatnonzero(gap - radius < np.minimum(distances.max(axis=1), plan.reach + 2 * radius))
+    trusted = _trusted(plan, crossings)
+    reach = float(np.linalg.norm(plan.steps))
+    for begin in range(0, len(rows), TOGETHER):
+        some = rows[begin : begin + TOGETHER]
+        points = block_points(places[some], plan.steps)
+        _, nearest = tree.query(points)
+        other = np.empty(len(points))
+        distances_to_crossings(points, nearest.astype(np.int32), crossings, reach, other)
+        nearer = (other < distances[some].ravel()).reshape(len(some), -1)
+        distances[some] = np.where(nearer, other.reshape(nearer.shape), distances[some])
+        confidence[some] = np.where(nearer, trusted[nearest].reshape(nearer.shape), confidence[some])
+
+
+def _trusted(plan: BandPlan, crossings: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(c,) confidence in crossings: that of the coarse field there."""
+    if plan.coarse.confidence is None:
+        return np.ones(len(crossings), dtype=np.float32)
+    index = (crossings[:, 1:4] / plan.coarse.grid.spacing).T
+    result: NDArray[np.float32] = scipy.ndimage.map_coordinates(plan.coarse.confidence, index, order=1, mode="nearest")
+    return result

@@ -1,0 +1,77 @@
+"""Distance in a band around a shape, at a fineness that no grid of the whole box could have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnostics import Diagnostics
+from ..domains.grid import Grid
+from ..fields.band_field import BandField
+from ..fields.grid_field import GridField
+from ..operators.grid.blocks import Blocks
+from ..operators.grid.exact_surface import ExactSurface
+from ..parallel import n_threads
+from ..progress import Progress
+from .band_plan import BandPlan, plan_band
+from .band_tiles import Tile, solve_tile
+
+
+def band_around(coarse: GridField, grid: Grid, band: float, progress: Progress | None = None) -> BandField:
+    """Distance in a band, from the distance to a solid on the `coarse_grid` of a fine grid.
+
+    Parameters
+    ----------
+    coarse : GridField
+        What `solid_distance` gives.
+    grid : Grid
+        Of the band's nodes.
+    band : float
+        Half width of the band, in units of length.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; what it raises cancels.
+
+    Returns
+    -------
+    BandField
+        With the notes of the coarse field.
+    """
+    plan = plan_band(coarse, grid, band)
+    tiles = plan.tiles
+    results: list[Tile] = []
+    for tile in in_threads(lambda place: solve_tile(plan, place), tiles):
+        results.append(tile)
+        if progress is not None:
+            progress(len(results) / len(tiles), "band")
+    return joined(plan, results, coarse.diagnostics)
+
+
+def in_threads(solve: Callable[[NDArray[np.int64]], Tile], places: Iterable[NDArray[np.int64]]) -> Iterator[Tile]:
+    """Tiles, in order, of which as many are computed at a time as there are processors."""
+    with ThreadPoolExecutor(n_threads()) as pool:
+        jobs = [pool.submit(solve, place) for place in places]
+        try:
+            for job in jobs:
+                yield job.result()
+        finally:
+            for job in jobs:
+                job.cancel()
+
+
+def joined(plan: BandPlan, tiles: list[Tile], diagnostics: Diagnostics) -> BandField:
+    """The field that tiles, in any order, make together."""
+    places = np.concatenate([tile.places for tile in tiles])
+    blocks = Blocks.of(places, plan.grid.shape)
+    values = np.empty((len(places), *tiles[0].values.shape[1:]), dtype=np.float32)
+    confidence = np.empty(values.shape, dtype=np.float16)
+    for tile in tiles:
+        rows = blocks.rows(tile.places)
+        values[rows] = tile.values
+        confidence[rows] = tile.confidence
+    telling = plan.telling if not plan.telling.all() else None
+    crossings = np.concatenate([tile.crossings for tile in tiles])
+    surface = ExactSurface(plan.features, crossings, np.array(plan.grid.origin), np.array(plan.steps), telling)
+    return BandField(plan.grid, blocks, values, plan.coarse, plan.width, diagnostics, confidence, surface)

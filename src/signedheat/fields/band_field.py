@@ -1,0 +1,240 @@
+"""Distance in a narrow band around a surface, at fine nodes; and on a coarse grid everywhere else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from os import PathLike
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..diagnostics import Diagnostics
+from ..domains.grid import Grid
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError, OutsideError
+from ..operators.grid.block_contours import block_contour
+from ..operators.grid.blocks import SIDE, Blocks
+from ..operators.grid.exact_surface import ExactSurface
+from .files import save_field
+from .grid_field import GridField
+
+NODES = SIDE**3
+
+
+@dataclass(frozen=True, eq=False)
+class BandField:
+    """Signed distance at the nodes of a fine grid that are near a surface, and at those of a coarse grid elsewhere.
+
+    Nodes come in blocks of 8³, where at least one node is within the band. Everything a `GridField` does works alike:
+    fine in the band, coarse beyond.
+
+    Parameters
+    ----------
+    grid : Grid
+        Of the fine nodes, of which only those in `blocks` have values.
+    blocks : Blocks
+        Which those are.
+    values : (n, 8, 8, 8) float32
+        φ at the nodes of the blocks, negative inside; NaN at nodes of the last blocks that lie beyond the grid.
+    coarse : GridField
+        φ on the whole box.
+    width : float
+        Distance up to which all fine nodes are there, on both sides, in units of length.
+    diagnostics : Diagnostics
+        Timings and notes.
+    confidence : (n, 8, 8, 8) float16, optional
+        See `GridField`.
+    surface : ExactSurface, optional
+        What the values are distances to, where that is known exactly: contours then lie on it exactly.
+
+    Raises
+    ------
+    GeometryError
+        If values and blocks do not match.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> from signedheat.extensions.solid_distance import solid_distance
+    >>> ball = solid_distance(samples.sphere(4), spacing=0.02, band=0.1)
+    >>> ball.n_nodes < 0.3 * ball.grid.n_nodes
+    True
+    >>> bool(abs(ball([[0.95, 0.0, 0.0]])[0] + 0.05) < 0.002)
+    True
+    >>> ball.offset(0.05).n_faces > 0
+    True
+    """
+
+    grid: Grid
+    blocks: Blocks
+    values: NDArray[np.float32]
+    coarse: GridField
+    width: float
+    diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+    confidence: NDArray[np.float16] | None = field(default=None, repr=False)
+    surface: ExactSurface | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.values.shape != (len(self.blocks), SIDE, SIDE, SIDE) or self.blocks.shape != self.grid.shape:
+            raise GeometryError(
+                f"{len(self.blocks)} blocks of a grid of {self.blocks.shape} nodes have values of shape "
+                f"{self.values.shape} on one of {self.grid.shape}",
+                element="values",
+            )
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        """φ at points in space: linear between the fine nodes in the band, between the coarse ones beyond.
+
+        Parameters
+        ----------
+        points : (n, 3) or (3,) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (n,) float, or one float
+            Signed distances.
+        """
+        given = np.asarray(points, dtype=np.float64)
+        places = self._checked(given)
+        values = self._fine(places)
+        beyond = np.isnan(values)
+        if beyond.any():
+            values[beyond] = self.coarse(places[beyond])
+        return values if given.ndim == 2 else values[0]
+
+    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+        """∇φ at points in space: central differences of the fine nodes where they are, of the coarse ones elsewhere.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (n, 3) float
+            Gradients; of length about 1, since φ is a distance.
+        """
+        places = self._checked(points)
+        slopes = np.empty_like(places)
+        for axis, step in enumerate(self.grid.spacing):
+            ahead, behind = places.copy(), places.copy()
+            ahead[:, axis] = np.minimum(ahead[:, axis] + step, self.grid.upper[axis])
+            behind[:, axis] = np.maximum(behind[:, axis] - step, self.grid.origin[axis])
+            span = ahead[:, axis] - behind[:, axis]
+            rise = self._fine(ahead) - self._fine(behind)
+            slopes[:, axis] = np.where(span > 0, rise / np.where(span > 0, span, 1.0), np.nan)
+        beyond = np.isnan(slopes).any(axis=1)
+        if beyond.any():
+            slopes[beyond] = self.coarse.gradient(places[beyond])
+        return slopes
+
+    @property
+    def domain(self) -> Grid:
+        """The fine grid."""
+        return self.grid
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of fine nodes that are there."""
+        return NODES * len(self.blocks)
+
+    def contour(self, level: float = 0.0) -> TriangleMesh:
+        """The level set φ = level: closed, manifold, with normals pointing to greater φ.
+
+        Where it leaves the grid it is closed along its box (1 % of a cell outside).
+
+        Parameters
+        ----------
+        level : float
+            The level, in units of length, within the band.
+
+        Returns
+        -------
+        TriangleMesh
+            The surface.
+
+        Raises
+        ------
+        OutsideError
+            If the level is not within the band, or φ does not take it.
+        """
+        if abs(level) > self.width:
+            raise OutsideError(
+                f"level {level:g} lies outside the band, which reaches to {self.width:g}",
+                remedy=f"use a band of at least {abs(level):g}",
+                element=f"level {level:g}",
+            )
+        origin, spacing = self.grid.origin, self.grid.spacing
+        surface = self.surface
+
+        def refine(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+            points = origin + cells * spacing
+            return points if surface is None else surface.on_level(points, _NodeValues(self), level)
+
+        vertices, faces = block_contour(self.blocks, self.values, spacing, level, refine)
+        return TriangleMesh(vertices, faces)
+
+    def offset(self, distance: float) -> TriangleMesh:
+        """The offset of the shape at a signed distance: `contour`, but refused if the grid is too small for it.
+
+        Parameters
+        ----------
+        distance : float
+            Signed distance, positive outward, within the band.
+
+        Returns
+        -------
+        TriangleMesh
+            As `contour`.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the value in the band, or the offset leaves the grid although the shape does not.
+        """
+        self.coarse.refuse_beyond_walls(distance)
+        return self.contour(distance)
+
+    def dense(self) -> GridField:
+        """The field at all nodes of the fine grid, those beyond the band interpolated from the coarse one."""
+        index = [np.arange(n) * step for n, step in zip(self.grid.shape, self.grid.spacing, strict=True)]
+        values = np.empty(self.grid.shape)
+        for i, x in enumerate(index[0]):  # plane by plane, in bounded memory
+            plane = np.stack(np.meshgrid([x], *index[1:], indexing="ij"), axis=-1).reshape(-1, 3)
+            values[i] = self.coarse(self.grid.origin + plane).reshape(self.grid.shape[1:])
+        for place, block in zip(self.blocks.places.astype(np.int64) * SIDE, self.values, strict=True):
+            part = tuple(slice(p, min(p + SIDE, n)) for p, n in zip(place, self.grid.shape, strict=True))
+            values[part] = block[tuple(slice(0, s.stop - s.start) for s in part)]
+        return GridField(self.grid, values, self.diagnostics)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write to a file, in the format given by its extension: ``.npz`` or ``.vdb``."""
+        save_field(self, path)
+
+    def _checked(self, points: ArrayLike) -> NDArray[np.float64]:
+        places = np.atleast_2d(np.asarray(points, dtype=np.float64))
+        if places.shape[-1] != 3 or not np.isfinite(places).all():
+            raise GeometryError("points must be finite, with 3 coordinates each", element="points")
+        return places
+
+    def _fine(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.blocks.interpolated(self.values, (places - self.grid.origin) / self.grid.spacing)
+
+    def __repr__(self) -> str:
+        return f"BandField({self.grid!r}, {len(self.blocks)} blocks, {self.width:g} on either side)"
+
+
+@dataclass(frozen=True, eq=False)
+class _NodeValues:
+    """The values of a band, indexed by nodes as those of a grid are."""
+
+    band: BandField
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.band.grid.shape
+
+    def __getitem__(self, nodes: tuple[NDArray[np.int64], ...]) -> NDArray[np.float64]:
+        return self.band.blocks.values_at(self.band.values, np.stack(nodes, axis=1))

@@ -1,0 +1,102 @@
+"""Reading and writing of fields in bands: NumPy archives of their blocks."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..domains.grid import Grid
+from ..errors import FileFormatError, GeometryError
+from ..fields.band_field import BandField
+from ..fields.grid_field import GridField
+from ..operators.grid.blocks import Blocks
+from .files import PathLike, ensure_writable, extension, replacing
+
+CONVENTION = (
+    "signed distance, negative inside; values[n, i, j, k] at origin + (8 * places[n] + (i, j, k)) * spacing, axes "
+    "x, y, z, in the units of the shape; elsewhere coarse_values[i, j, k] at origin + (i, j, k) * coarse_spacing"
+)
+
+
+def save_band_field(field: BandField, path: PathLike) -> None:
+    """Write a field in a band, in the format given by the extension.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown, or the file cannot be written.
+    """
+    ensure_band_writable(path)
+    with replacing(path) as temporary:
+        WRITERS[extension(path)](field, temporary)
+
+
+def ensure_band_writable(path: PathLike) -> None:
+    """Check before a long computation that a field in a band can be written.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown, or no file can be made there.
+    """
+    ensure_writable(path, BAND_FORMATS, "a field in a band")
+
+
+def load_band_field(path: PathLike) -> BandField:
+    """Read a ``.npz`` file that `save_band_field` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            grid = Grid(file["origin"], file["spacing"], file["shape"])
+            far = file["coarse_values"]
+            coarse = GridField(Grid(file["origin"], file["coarse_spacing"], far.shape), far)
+            blocks = Blocks.of(file["places"], grid.shape)
+            confidence = file["confidence"] if "confidence" in file else None
+            values = file["values"]
+            if not np.array_equal(blocks.places, file["places"]):
+                raise GeometryError("its blocks are not in order", element="places")
+            return BandField(grid, blocks, values, coarse, float(file["width"]), confidence=confidence)
+    except (KeyError, ValueError, OSError, zipfile.BadZipFile, GeometryError) as error:
+        raise FileFormatError(
+            f"it is no field in a band, or is truncated ({error})", remedy="write it again", path=path
+        ) from error
+
+
+def is_band_field(path: PathLike) -> bool:
+    """Whether a file is an archive of blocks."""
+    if extension(path) != ".npz" or not zipfile.is_zipfile(path):
+        return False
+    with zipfile.ZipFile(path) as file:
+        return "coarse_values.npy" in file.namelist()
+
+
+def _write_npz(field: BandField, path: Path) -> None:
+    some: dict[str, Any] = {} if field.confidence is None else {"confidence": field.confidence}
+    with path.open("wb") as file:
+        np.savez(
+            file,
+            places=field.blocks.places,
+            values=field.values,
+            origin=field.grid.origin,
+            spacing=field.grid.spacing,
+            shape=np.array(field.grid.shape),
+            width=np.array(field.width),
+            coarse_values=field.coarse.values,
+            coarse_spacing=field.coarse.grid.spacing,
+            convention=np.array(CONVENTION),
+            **some,
+        )
+
+
+WRITERS: dict[str, Callable[[BandField, Path], None]] = {".npz": _write_npz}
+
+BAND_FORMATS = frozenset(WRITERS)

@@ -1,0 +1,145 @@
+"""Level sets on sparse grids: marching cubes, window by window, and vertices of neighbouring windows merged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import OutsideError
+from ...geometry.marching import CAP, CLEARANCE
+from ...packages import lazy_module
+from .blocks import SIDE, Blocks
+
+measure = lazy_module("skimage.measure", "contours")
+
+WINDOW = 8
+"""Blocks along each edge of a window."""
+
+Refine = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def block_contour(
+    blocks: Blocks,
+    values: NDArray[np.float32],
+    spacing: NDArray[np.float64],
+    level: float,
+    refine: Refine | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Marching cubes (Lewiner et al. 2003) in the cells whose nodes all have a value: closed where those around do.
+
+    Neighbouring windows share nodes, and so find the same points on the edges between them; these become one. Where
+    the level set leaves the grid it is closed along the walls, `CAP` cells outside.
+
+    Parameters
+    ----------
+    blocks : Blocks
+        Which nodes are there.
+    values : (n, 8, 8, 8) float32
+        Their values, NaN where they have none.
+    spacing : (3,) float
+        Distance between nodes.
+    level : float
+        Which.
+    refine : callable, optional
+        Moves (n, 3) points, in cells, along the edges of the grid that they lie on.
+
+    Returns
+    -------
+    vertices : (n, 3) float
+        In cells from the first node.
+    faces : (m, 3) int
+        Counter-clockwise as seen from the side of greater values.
+
+    Raises
+    ------
+    OutsideError
+        If the values do not take the level.
+    """
+    least = CLEARANCE * float(spacing.min())
+    capped = _reaches_walls(blocks, values, level)
+    parts, triangles, count = [], [], 0
+    for window in np.unique(blocks.places // WINDOW, axis=0).astype(np.int64):
+        first = window * WINDOW * SIDE
+        shape = np.full(3, WINDOW * SIDE + 1)
+        if capped:  # a layer of nodes outside the walls
+            beyond = (first == 0).astype(np.int64)
+            first, shape = first - beyond, shape + beyond
+        size = (int(shape[0]), int(shape[1]), int(shape[2]))
+        height = blocks.window(values, first, size) - np.float32(level)
+        if capped:
+            _close_at_walls(height, first, np.array(blocks.shape))
+        height[(height >= 0) & (height < least)] = least
+        height[(height < 0) & (height > -least)] = -least
+        found = _window_surface(height)
+        if found is not None:
+            parts.append(found[0] + first)
+            triangles.append(found[1].astype(np.int64) + count)
+            count += len(found[0])
+    if not parts:
+        raise OutsideError(
+            f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"
+        )
+    vertices, faces = _merged(np.concatenate(parts), np.concatenate(triangles))
+    return (vertices if refine is None else refine(vertices)), faces
+
+
+def _window_surface(height: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
+    """Vertices in cells and faces, in cells whose nodes all have a value; None if there are none."""
+    known = ~np.isnan(height)
+    whole = np.zeros(height.shape, dtype=bool)  # cells, at their last nodes
+    inner = np.ones(tuple(n - 1 for n in height.shape), dtype=bool)
+    some, every = np.zeros_like(inner), np.ones_like(inner)
+    inside = height < 0
+    for corner in np.ndindex(2, 2, 2):
+        part = tuple(slice(c, n - 1 + c) for c, n in zip(corner, height.shape, strict=True))
+        inner &= known[part]
+        some |= inside[part]
+        every &= inside[part]
+    inner &= some & ~every
+    if not inner.any():
+        return None
+    whole[1:, 1:, 1:] = inner
+    filled = np.where(known, height, np.float32(1.0))
+    vertices, faces, _, _ = measure.marching_cubes(filled, 0.0, gradient_direction="descent", mask=whole)
+    return vertices.astype(np.float64), faces
+
+
+def _merged(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices on the same edge of the grid as one. Those inside cells belong to one window anyway."""
+    base = np.floor(vertices)
+    fractions = vertices - base
+    crossed = fractions > 0
+    on_edge = crossed.sum(axis=1) == 1
+    axis = np.where(on_edge, crossed.argmax(axis=1), 3)
+    own = np.where(on_edge, 0, np.arange(1, len(vertices) + 1))  # each of the others is itself alone
+    keys = np.concatenate([base.astype(np.int64), axis[:, None], own[:, None]], axis=1)
+    order = np.lexsort(keys.T)
+    new = np.ones(len(keys), dtype=bool)
+    new[1:] = (keys[order[1:]] != keys[order[:-1]]).any(axis=1)
+    number = np.empty(len(keys), dtype=np.int64)
+    number[order] = np.cumsum(new) - 1
+    return vertices[order[new]], number[faces]
+
+
+def _reaches_walls(blocks: Blocks, values: NDArray[np.float32], level: float) -> bool:
+    """Whether the level set leaves the grid: nodes on its walls lie on both sides."""
+    signs: set[bool] = set()
+    for axis, n in enumerate(blocks.shape):
+        for node in (0, n - 1):
+            rows = np.flatnonzero(blocks.places[:, axis] == node // SIDE)
+            wall: NDArray[np.float32] = values[rows].take(node % SIDE, axis=axis + 1)
+            signs |= {bool(sign) for sign in np.unique(wall[~np.isnan(wall)] < level)}
+    return len(signs) == 2
+
+
+def _close_at_walls(height: NDArray[np.float32], first: NDArray[np.int64], limit: NDArray[np.int64]) -> None:
+    """Values for the layer of nodes beyond the walls, outside, so that crossings lie `CAP` cells beyond the walls."""
+    for axis in range(3):
+        for beyond, wall in ((-1, 0), (int(limit[axis]), int(limit[axis]) - 1)):
+            at, from_ = beyond - int(first[axis]), wall - int(first[axis])
+            if 0 <= at < height.shape[axis] and 0 <= from_ < height.shape[axis]:
+                layers: NDArray[np.float32] = np.moveaxis(height, axis, 0)
+                layer = layers[from_]
+                layers[at] = np.where(layer < 0, -layer * np.float32(1 / CAP - 1), layer)

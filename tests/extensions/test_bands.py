@@ -1,0 +1,118 @@
+import numpy as np
+import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+import signedheat as sh
+from shapes.bodies import box
+from shapes.grid_cases import assert_closed_manifold, sphere, torus
+
+
+def compared(shape, resolution, cells, **options):
+    """A band, the dense field on the same grid, and the band's values on it, NaN where there are none."""
+    dense = sh.solid_distance(shape, resolution=resolution, **options)
+    band = sh.solid_distance(shape, dense.grid, band=cells * float(dense.grid.spacing.max()), **options)
+    return band, dense, band.blocks.window(band.values, np.zeros(3, dtype=int), dense.grid.shape)
+
+
+@pytest.mark.parametrize("shape", [sphere(2000), torus(60, 30), box([0, 0, 0], [1.0, 0.6, 0.3])])
+def test_around_whole_shapes_a_band_has_the_exact_distance(shape):
+    band, dense, values = compared(shape, 60, 3.0)
+    h = float(dense.grid.spacing[0])
+    there = ~np.isnan(values)
+    assert there[np.abs(dense.values) <= 3 * h].all()
+    assert 0 < there.mean() < 0.95
+    assert ((values < 0) == (dense.values < 0))[there].all()
+    assert np.abs(values - dense.values)[there].max() < 0.25 * h  # the dense field's nearest face is not always it
+    rng = np.random.default_rng(0)
+    lower, upper = dense.grid.origin, dense.grid.upper
+    points = rng.uniform(lower, upper, (2000, 3))
+    np.testing.assert_allclose(band(points), dense(points), atol=2 * h)  # coarse beyond the band
+    near = np.abs(dense(points)) < 2 * h
+    np.testing.assert_allclose(band(points[near]), dense(points[near]), atol=0.1 * h)
+    assert np.abs(np.linalg.norm(band.gradient(points[near]), axis=1) - 1).mean() < 0.1
+    for level in (0.0, 2 * h, -2 * h):
+        assert_closed_manifold(band.contour(level))
+        assert band.contour(level).n_faces == pytest.approx(dense.contour(level).n_faces, rel=0.01)
+    with pytest.raises(sh.OutsideError) as caught:
+        band.contour(4 * h)
+    assert caught.value.remedy
+
+
+def test_a_band_is_as_near_the_truth_as_the_dense_field_where_surface_is_missing():
+    whole = sphere(2000)
+    centres = whole.vertices[whole.faces].mean(axis=1)
+    holes = np.random.default_rng(1).normal(size=(5, 3))
+    holes /= np.linalg.norm(holes, axis=1)[:, None]
+    broken = sh.TriangleMesh(whole.vertices, whole.faces[(centres @ holes.T < 0.95).all(axis=1)])
+    band, dense, values = compared(broken, 80, 3.0)
+    h = float(dense.grid.spacing[0])
+    truth = np.linalg.norm(dense.grid.points, axis=-1) - 1
+    near = ~np.isnan(values) & (np.abs(truth) < 3 * h)
+    error, other = (np.sqrt(np.mean((v - truth)[near] ** 2)) for v in (values, dense.values))
+    assert error < 2.2 * other
+    for level in (0.0, 1.5 * h):
+        assert_closed_manifold(band.contour(level))
+    wrong = ~np.isnan(values) & ((values < 0) != (dense.values < 0))
+    assert not (wrong & (np.abs(dense.values) > 2.5 * h)).any()
+    confidence = band.blocks.window(band.confidence.astype(np.float32), np.zeros(3, dtype=int), dense.grid.shape)
+    assert np.nanmin(confidence) < 1.0 == np.nanmax(confidence)
+
+
+def test_features_that_the_coarse_grid_misses_are_found():
+    # a plate, a gap and a ball far thinner than a coarse cell, which is four times the fine one
+    big = sphere(1500)
+    h = 2.8 / 100
+    plate = box([1.6, -0.8, -0.8], [1.6 + 1.6 * h, 0.8, 0.8])
+    other = box([1.6 + 3.4 * h, -0.8, -0.8], [2.2, 0.8, 0.8])
+    ball = sphere(100, 1.2 * h, (-1.4, 0.0, 0.0))
+    band = sh.solid_distance([big, plate, other, ball], spacing=h, band=3 * h)
+    middles = [[1.6 + 0.8 * h, 0.1, 0.2], [1.6 + 2.5 * h, 0.1, 0.2], [-1.4, 0.0, 0.0]]
+    assert np.sign(band(middles)).tolist() == [-1, 1, -1]
+    surface = band.contour()
+    assert_closed_manifold(surface)
+    a, b = surface.faces[:, [0, 1, 1, 2]].reshape(-1, 2).T
+    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(surface.n_vertices,) * 2)
+    assert connected_components(graph, directed=False)[0] == 4
+
+
+def test_what_leaves_the_grid_is_closed_at_its_walls():
+    whole = sphere(1500)
+    half = sh.TriangleMesh(whole.vertices, whole.faces[whole.vertices[whole.faces][:, :, 2].mean(axis=1) < 0.3])
+    band = sh.solid_distance(half, resolution=70, band=0.12)
+    for level in (0.0, 0.1):
+        assert_closed_manifold(band.contour(level))
+
+
+def test_points_are_measured_to_what_is_fitted_to_them():
+    rng = np.random.default_rng(5)
+    normals = rng.normal(size=(4000, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    band = sh.solid_distance(sh.PointCloud(normals, normals), resolution=96, band=0.08)
+    assert_closed_manifold(band.contour())
+    directions = rng.normal(size=(500, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    assert np.abs(band(directions * 1.03) - 0.03).max() < 0.01
+
+
+def test_bands_that_make_no_sense_are_refused():
+    ball = sphere(200)
+    for band in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(sh.GeometryError):
+            sh.solid_distance(ball, resolution=32, band=band)
+    with pytest.raises(sh.UnsupportedTypeError):
+        sh.solid_distance(ball, resolution=32, band=0.1, plain=True)
+
+
+def test_files_keep_a_band_to_the_last_bit(tmp_path):
+    band = sh.solid_distance(sphere(300), resolution=40, band=0.2)
+    band.save(tmp_path / "band.npz")
+    back = sh.load_field(tmp_path / "band.npz")
+    np.testing.assert_array_equal(back.values, band.values)
+    np.testing.assert_array_equal(back.blocks.places, band.blocks.places)
+    points = np.random.default_rng(0).normal(size=(300, 3))
+    np.testing.assert_array_equal(back(points), band(points))
+    data = (tmp_path / "band.npz").read_bytes()
+    (tmp_path / "band.npz").write_bytes(data[: len(data) // 2])
+    with pytest.raises(sh.FileFormatError):
+        sh.load_field(tmp_path / "band.npz")
