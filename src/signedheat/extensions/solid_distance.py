@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import cast, overload
+from typing import overload
 
 import numpy as np
 import scipy
@@ -13,15 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..constraints import Constraint, ZeroSet
 from ..diagnostics import Diagnostics, LeftOut, Note, OrientedPoints, SharpenedToShape
 from ..discretization import discretize
-from ..domains.foreign import as_shapes
 from ..domains.grid import Grid
 from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
-from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
-from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
-from ..errors import CancellingNormalsError, SourceError, UnsupportedTypeError
+from ..errors import CancellingNormalsError, UnsupportedTypeError
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
@@ -36,15 +33,13 @@ from ..progress import Progress, Stopwatch, within
 from ..solver import SignedHeatSolver, checked
 from .band_plan import coarse_grid
 from .bands import band_around
+from .joining import Shape, joined_shape
 from .orientation import orientation
 from .point_orientation import orient_points
 from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .sharpening import sharpen
 from .sides import FAR, Sides, choose_sides, nothing_inside
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
-
-Mesh = TriangleMesh | PolygonMesh
-Shape = Mesh | PointCloud
 
 STEPS = 7
 """Steps that are timed."""
@@ -189,7 +184,7 @@ def solid_distance(
     >>> bool(np.abs(field([[0.5, 0, 0]]) + np.sqrt(0.75)) < 0.05)
     True
     """
-    solid = _joined(shape)
+    solid = joined_shape(shape)
     if domain is None:
         bounds = bounds_around([solid])
         domain = Grid.around(bounds, resolution, padding, spacing)
@@ -205,27 +200,6 @@ def solid_distance(
     if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
         return _on_grid(solid, domain, steps, progress)
     return _elsewhere(solid, domain, steps, progress)
-
-
-def _joined(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
-    """One shape of several meshes."""
-    shapes = as_shapes(shape)
-    if not shapes:
-        raise SourceError("there is no shape", remedy="pass at least one")
-    if len(shapes) == 1:
-        whole = shapes[0]
-        return whole.boundary if isinstance(whole, TetMesh) else cast("Shape", whole)
-    meshes = []
-    for index, each in enumerate(shapes):
-        if not isinstance(each, TriangleMesh | PolygonMesh):
-            raise SourceError(
-                f"several meshes make one solid, and shape {index} is a {type(each).__name__}",
-                element=f"shape {index}",
-            )
-        meshes.append(each.triangulation)
-    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 def _oriented(shape: Shape, notes: list[Note]) -> tuple[Merged, bool]:

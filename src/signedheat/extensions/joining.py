@@ -1,0 +1,39 @@
+"""Several meshes as one shape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+
+from ..domains.foreign import as_shapes
+from ..domains.kinds import ShapeLike
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.tet_mesh import TetMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import SourceError
+
+Shape = TriangleMesh | PolygonMesh | PointCloud
+
+
+def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
+    """One shape of several meshes."""
+    shapes = as_shapes(shape)
+    if not shapes:
+        raise SourceError("there is no shape", remedy="pass at least one")
+    if len(shapes) == 1:
+        whole = shapes[0]
+        return whole.boundary if isinstance(whole, TetMesh) else cast("Shape", whole)
+    meshes = []
+    for index, each in enumerate(shapes):
+        if not isinstance(each, TriangleMesh | PolygonMesh):
+            raise SourceError(
+                f"several meshes make one solid, and shape {index} is a {type(each).__name__}",
+                element=f"shape {index}",
+            )
+        meshes.append(each.triangulation)
+    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
