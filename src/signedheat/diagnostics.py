@@ -165,7 +165,6 @@ class SharpenedToShape(Note):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-@dataclass(frozen=True, eq=False)
 class SharpenedToCurves(Note):
     """What a field sharpened to curves was measured to, and how its sides were told.
 
@@ -190,7 +189,7 @@ class SharpenedToCurves(Note):
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class OrientedPoints(Note):
     """Number of normals of a point cloud that were fitted, and that were turned."""
 
