@@ -10,7 +10,7 @@ from matplotlib.patches import FancyBboxPatch
 from PIL import Image
 
 FLOORS = [
-    ("cli   visualization   samples   public   io", "commands, pictures, files, conversions", "#f3d9c1"),
+    ("cli   visualization   samples   public   batches   io", "commands, pictures, many shapes, files", "#f3d9c1"),
     ("extensions", "sharpening, jumps, completion, morphology, tet meshing", "#f7e6d0"),
     ("solver   fields", "SignedHeatSolver, signed_distance; values that know their domain", "#fbf1de"),
     ("method   constraints", "diffuse → normalize → integrate, once, on discretisations", "#fff6c9"),

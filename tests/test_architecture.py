@@ -28,6 +28,7 @@ FLOORS = [
     {"extensions"},
     {"io"},
     {"visualization"},
+    {"batches"},
     {"", "public"},  # the package itself, with the public names
     {"samples"},
     {"cli"},

@@ -14,6 +14,7 @@ from .errors import MissingPackageError
 
 REMEDIES = {
     "PIL": "pip install pillow",
+    "distributed": "pip install signedheat[cluster]",
     "mpl_toolkits": "pip install matplotlib",
     "nrrd": "pip install pynrrd",
     "openvdb": "conda install -c conda-forge openvdb, or use .vti files",

@@ -1,5 +1,8 @@
 """The public names, all of which importing this module imports; `signedheat` does when one is first asked for."""
 
+from .batches.job import BatchJob, Sampling
+from .batches.manifest import Outcome
+from .batches.run import Batch, batch
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .diagnostics import Diagnostics
 from .domains.curves import Curve, SurfacePoints
@@ -28,7 +31,6 @@ from .errors import (
 )
 from .extensions.close_curves import close_curves
 from .extensions.common_subdivision import common_subdivision
-from .extensions.curve_distance import curve_distance
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.orientation import Orientation, orient, orientation
 from .extensions.piecewise import piecewise_distance
@@ -60,6 +62,8 @@ from .visualization import new_figure as _new_figure  # noqa: F401  provides not
 
 __all__ = [
     "BandField",
+    "Batch",
+    "BatchJob",
     "ConstraintError",
     "Convex",
     "Curve",
@@ -79,12 +83,14 @@ __all__ = [
     "MemoryLimitError",
     "MissingPackageError",
     "Orientation",
+    "Outcome",
     "OutsideError",
     "PiecewiseField",
     "PointCloud",
     "PolygonMesh",
     "Polyline",
     "Samples",
+    "Sampling",
     "SignedHeatError",
     "SignedHeatSolver",
     "Soft",
@@ -98,10 +104,10 @@ __all__ = [
     "VertexField",
     "ZeroSet",
     "as_shape",
+    "batch",
     "close_curves",
     "closing",
     "common_subdivision",
-    "curve_distance",
     "dilate",
     "erode",
     "intrinsic_delaunay",

@@ -60,7 +60,7 @@ def _run(argv: Sequence[str] | None) -> int:
         tell(json.dumps(summary))
     elif text and not arguments.quiet:
         tell(text)
-    return 0
+    return FAILED if summary.get("failed") else 0  # of many, some
 
 
 def _is_expected(error: BaseException) -> bool:

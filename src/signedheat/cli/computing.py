@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TypeAlias, overload
 
-import numpy as np
-
 from .. import sharpen
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
-from ..diagnostics import (
-    BoundsNothing,
-    CompletedArea,
-    LeftOut,
-    OrientedPoints,
-    ReachesBox,
-    SampledSource,
-    ShapeOriented,
-)
+from ..diagnostics import SampledSource
 from ..domains.grid import Grid, room_around
 from ..domains.tet_mesh import TetMesh
 from ..errors import SignedHeatError
+from ..extensions.figures import describe as describe
+from ..extensions.figures import told
 from ..extensions.solid_distance import solid_distance
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
@@ -41,8 +32,6 @@ Summary: TypeAlias = tuple[dict[str, Any], str]
 RESOLUTION = 128
 MOST = 0.9
 """Fraction of the area that may cancel without a warning."""
-TOLD = 0.005
-"""Fraction of the surface that may be completed, or bound nothing, without a word."""
 
 
 @contextmanager
@@ -143,25 +132,6 @@ def planar_distance(lines: Any, grid: Grid, arguments: Namespace, progress: Prog
     return sharpen(field)
 
 
-def told(field: GridField | TetField | BandField) -> list[str]:
-    """What to know about a field before trusting it, a line for each thing."""
-    lines = []
-    for note in field.diagnostics.notes:
-        if isinstance(note, ShapeOriented) and (note.turned_faces or note.merged_faces):
-            lines.append(str(note))
-        elif isinstance(note, OrientedPoints) and (note.normals_fitted or note.normals_turned):
-            lines.append(str(note))
-        elif isinstance(note, LeftOut) and note.covered_faces:
-            lines.append(str(note))
-        elif isinstance(note, CompletedArea) and note.completed_share > TOLD:
-            lines.append(str(note))
-        elif isinstance(note, BoundsNothing) and note.open_area > TOLD:
-            lines.append(str(note))
-        elif isinstance(note, ReachesBox):
-            lines.append(str(note))
-    return lines
-
-
 def drawable(field: GridField | BandField) -> GridField:
     """The field, or of one in a band the coarse one: slices are drawn through the whole box."""
     return field.coarse if isinstance(field, BandField) else field
@@ -177,38 +147,3 @@ def hint(field: GridField | BandField) -> str:
         f"\n{cancelled:.4%} of the area lies within a cell of area that faces the other way, as on thin sheets: if "
         "faces are doubled, remove one copy"
     )
-
-
-def describe(field: Any) -> dict[str, Any]:
-    """Key figures of a field, for ``--json``."""
-    if isinstance(field, GridField | BandField):
-        note = field.diagnostics.note(SampledSource)
-        where = {
-            "origin": field.grid.origin.tolist(),
-            "spacing": field.grid.spacing.tolist(),
-            "shape": list(field.grid.shape),
-            "area_outside": note.area_outside if note else 0.0,
-            "area_cancelled": note.area_cancelled if note else 0.0,
-        }
-        if isinstance(field, BandField):
-            where |= {"band": field.width, "blocks": len(field.blocks), "nodes": field.n_nodes}
-    else:
-        where = {"n_vertices": len(field.values)}
-    return {
-        **where,
-        "minimum": float(np.nanmin(field.values)),
-        "maximum": float(np.nanmax(field.values)),
-        "notes": {snake(type(note).__name__): note.as_dict() for note in field.diagnostics.notes},
-        "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
-    }
-
-
-def snake(name: str) -> str:
-    """A class name as a key of JSON.
-
-    Examples
-    --------
-    >>> snake("ReachesBox")
-    'reaches_box'
-    """
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

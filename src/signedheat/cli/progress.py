@@ -25,9 +25,13 @@ class ProgressBar:
         seconds = time.perf_counter() - self._begin
         say(f"\r\x1b[2K{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}", end="")
 
+    def clear(self) -> None:
+        """Take the bar away, for a line of text."""
+        if self._is_shown:
+            say("\r\x1b[2K", end="")
+
     def __enter__(self) -> ProgressBar:
         return self
 
     def __exit__(self, *_: Any) -> None:
-        if self._is_shown:
-            say("\r\x1b[2K", end="")
+        self.clear()

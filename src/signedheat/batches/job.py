@@ -1,0 +1,145 @@
+"""What is made of each shape of a batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, cast
+
+from ..constraints import Constraint, ZeroSet
+from ..domains.grid import Grid, room_around
+from ..errors import SignedHeatError
+from ..extensions.figures import describe, shape_figures, told
+from ..extensions.sampling import WIDTHS, Layout, sample
+from ..extensions.solid_distance import solid_distance
+from ..fields.grid_field import GridField
+from ..io.fields import save_field
+from ..io.shapes import read, save
+from ..lowering.area_elements import bounds_around
+from ..solver import as_list
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Which samples are taken (`signedheat.sample`), and how they are kept (`Samples.save`).
+
+    Attributes
+    ----------
+    n : int
+        Number of points.
+    near : float
+        Share of them near the surface.
+    widths : tuple of float
+        Standard deviations of the noise, over the radius of the shape.
+    seed : int
+        Of the random numbers.
+    normalize : bool
+        Move and scale the shape into the unit sphere.
+    layout : "arrays" or "deepsdf"
+        How they are kept in the file.
+    """
+
+    n: int = 250_000
+    near: float = 0.8
+    widths: tuple[float, ...] = WIDTHS
+    seed: int = 0
+    normalize: bool = False
+    layout: Layout = "arrays"
+
+
+@dataclass(frozen=True)
+class BatchJob:
+    """What `batch` makes of each shape: any of a field, offsets, samples and a report, of one distance.
+
+    Attributes
+    ----------
+    volume : str, optional
+        Extension of the file of the field, such as ``".npz"``.
+    offsets : tuple of float
+        Distances at which closed surfaces are written, ``NAME_+0.5.stl``.
+    surfaces : str
+        Extension of their files.
+    samples : Sampling, optional
+        Points to learn from, ``NAME.npz``; ``NAME_samples.npz`` beside a field of that name.
+    info : bool
+        Report counts and defects of the shape, as ``signedheat info`` does, in the manifest.
+    resolution, spacing, padding
+        The grid around each shape, as for `solid_distance`; by default with room for the offsets.
+    constraint, diffusion, as_oriented, keep_overlaps, plain
+        As for `solid_distance`.
+
+    Raises
+    ------
+    SignedHeatError
+        If there is nothing to make, or samples are wanted of a plain field.
+    """
+
+    volume: str | None = None
+    offsets: tuple[float, ...] = ()
+    surfaces: str = ".stl"
+    samples: Sampling | None = None
+    info: bool = False
+    resolution: int = 128
+    spacing: float | tuple[float, ...] | None = None
+    padding: float | None = None
+    constraint: Constraint = field(default_factory=ZeroSet)
+    diffusion: float = 1.0
+    as_oriented: bool = False
+    keep_overlaps: bool = False
+    plain: bool = False
+
+    def __post_init__(self) -> None:
+        if not (self._measures or self.info):
+            raise SignedHeatError(
+                "there is nothing to make of the shapes", remedy="ask for a volume, offsets, samples or info"
+            )
+        if self.plain and self.samples is not None:
+            raise SignedHeatError(
+                "samples have distances to the shape itself, which a plain field does not know",
+                remedy="leave out plain",
+            )
+
+    @property
+    def _measures(self) -> bool:
+        return self.volume is not None or bool(self.offsets) or self.samples is not None
+
+    def __call__(self, path: Path, stem: Path) -> dict[str, object]:
+        """Make it of one shape: files that begin with `stem`. Returns figures, with what to know under "told"."""
+        shape = read(path)
+        figures: dict[str, object] = {"info": shape_figures(shape)} if self.info else {}
+        if not self._measures:
+            return figures
+        bounds = bounds_around(as_list(shape))
+        reach = max((abs(distance) for distance in self.offsets), default=0.0)
+        padding = room_around(bounds, reach) if self.padding is None else self.padding
+        grid = Grid.around(bounds, self.resolution, padding, self.spacing)
+        phi = solid_distance(
+            shape,
+            grid,
+            constraint=self.constraint,
+            diffusion=self.diffusion,
+            as_oriented=self.as_oriented,
+            keep_overlaps=self.keep_overlaps,
+            plain=self.plain,
+        )
+        return {**figures, "told": told(phi), "field": describe(phi), **self._written(phi, stem)}
+
+    def _written(self, phi: GridField, stem: Path) -> dict[str, object]:
+        """Write what is wanted of a field, and tell its figures."""
+        figures: dict[str, object] = {}
+        if self.volume is not None:
+            save_field(phi, f"{stem}{self.volume}")
+        surfaces = []
+        for distance in self.offsets:
+            surface = cast("GridField[Literal[3]]", phi).offset(distance)
+            save(surface, f"{stem}_{distance:+g}{self.surfaces}")
+            surfaces.append({"distance": distance, "vertices": surface.n_vertices, "faces": surface.n_faces})
+        if surfaces:
+            figures["surfaces"] = surfaces
+        if self.samples is not None:
+            wanted = self.samples
+            taken = sample(phi, wanted.n, near=wanted.near, widths=wanted.widths, seed=wanted.seed)
+            ending = "_samples" if self.volume == ".npz" else ""
+            (taken.normalized() if wanted.normalize else taken).save(f"{stem}{ending}.npz", wanted.layout)
+            figures["samples"] = taken.figures
+        return figures

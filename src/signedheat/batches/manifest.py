@@ -1,0 +1,128 @@
+"""The manifest of a batch: one line of JSON for each shape, written as soon as it is known."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from ..io.files import replacing
+
+NAME = "manifest.jsonl"
+
+State = Literal["done", "failed", "timed out", "died"]
+"""done: everything was written; failed: with an error; timed out: stopped at the time limit; died: its process did."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one shape: a line of the manifest.
+
+    Attributes
+    ----------
+    name : str
+        Name of its results, without extension, in the folder of the batch.
+    input : str
+        The file.
+    state : "done", "failed", "timed out" or "died"
+        How it ended.
+    seconds : float
+        How long it took.
+    message : str
+        What went wrong; of what is done, what to know before trusting it.
+    outputs : tuple of str
+        Files, in the folder of the batch.
+    figures : mapping
+        Figures of quality, as ``--json`` tells them.
+    job : str
+        What was to be made of it, and by which version of this package.
+    source : tuple of int
+        Size of the file in bytes, and when it was modified, in nanoseconds.
+    """
+
+    name: str
+    input: str
+    state: State
+    seconds: float
+    message: str = ""
+    outputs: tuple[str, ...] = ()
+    figures: Mapping[str, object] = field(default_factory=dict)
+    job: str = ""
+    source: tuple[int, int] = (0, 0)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether everything was written."""
+        return self.state == "done"
+
+
+class Manifest:
+    """The manifest in a folder, as it was left, and open for what follows."""
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / NAME
+        self.known = _read(self.path)
+
+    def still_holds(self, name: str, path: Path, job: str) -> Outcome | None:
+        """The outcome of a shape that is done: the same file, the same job, and all its results still there."""
+        outcome = self.known.get(name)
+        if outcome is None or not outcome.is_done or outcome.job != job_text(job):
+            return None
+        same = outcome.source == source_of(path)
+        present = all((self.path.parent / output).is_file() for output in outcome.outputs)
+        return outcome if same and present else None
+
+    def begin(self, kept: Iterable[Outcome]) -> None:
+        """Leave the lines of what is kept, and no others."""
+        self.write(kept)
+
+    def add(self, outcome: Outcome) -> None:
+        """Append a line, at once: whatever happens next, it stays."""
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(_line(outcome))
+            file.flush()
+            os.fsync(file.fileno())
+
+    def write(self, outcomes: Iterable[Outcome]) -> None:
+        """Replace all lines."""
+        with replacing(self.path) as temporary:
+            temporary.write_text("".join(_line(outcome) for outcome in outcomes), encoding="utf-8")
+
+
+def job_text(job: str) -> str:
+    """A job with the version that does it."""
+    package = __name__.partition(".")[0]
+    return f"{job} by {package} {sys.modules[package].__version__}"
+
+
+def source_of(path: Path) -> tuple[int, int]:
+    """Size and time of modification of a file; zeros where there is none."""
+    with suppress(OSError):
+        status = path.stat()
+        return status.st_size, status.st_mtime_ns
+    return 0, 0
+
+
+def _line(outcome: Outcome) -> str:
+    return json.dumps(asdict(outcome), ensure_ascii=False) + "\n"
+
+
+def _read(path: Path) -> dict[str, Outcome]:
+    """Outcomes by name, the last of each; a line that was cut off by the end of a run is left out."""
+    known: dict[str, Outcome] = {}
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except FileNotFoundError:
+        return known
+    for line in lines:
+        with suppress(ValueError, TypeError, KeyError):
+            entries = json.loads(line)
+            entries["outputs"], entries["source"] = tuple(entries["outputs"]), tuple(entries["source"])
+            outcome = Outcome(**entries)
+            known[outcome.name] = outcome
+    return known

@@ -1,0 +1,98 @@
+"""Key figures of fields and shapes, ready for JSON, and what to know before trusting them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ..diagnostics import (
+    BoundsNothing,
+    CompletedArea,
+    LeftOut,
+    OrientedPoints,
+    ReachesBox,
+    SampledSource,
+    ShapeOriented,
+)
+from ..domains.digital_surface import DigitalSurface
+from ..domains.inspection import inspect
+from ..domains.kinds import Shape
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..fields.band_field import BandField
+from ..fields.grid_field import GridField
+from ..fields.tet_field import TetField
+from .orientation import orientation
+from .thickness import thickness
+
+TOLD = 0.005
+"""Fraction of the surface that may be completed, or bound nothing, without a word."""
+
+
+def told(field: GridField | TetField | BandField) -> list[str]:
+    """What to know about a field before trusting it, a line for each thing."""
+    lines = []
+    for note in field.diagnostics.notes:
+        if isinstance(note, ShapeOriented) and (note.turned_faces or note.merged_faces):
+            lines.append(str(note))
+        elif isinstance(note, OrientedPoints) and (note.normals_fitted or note.normals_turned):
+            lines.append(str(note))
+        elif isinstance(note, LeftOut) and note.covered_faces:
+            lines.append(str(note))
+        elif isinstance(note, CompletedArea) and note.completed_share > TOLD:
+            lines.append(str(note))
+        elif isinstance(note, BoundsNothing) and note.open_area > TOLD:
+            lines.append(str(note))
+        elif isinstance(note, ReachesBox):
+            lines.append(str(note))
+    return lines
+
+
+def describe(field: Any) -> dict[str, Any]:
+    """Key figures of a field, for ``--json``."""
+    if isinstance(field, GridField | BandField):
+        note = field.diagnostics.note(SampledSource)
+        where = {
+            "origin": field.grid.origin.tolist(),
+            "spacing": field.grid.spacing.tolist(),
+            "shape": list(field.grid.shape),
+            "area_outside": note.area_outside if note else 0.0,
+            "area_cancelled": note.area_cancelled if note else 0.0,
+        }
+        if isinstance(field, BandField):
+            where |= {"band": field.width, "blocks": len(field.blocks), "nodes": field.n_nodes}
+    else:
+        where = {"n_vertices": len(field.values)}
+    return {
+        **where,
+        "minimum": float(np.nanmin(field.values)),
+        "maximum": float(np.nanmax(field.values)),
+        "notes": {snake(type(note).__name__): note.as_dict() for note in field.diagnostics.notes},
+        "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
+    }
+
+
+def snake(name: str) -> str:
+    """A class name as a key of JSON.
+
+    Examples
+    --------
+    >>> snake("ReachesBox")
+    'reaches_box'
+    """
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+
+
+def shape_figures(shape: Shape) -> dict[str, object]:
+    """Counts and defects of a shape; of meshes also which way their parts face, and how thin walls and gaps are."""
+    counted = shape.squares if isinstance(shape, DigitalSurface) else shape
+    figures: dict[str, object] = {"kind": type(shape).__name__, **asdict(inspect(counted))}
+    if isinstance(shape, TriangleMesh | PolygonMesh):
+        found = orientation(shape)
+        widths = thickness(found.shape)
+        figures["orientation"] = found.summary
+        figures["thickness"] = {**asdict(widths), "spacing": widths.spacing}
+    return figures

@@ -1,0 +1,33 @@
+"""Jobs that fail in every way, for workers to import."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import signedheat as sh
+
+
+def measure(path: Path, stem: Path) -> dict[str, object]:
+    """Does what the name of the file says; otherwise writes two files and returns a figure."""
+    name = path.stem
+    Path(f"{stem}.begun").write_text("half")
+    if name.startswith("slow"):
+        time.sleep(60)
+    if name.startswith("killed"):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if name.startswith("crashed"):
+        os._exit(3)
+    if name.startswith("wrong"):
+        raise sh.GeometryError("there is\nno face", remedy="add one")
+    if name.startswith("bug"):
+        raise KeyError("missing")
+    if name.startswith("loud"):
+        print("on standard output")
+    if name.startswith("hungry") and not path.with_suffix(".fed").exists():
+        path.with_suffix(".fed").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    Path(f"{stem}.txt").write_text(path.read_text())
+    return {"length": len(path.read_text()), "told": ["this is known"]}

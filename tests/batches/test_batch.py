@@ -1,0 +1,225 @@
+"""Many shapes: whatever happens to one of them, the others are done, and the manifest says so."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from batch_jobs import measure
+from signedheat import samples
+from signedheat.batches.inputs import expand
+
+
+@pytest.fixture
+def files(tmp_path):
+    """A function that makes files, of which it returns the folder."""
+
+    def make(*names):
+        for name in names:
+            path = tmp_path / "in" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"this is {name}")
+        return tmp_path / "in"
+
+    return make
+
+
+def lines(folder):
+    return [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
+
+
+def test_whatever_happens_to_one_the_others_are_done(tmp_path, files):
+    names = ["a", "bug", "crashed", "killed", "loud", "slow", "wrong", "z"]
+    folder = files(*(f"{name}.ply" for name in names))
+    reports = []
+    batch = sh.batch(
+        folder, tmp_path / "out", measure, workers=2, time_limit=5, report=lambda each: reports.append(each.name)
+    )
+    states = {outcome.name: outcome.state for outcome in batch.outcomes}
+    assert states == {
+        "a": "done",
+        "bug": "failed",
+        "crashed": "died",
+        "killed": "died",
+        "loud": "done",
+        "slow": "timed out",
+        "wrong": "failed",
+        "z": "done",
+    }
+    assert sorted(reports) == names
+    assert {each.name for each in batch.failures} == {"bug", "crashed", "killed", "slow", "wrong"}
+    told = {line["name"]: line for line in lines(tmp_path / "out")}
+    assert list(told) == names
+    assert told["wrong"]["message"] == "there is no face: add one"
+    assert "KeyError" in told["bug"]["message"] and "killed" in told["killed"]["message"]
+    assert "status 3" in told["crashed"]["message"] and "5 s" in told["slow"]["message"]
+    assert told["a"]["outputs"] == ["a.begun", "a.txt"] and told["a"]["figures"] == {"length": len("this is a.ply")}
+    assert told["a"]["message"] == "this is known" and told["a"]["seconds"] >= 0
+    present = {path.name for path in (tmp_path / "out").iterdir()}
+    assert present == {"manifest.jsonl", *(f"{name}.{end}" for name in ("a", "loud", "z") for end in ("begun", "txt"))}
+
+
+def test_a_restart_does_what_is_not_done_yet(tmp_path, files):
+    folder, out = files("a.ply", "b.ply", "c.ply"), tmp_path / "out"
+    first = sh.batch(folder, out, measure, workers=1)
+    assert first.skipped == 0 and not first.failures
+    before = {name: (out / f"{name}.txt").stat().st_mtime_ns for name in "abc"}
+    (out / "a.txt").unlink()
+    (folder / "b.ply").write_text("other")
+    (folder / "new.ply").write_text("new")
+    second = sh.batch(folder, out, measure, workers=1)
+    assert second.skipped == 1 and [each.name for each in second.outcomes] == ["a", "b", "c", "new"]
+    assert (out / "c.txt").stat().st_mtime_ns == before["c"]
+    assert (out / "b.txt").read_text() == "other" and (out / "a.txt").exists() and (out / "new.txt").exists()
+    assert len(lines(out)) == 4
+    text = (out / "manifest.jsonl").read_text()
+    (out / "manifest.jsonl").write_text(text[: len(text) - 40])  # as the end of a run may leave it
+    assert sh.batch(folder, out, measure, workers=1).skipped == 3
+
+
+def test_another_job_does_everything_again(tmp_path):
+    samples.sphere(2).save(tmp_path / "ball.ply")
+    out = tmp_path / "out"
+    job = sh.BatchJob(volume=".npz", resolution=16)
+    assert sh.batch(tmp_path / "ball.ply", out, job, workers=1).skipped == 0
+    assert sh.batch(tmp_path / "ball.ply", out, job, workers=1).skipped == 1
+    assert sh.batch(tmp_path / "ball.ply", out, sh.BatchJob(volume=".npz", resolution=20), workers=1).skipped == 0
+    assert max(sh.load_field(out / "ball.npz").grid.shape) == 20
+
+
+def test_what_was_short_of_memory_is_tried_again_alone(tmp_path, files):
+    folder = files("a.ply", "hungry.ply", "z.ply")
+    batch = sh.batch(folder, tmp_path / "out", measure, workers=2)
+    assert [outcome.state for outcome in batch.outcomes] == ["done"] * 3
+
+
+def test_results_do_not_depend_on_the_number_of_workers(tmp_path):
+    for k in range(3):
+        samples.without_faces(samples.sphere(2, radius=1 + k), 0.2, seed=k).save(tmp_path / f"in{k}.ply")
+    sampling = sh.Sampling(n=300, normalize=True)
+    job = sh.BatchJob(volume=".npy", offsets=(0.1, -0.1), samples=sampling, info=True, resolution=20)
+    one, two = tmp_path / "one", tmp_path / "two"
+    sh.batch(str(tmp_path / "in*.ply"), one, job, workers=1)
+    batch = sh.batch(str(tmp_path / "in*.ply"), two, job, workers=2)
+    names = sorted(path.name for path in one.iterdir())
+    assert names == sorted(path.name for path in two.iterdir())
+    for name in names:
+        if name != "manifest.jsonl":
+            assert (one / name).read_bytes() == (two / name).read_bytes()
+    figures = batch.outcomes[1].figures
+    assert figures["surfaces"][0]["distance"] == 0.1 and figures["samples"]["samples"] == 300
+    assert figures["info"]["kind"] == "TriangleMesh" and figures["field"]["notes"]["sharpened_to_shape"]
+    field = sh.solid_distance(sh.read(tmp_path / "in1.ply"), sh.load_field(one / "in1.npy").grid)
+    np.testing.assert_array_equal(sh.load_field(one / "in1.npy").values, field.values)
+
+
+def test_killing_the_whole_batch_loses_only_what_was_under_way(tmp_path, files):
+    folder, out = files("a.ply", "b.ply", "slow.ply"), tmp_path / "out"
+    code = (
+        "import signedheat as sh\nfrom batch_jobs import measure\n"
+        f"sh.batch({str(folder)!r}, {str(out)!r}, measure, workers=1)"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    process = subprocess.Popen([sys.executable, "-c", code], env=environment)
+    deadline = time.monotonic() + 60
+    while not (out / "manifest.jsonl").exists() or len(lines(out)) < 2:
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.05)
+    workers = children(process.pid)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    while any(is_running(worker) for worker in workers):  # workers end with the process that they work for
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    assert [line["state"] for line in lines(out)] == ["done", "done"]
+    (folder / "slow.ply").rename(folder / "quick.ply")
+    batch = sh.batch(folder, out, measure, workers=1)
+    assert batch.skipped == 2 and not batch.failures
+    assert not [path for path in out.iterdir() if path.name.startswith(".")]
+
+
+def children(number):
+    found = []
+    for status in os.listdir("/proc"):
+        if status.isdigit():
+            try:
+                with open(f"/proc/{status}/stat") as file:
+                    parent = int(file.read().rpartition(")")[2].split()[1])
+            except OSError:
+                continue
+            if parent == number:
+                found.append(int(status))
+    return found
+
+
+def is_running(number):
+    try:
+        with open(f"/proc/{number}/stat") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_progress_estimates_and_stops(tmp_path, files):
+    folder, heard = files("a.ply", "b.ply", "c.ply"), []
+
+    def progress(fraction, text):
+        heard.append((fraction, text))
+        if fraction > 0.5:
+            raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        sh.batch(folder, tmp_path / "out", measure, workers=1, progress=progress)
+    assert [fraction for fraction, _ in heard] == pytest.approx([0, 1 / 3, 2 / 3])
+    assert heard[1][1].startswith("1 of 3 shapes, about ")
+    assert len(lines(tmp_path / "out")) == 2
+
+
+def test_names_follow_files(tmp_path, files):
+    folder = files("a.ply", "parts/a.ply", "parts/b.stl", "parts/b.obj", "parts/deep/c.v2.off", "notes.txt")
+    out = folder / "out"
+    (out).mkdir()
+    (out / "old.ply").write_text("result of a run before")
+    named = {str(each.path.relative_to(folder)): each.name for each in expand([folder], out)}
+    assert named == {
+        "a.ply": "a",
+        "parts/a.ply": "parts/a",
+        "parts/b.obj": "parts/b.obj",
+        "parts/b.stl": "parts/b.stl",
+        "parts/deep/c.v2.off": "parts/deep/c.v2",
+    }
+    patterns = expand([f"{folder}/**/a.ply", f"{folder}/parts/*.stl", folder / "a.ply"], out)
+    assert [each.name for each in patterns] == ["a", "parts/a", "b"]
+    twins = expand([folder / "a.ply", folder / "parts" / "a.ply"], out)
+    assert sorted(each.name for each in twins) == ["a.ply", "parts/a.ply"]
+
+
+def test_what_is_no_batch_says_so(tmp_path, files, monkeypatch):
+    folder = files("a.ply")
+    with pytest.raises(sh.FileFormatError):
+        sh.batch(str(tmp_path / "*.nothing"), tmp_path / "out", measure)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(sh.FileFormatError):
+        sh.batch(tmp_path / "empty", tmp_path / "out", measure)
+    with pytest.raises(sh.SignedHeatError) as caught:
+        sh.batch(folder, tmp_path / "out", lambda path, stem: {})
+    assert "module" in caught.value.remedy
+    with pytest.raises(sh.SignedHeatError):
+        sh.batch(folder, tmp_path / "out", measure, workers=0)
+    with pytest.raises(sh.SignedHeatError):
+        sh.batch(folder, folder / "a.ply" / "out", measure)
+    with pytest.raises(sh.SignedHeatError):
+        sh.BatchJob()
+    with pytest.raises(sh.SignedHeatError):
+        sh.BatchJob(samples=sh.Sampling(), plain=True)
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if not path.endswith("tests")])
+    unknown = sh.batch(folder, tmp_path / "other", measure, workers=1)
+    assert unknown.failures[0].state == "failed" and "batch_jobs" in unknown.failures[0].message
+    missing = sh.batch(folder / "missing.ply", tmp_path / "out", sh.BatchJob(info=True), workers=1)
+    assert missing.failures[0].state == "failed" and "no such file" in missing.failures[0].message

@@ -1,0 +1,60 @@
+"""``signedheat batch``, as a user meets it."""
+
+import io
+import json
+
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.cli import main
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "in").mkdir()
+    samples.sphere(2).save(tmp_path / "in" / "ball.ply")
+    (tmp_path / "in" / "bad.stl").write_bytes(b"nothing that makes sense")
+    return tmp_path / "in"
+
+
+def test_batch_makes_what_is_asked_for_and_says_what_failed(tmp_path, folder, capsys):
+    out = tmp_path / "out"
+    wanted = ["--volume", "--offset", "0.1", "-0.2", "--sample", "100", "--info", "--surface", "ply", "--normalize"]
+    options = [*wanted, "--resolution", "16", "--workers", "1", "--time-limit", "200"]
+    assert main(["batch", str(folder), "-o", str(out), *options, "--json"]) == 1
+    printed, said = capsys.readouterr()
+    assert said.count("\n") == 1 and "bad.stl: failed: " in said
+    summary = json.loads(printed)
+    assert summary["states"] == {"failed": 1, "done": 1} and summary["shapes"] == 2 and summary["skipped"] == 0
+    names = {"ball.npz", "ball_samples.npz", "ball_+0.1.ply", "ball_-0.2.ply", "manifest.jsonl"}
+    assert {path.name for path in out.iterdir()} == names
+    assert max(sh.load_field(out / "ball.npz").grid.shape) == 16
+    (folder / "bad.stl").unlink()
+    assert main(["batch", str(folder), "-o", str(out), *options]) == 0
+    assert "1 done (1 of them before)" in capsys.readouterr().out
+
+
+def test_a_list_on_standard_input(tmp_path, folder, capsys, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO(f"{folder / 'ball.ply'}\n\n"))
+    assert main(["batch", "-", "-o", str(tmp_path / "out"), "--info", "--workers", "1"]) == 0
+    assert "1 shapes, 1 done" in capsys.readouterr().out
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+    assert main(["batch", "-", "-o", str(tmp_path / "out"), "--info"]) == 1
+    assert "standard input" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        [],
+        ["--sample", "--plain"],
+        ["--info", "--workers", "2", "--scheduler", "tcp://localhost:1"],
+        ["--volume", "--spacing", "0.1", "--resolution", "16"],
+        ["--volume", "--spacing", "0.1", "0.1"],
+        ["--volume", "stl"],
+    ],
+)
+def test_bad_usage(tmp_path, folder, capsys, options):
+    assert main(["batch", str(folder), "-o", str(tmp_path / "out"), *options]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
