@@ -381,8 +381,9 @@ def test_what_cannot_be_done_is_said():
             sh.intrinsic_delaunay(domain)
         with refused(sh.GeometryError, "domain"):
             sh.SignedHeatSolver(domain, intrinsic=True).distance(mesh.path([0, 1]))
-    with refused(sh.GeometryError, "edges"):
-        sh.intrinsic_delaunay(sh.TriangleMesh(np.ones((3, 3)), [[0, 1, 2]]))
+    for nothing in (np.ones((3, 3)), [[0, 0, 0], [1, 0.1, 0.3], [2, 0.2, 0.6]], np.eye(3) + 1e18):
+        with refused(sh.GeometryError, "faces"):
+            sh.intrinsic_delaunay(sh.TriangleMesh(nothing, [[0, 1, 2]]))
     with refused(sh.SourceError, "face 1000"):
         sh.intrinsic_delaunay(mesh, keep=sh.Curve([1000, 0], np.eye(3)[:2]))
     for keep in "curve", np.zeros(3), [None], 3:

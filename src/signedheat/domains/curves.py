@@ -9,9 +9,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import GeometryError, SourceError
+from ..errors import SourceError
 from ..frozen import Frozen
-from .validation import finite_rows, frozen
+from .validation import array_of, finite_rows, flag, frozen, whole_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +74,10 @@ class Curve(Frozen):
             )
         object.__setattr__(self, "faces", ids)
         object.__setattr__(self, "barycentric", weights)
-        object.__setattr__(self, "closed", bool(closed))
-        object.__setattr__(self, "oriented", bool(oriented))
+        object.__setattr__(self, "closed", flag(closed, "closed"))
+        object.__setattr__(self, "oriented", flag(oriented, "oriented"))
         if normals is not None:
-            normals = finite(normals, "curve normals")
+            normals = finite_rows(normals, "curve normals", 3, SourceError)
             if len(normals) != self.n_segments:
                 raise SourceError(
                     f"a curve of {self.n_segments} segments needs as many normals, not {len(normals)}: "
@@ -163,11 +163,11 @@ def surface_points(
     faces: ArrayLike, barycentric: ArrayLike, name: str
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Read-only face ids and barycentric coordinates, checked as far as possible without the surface."""
-    ids = np.atleast_1d(np.asarray(faces))
+    ids = np.atleast_1d(array_of(faces, f"face ids of a {name}", SourceError))
     if ids.size == 0:
         return frozen(np.empty(0, dtype=np.int64)), frozen(np.empty((0, 3)))
-    weights = finite(barycentric, f"barycentric coordinates of a {name}")
-    if ids.ndim != 1 or len(ids) != len(weights) or not np.issubdtype(ids.dtype, np.integer):
+    weights = finite_rows(barycentric, f"barycentric coordinates of a {name}", 3, SourceError)
+    if ids.ndim != 1 or len(ids) != len(weights) or ids.dtype.kind not in "iuO":
         raise SourceError(
             f"a {name} needs one integer face id per point: {ids.dtype} of shape {ids.shape} for {len(weights)} points",
             element="faces",
@@ -179,12 +179,4 @@ def surface_points(
             "they must be at least 0 and add up to 1",
             element=f"point {wrong[0]}",
         )
-    return frozen(ids.astype(np.int64)), weights
-
-
-def finite(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    """`values` as (n, 3) finite numbers; raises `SourceError` otherwise."""
-    try:
-        return finite_rows(values, name, 3)
-    except GeometryError as error:
-        raise SourceError(error.cause, remedy=error.remedy, element=error.element) from None
+    return frozen(whole_numbers(ids, f"face ids of a {name}", SourceError)), weights

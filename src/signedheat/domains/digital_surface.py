@@ -15,7 +15,7 @@ from .display import Displayed, to_pyvista
 from .polygon_mesh import PolygonMesh
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
-from .validation import frozen
+from .validation import array_of, finite_number, frozen, numbers, positive_steps, refuse_extreme
 
 if TYPE_CHECKING:
     import pyvista
@@ -70,10 +70,10 @@ class DigitalSurface(Displayed, Surface):
         origin: ArrayLike = (0.0, 0.0, 0.0),
         radius: float | None = None,
     ) -> None:
-        array = np.asarray(volume)
+        array = array_of(volume, "volume")
         if array.ndim != 3:
             raise GeometryError(f"a volume must be an array with 3 axes, not {array.ndim}", element="volume")
-        if array.dtype != bool and not (array.size and np.isin(array, (0, 1)).all()):
+        if array.dtype != bool and not (array.size and array.dtype.kind in "iuf" and np.isin(array, (0, 1)).all()):
             raise GeometryError(
                 f"a volume must be boolean, or 0 and 1, not {array.dtype} with other values",
                 remedy="threshold it first, for instance volume > 0.5",
@@ -81,27 +81,22 @@ class DigitalSurface(Displayed, Surface):
         solid = array.astype(bool)
         if not solid.any():
             raise GeometryError("the volume holds no voxel: every entry is False", element="volume")
-        steps = np.asarray(spacing, dtype=np.float64)
-        if steps.shape not in ((), (3,)) or not (np.isfinite(steps).all() and (steps > 0).all()):
-            raise GeometryError(
-                f"voxel spacing must be one positive number or 3, not {steps.tolist()}", element="spacing"
-            )
-        start = np.asarray(origin, dtype=np.float64)
+        steps = positive_steps(spacing, "spacing", 3)
+        start = numbers(origin, "origin")
         if start.shape != (3,) or not np.isfinite(start).all():
             raise GeometryError(
                 f"the origin of a volume must be 3 finite numbers, not {start.tolist()}", element="origin"
             )
-        steps = np.broadcast_to(steps, 3).copy()
+        refuse_extreme(start, start + steps * array.shape, "voxels")
         if radius is None:
             spans = [np.flatnonzero(solid.any(axis=tuple({0, 1, 2} - {axis}))) for axis in range(3)]
             extent = max(step * (span[-1] - span[0] + 1) for step, span in zip(steps, spans, strict=True))
             radius = 0.4 * float(np.sqrt(steps.max() * extent))
-        if not (np.isfinite(radius) and radius >= 0):
-            raise GeometryError(f"the radius for normals must be finite and at least 0, not {radius}", element="radius")
+        radius = finite_number(radius, "radius", 0, GeometryError)
         object.__setattr__(self, "volume", frozen(solid))
-        object.__setattr__(self, "spacing", frozen(steps))
-        object.__setattr__(self, "origin", frozen(start.copy()))
-        object.__setattr__(self, "radius", float(radius))
+        object.__setattr__(self, "spacing", steps)
+        object.__setattr__(self, "origin", frozen(start))
+        object.__setattr__(self, "radius", radius)
 
     @cached_property
     def surfels(self) -> Surfels:

@@ -10,11 +10,21 @@ from typing import TYPE_CHECKING, Generic, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import GeometryError
+from ..errors import GeometryError, MemoryLimitError
 from ..frozen import Frozen
 from ..reprs import short
 from .display import Displayed, to_pyvista
-from .validation import frozen
+from .validation import (
+    array_of,
+    coordinates,
+    finite_number,
+    frozen,
+    numbers,
+    positive_steps,
+    refuse_extreme,
+    whole_number,
+    whole_numbers,
+)
 
 ROOM = 0.2
 """Share of its longest side by which a shape is padded on every side."""
@@ -87,29 +97,20 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         self: Grid[int], origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None
     ) -> None: ...
     def __init__(self, origin: ArrayLike, spacing: ArrayLike, shape: ArrayLike, mask: ArrayLike | None = None) -> None:
-        corner = np.atleast_1d(np.array(origin, dtype=np.float64))
-        counts = np.atleast_1d(np.asarray(shape))
-        if corner.ndim != 1 or not np.isfinite(corner).all():
-            raise GeometryError(
-                f"grid origin must be a finite vector, not {np.asarray(origin).tolist()}", element="origin"
-            )
-        if counts.shape != corner.shape or not np.issubdtype(counts.dtype, np.integer):
-            raise GeometryError(
-                f"grid shape must be {len(corner)} integers, not {np.asarray(shape).tolist()}", element="shape"
-            )
+        corner = np.atleast_1d(numbers(origin, "origin"))
+        counts = np.atleast_1d(whole_numbers(shape, "shape"))
+        if corner.ndim != 1 or not len(corner) or not np.isfinite(corner).all():
+            raise GeometryError(f"grid origin must be a finite vector, not {corner.tolist()}", element="origin")
+        if counts.shape != corner.shape:
+            raise GeometryError(f"grid shape must be {len(corner)} integers, not {counts.tolist()}", element="shape")
         if (counts < 2).any():
             raise GeometryError(
                 f"a grid needs at least 2 nodes along every axis, not {counts.tolist()}", element="shape"
             )
-        steps = np.asarray(spacing, dtype=np.float64)
-        if steps.ndim > 1 or (steps.ndim == 1 and steps.shape != corner.shape):
-            raise GeometryError(
-                f"grid spacing must be one number or {len(corner)}, not {steps.tolist()}", element="spacing"
-            )
-        if not (np.isfinite(steps).all() and (steps > 0).all()):
-            raise GeometryError(f"grid spacing must be positive and finite, not {steps.tolist()}", element="spacing")
+        steps = positive_steps(spacing, "spacing", len(corner))
+        refuse_extreme(corner, corner + steps * (counts.astype(np.float64) - 1), "nodes")
         object.__setattr__(self, "origin", frozen(corner))
-        object.__setattr__(self, "spacing", frozen(np.broadcast_to(steps, corner.shape).copy()))
+        object.__setattr__(self, "spacing", steps)
         object.__setattr__(self, "shape", tuple(int(n) for n in counts))
         object.__setattr__(self, "mask", None if mask is None else _solid_nodes(mask, self.shape))
 
@@ -144,10 +145,13 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         >>> Grid.around([[0, 0, 0], [1, 2, 4]], resolution=7, padding=1.0)
         Grid(origin=[-1, -1, -1], spacing=1, shape=(4, 5, 7))
         """
-        lower, upper = np.asarray(bounds, dtype=np.float64)
+        box = coordinates(bounds, "bounds")
+        if len(box) != 2 or not (box[0] <= box[1]).all():
+            raise GeometryError(f"bounds must be a lower and an upper corner, not {box.tolist()}", element="bounds")
+        lower, upper = box
         longest = float((upper - lower).max())
-        if padding is not None and not (np.isfinite(padding) and padding >= 0):
-            raise GeometryError(f"the padding must be a length, zero or more, not {padding}", element="padding")
+        if padding is not None:
+            padding = finite_number(padding, "padding", 0, GeometryError)
         room = room_around(bounds) if padding is None else float(padding)
         if not longest + 2 * room > 0:
             raise GeometryError(
@@ -155,17 +159,14 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
                 remedy="give a padding or a grid",
             )
         if spacing is None:
-            if int(resolution) != resolution or resolution < 2:
-                raise GeometryError(
-                    f"the resolution must be a whole number of at least 2 nodes, not {resolution}", element="resolution"
-                )
-            spacing = (longest + 2 * room) / (int(resolution) - 1)
-        steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), lower.shape)
-        if not (np.isfinite(steps).all() and (steps > 0).all()):
-            raise GeometryError(
-                f"grid spacing must be positive and finite, not {np.asarray(spacing).tolist()}", element="spacing"
-            )
+            spacing = (longest + 2 * room) / (whole_number(resolution, "resolution", 2) - 1)
+        steps = positive_steps(spacing, "spacing", len(lower))
         cells = np.maximum(1, np.ceil((upper - lower + 2 * room) / steps - 1e-9))
+        if not (cells < 2**62).all():
+            raise MemoryLimitError(
+                f"a spacing of {steps.min():.3g} makes {cells.max():.3g} cells along one axis",
+                remedy="choose a larger spacing",
+            )
         return cls(0.5 * (lower + upper) - 0.5 * cells * steps, steps, cells.astype(np.int64) + 1)
 
     @property
@@ -198,7 +199,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """(n,) whether each of the (n, d) points lies within the bounding box of the nodes."""
-        positions = np.asarray(points, dtype=np.float64)
+        positions = numbers(points, "points")
         inside: NDArray[np.bool_] = np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
         return inside
 
@@ -226,7 +227,7 @@ def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = ROOM) -> f
 
 
 def _solid_nodes(mask: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    solid = np.array(mask)
+    solid = np.array(array_of(mask, "mask"))
     if solid.dtype != np.bool_ or solid.shape != shape:
         raise GeometryError(
             f"the mask must be boolean, of shape {shape}, not {solid.dtype} of shape {solid.shape}", element="mask"

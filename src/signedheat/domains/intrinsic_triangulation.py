@@ -25,7 +25,7 @@ from ..geometry.intrinsic.history import History
 from ..geometry.intrinsic.refinement import refine_all
 from ..geometry.intrinsic.transfer import ConformingRefinement, transfer_segments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.mollification import mollify
+from ..geometry.mollification import MARGIN, laid_out
 from ..progress import Progress, Stopwatch
 from .curves import CurveOrPoints, CurvesAndPoints
 from .display import Displayed, to_pyvista
@@ -35,9 +35,6 @@ from .validation import finite_rows, frozen
 
 if TYPE_CHECKING:
     import pyvista
-
-MARGIN = 1e-14
-"""Margin of the triangle inequalities, relative to the mean length, to which flat triangles are mollified."""
 
 LARGEST_ANGLE = 30.0
 """Degrees; for larger minimum angles refinement need not terminate."""
@@ -260,7 +257,7 @@ def intrinsic_delaunay(
         raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices!r}", element="max_vertices")
     stopwatch = Stopwatch(progress, steps=3)
     with stopwatch("embed curves"):
-        base, _ = laid_out(mesh)
+        base, _ = laid_out(mesh, MARGIN)
         listed = list(keep) if isinstance(keep, Sequence) else [keep]
         refinement = ConformingRefinement.of(
             base, list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))
@@ -290,13 +287,3 @@ def triangle_mesh(domain: object) -> TriangleMesh:
             element="domain",
         )
     return domain
-
-
-def laid_out(mesh: TriangleMesh) -> tuple[IntrinsicMesh, float]:
-    """The intrinsic mesh of a mesh, mollified, and the length that mollification has added to all edges."""
-    lengths, added = mollify(mesh.edge_lengths[mesh.edges.face_edges], MARGIN)
-    if not lengths.max() > 0:
-        raise GeometryError(
-            "all edges of the mesh have length zero: it has no area to measure distance on", element="edges"
-        )
-    return IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges), added

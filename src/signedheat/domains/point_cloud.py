@@ -14,7 +14,7 @@ from ..geometry.local_triangulations import LocalTriangulations, local_triangula
 from .exchange import Exchangeable
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
-from .validation import finite_rows, frozen
+from .validation import coordinates, finite_rows, frozen, numbers, whole_number
 
 if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
@@ -68,7 +68,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         areas: ArrayLike | None = None,
         n_neighbors: int = 30,
     ) -> None:
-        positions = finite_rows(points, "points")
+        positions = coordinates(points, "points")
         if len(positions) == 0:
             raise GeometryError("there are no points: the point cloud is empty", element="points")
         directions = sizes = None
@@ -85,12 +85,12 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             directions = directions / lengths[:, None]
             directions = frozen(directions / np.linalg.norm(directions, axis=1)[:, None])
         if areas is not None:
-            sizes = np.array(areas, dtype=np.float64)
+            sizes = numbers(areas, "areas")
             _same_length(sizes, positions, "areas")
             if sizes.ndim != 1 or not (np.isfinite(sizes) & (sizes > 0)).all():
                 raise GeometryError("areas must be one positive, finite number per point", element="areas")
             sizes = frozen(sizes)
-        if n_neighbors < 3:
+        if whole_number(n_neighbors, "n_neighbors", 0) < 3:
             raise GeometryError(f"neighbourhoods need at least 3 points, not {n_neighbors}", element="n_neighbors")
         object.__setattr__(self, "points", positions)
         object.__setattr__(self, "normals", directions)

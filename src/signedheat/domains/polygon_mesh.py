@@ -16,7 +16,7 @@ from ..geometry.virtual_refinement import VirtualRefinement, virtual_refinement
 from .exchange import Exchangeable
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
-from .validation import finite_rows, frozen, used_bounds
+from .validation import array_of, coordinates, frozen, used_bounds, whole_numbers
 
 Polygons = Sequence[Sequence[int] | NDArray[np.int64]] | NDArray[np.int64]
 """Vertex ids of each polygon."""
@@ -51,8 +51,15 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
     offsets: NDArray[np.int64]
 
     def __init__(self, vertices: ArrayLike, polygons: Polygons) -> None:
-        positions = finite_rows(vertices, "vertices", 3)
-        counts = np.fromiter((len(p) for p in polygons), dtype=np.int64, count=len(polygons))
+        positions = coordinates(vertices, "vertices", 3)
+        if isinstance(polygons, np.ndarray):
+            polygons = array_of(polygons, "polygons")
+        try:
+            counts = np.fromiter((len(p) for p in polygons), dtype=np.int64, count=len(polygons))
+        except TypeError:
+            raise GeometryError(
+                "polygons must be a sequence with a sequence of vertex ids for each", element="polygons"
+            ) from None
         if len(counts) == 0:
             raise GeometryError("there are no polygons: the shape is empty", element="polygons")
         if (counts < 3).any():
@@ -61,9 +68,11 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
                 f"polygon {first} has {counts[first]} corners, and needs at least 3",
                 element=f"polygon {first}",
             )
-        corners = np.array(list(itertools.chain.from_iterable(polygons)))
-        if not np.issubdtype(corners.dtype, np.integer):
-            raise GeometryError(f"polygons must hold integer vertex ids, not {corners.dtype}", element="polygons")
+        corners = whole_numbers(list(itertools.chain.from_iterable(polygons)), "polygons")
+        if corners.ndim != 1:
+            raise GeometryError(
+                f"polygons must hold vertex ids, not arrays of shape {corners.shape[1:]}", element="polygons"
+            )
         offsets = np.concatenate([[0], np.cumsum(counts)])
         outside = np.flatnonzero((corners < 0) | (corners >= len(positions)))
         if len(outside):
@@ -73,7 +82,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
                 element=f"polygon {first}",
             )
         object.__setattr__(self, "vertices", positions)
-        object.__setattr__(self, "corners", frozen(corners.astype(np.int64)))
+        object.__setattr__(self, "corners", frozen(corners))
         object.__setattr__(self, "offsets", frozen(offsets))
 
     @property

@@ -13,7 +13,7 @@ from ..errors import GeometryError
 from ..frozen import Frozen
 from ..geometry.marching import level_lines
 from .display import Displayed, to_pyvista
-from .validation import finite_rows
+from .validation import boolean, coordinates, flag, numbers, positive_steps
 
 if TYPE_CHECKING:
     import pyvista
@@ -48,9 +48,9 @@ class Polyline(Displayed, Frozen):
     closed: bool
 
     def __init__(self, points: ArrayLike, closed: bool = False) -> None:
-        positions = finite_rows(points, "points", 2)
+        positions = coordinates(points, "points", 2)
         if closed and len(positions) > 2 and (positions[0] == positions[-1]).all():
-            positions = finite_rows(positions[:-1], "points", 2)
+            positions = coordinates(positions[:-1], "points", 2)
         if len(positions) < 2:
             raise GeometryError(f"a polyline needs at least 2 points, not {len(positions)}", element="points")
         if (positions == positions[0]).all():
@@ -58,7 +58,7 @@ class Polyline(Displayed, Frozen):
                 f"the polyline has no length: its {len(positions)} points are the same", element="points"
             )
         object.__setattr__(self, "points", positions)
-        object.__setattr__(self, "closed", bool(closed))
+        object.__setattr__(self, "closed", flag(closed, "closed"))
 
     @classmethod
     def from_mask(cls, mask: ArrayLike, origin: ArrayLike = (0.0, 0.0), spacing: ArrayLike = 1.0) -> list[Polyline]:
@@ -85,15 +85,16 @@ class Polyline(Displayed, Frozen):
         >>> dot.points.tolist(), dot.closed
         ([[1.0, 1.5], [1.5, 1.0], [1.0, 0.5], [0.5, 1.0]], True)
         """
-        inside = np.asarray(mask)
-        if inside.ndim != 2 or inside.dtype != np.bool_ or not inside.any():
+        inside = boolean(mask, "mask")
+        if inside.ndim != 2 or not inside.any():
             raise GeometryError(
                 f"a mask is a boolean image with something True in it, not {inside.dtype} of shape {inside.shape}",
                 remedy="compare the image with a threshold first",
             )
-        steps = np.broadcast_to(np.asarray(spacing, dtype=np.float64), 2)
+        steps = positive_steps(spacing, "spacing", 2)
+        start = coordinates(np.atleast_2d(numbers(origin, "origin")), "origin", 2)[0]
         padded = np.pad(inside, 1)
-        lines = level_lines(0.5 - padded, np.asarray(origin, dtype=np.float64) - steps, steps, 0.0)
+        lines = level_lines(0.5 - padded, start - steps, steps, 0.0)
         return [cls(points, closed) for points, closed in lines]
 
     @property

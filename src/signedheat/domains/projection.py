@@ -8,18 +8,19 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SourceError
 from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.paths import join
-from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.meshes import Triangles
+from ..geometry.mollification import MARGIN, laid_out
 from ..geometry.nearest import nearest_on_triangles
 from ..geometry.surface_points import locate_points
-from .curves import Curve, finite
+from .curves import Curve
+from .validation import coordinates, finite_number
 
 
 def projected_curve(
     mesh: Triangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
 ) -> Curve:
     """The curve through the closest points on a mesh, joined by geodesic paths."""
-    points = finite(points, "points of the polyline")
+    points = coordinates(points, "points of the polyline", 3, SourceError)
     if len(points) < 2:
         raise SourceError(
             f"a polyline needs at least two points, not {len(points)}",
@@ -29,15 +30,14 @@ def projected_curve(
     if max_distance is None:
         max_distance = 0.05 * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
     far = int(distances.argmax())
-    if distances[far] > max_distance:
+    if distances[far] > finite_number(max_distance, "max_distance", least=0):
         raise SourceError(
             f"the polyline leaves the mesh: point {far}, {points[far].tolist()}, is "
             f"{distances[far]:.6g} away from it, and at most {max_distance:.6g} is allowed",
             remedy="check units and placement, or raise max_distance",
             element=f"point {far}",
         )
-    lengths = np.linalg.norm(np.roll(mesh.vertices[mesh.faces], -1, axis=1) - mesh.vertices[mesh.faces], axis=2)
-    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
+    triangles, _ = laid_out(mesh, MARGIN)
     start = np.arange(len(points) if closed else len(points) - 1)
     located, starts, ends, _ = join(
         triangles, locate_points(triangles, faces, weights), start, (start + 1) % len(points), "polyline"

@@ -12,6 +12,7 @@ from ..geometry.surface_points import corners_at
 from .curves import Curve, SurfacePoints
 from .level_sets import boundary_curves, level_set, region_boundary
 from .projection import projected_curve
+from .validation import array_of, finite_number, numbers
 
 
 class Surface(Frozen):
@@ -24,6 +25,11 @@ class Surface(Frozen):
     def triangulation(self) -> Triangles:
         """The triangles that curves refer to."""
         raise NotImplementedError
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of values that a field on the surface has."""
+        return self.triangulation.n_vertices
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the vertices of `triangulation`, from values at the vertices of the domain."""
@@ -137,8 +143,13 @@ class Surface(Frozen):
         >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).level_set([0.0, 1.0, 1.0], 0.5)
         [Curve(2 points, open, oriented)]
         """
-        values = np.asarray(values, dtype=np.float64)
-        return level_set(self.triangulation, self.on_triangulation(values), float(level))
+        at_vertices, height = numbers(values, "values", SourceError), finite_number(level, "level")
+        if at_vertices.shape != (self.n_vertices,):
+            raise SourceError(
+                f"a level set needs one value per vertex: {self.n_vertices}, not an array {at_vertices.shape}",
+                element="values",
+            )
+        return level_set(self.triangulation, self.on_triangulation(at_vertices), height)
 
     def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
         """Boundary of a region of faces, with the region to the left, so that φ > 0 in it.
@@ -165,7 +176,7 @@ class Surface(Frozen):
         >>> mesh.region_boundary([True, False])
         [Curve(2 points, open, oriented)]
         """
-        return region_boundary(self.triangulation, self._triangle_mask(np.asarray(face_mask)))
+        return region_boundary(self.triangulation, self._triangle_mask(array_of(face_mask, "face_mask", SourceError)))
 
     def boundary_curves(self) -> list[Curve]:
         """The boundary of the surface, with the surface to its left.
@@ -184,7 +195,7 @@ class Surface(Frozen):
         return boundary_curves(self.triangulation)
 
     def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        ids = self._triangulation_vertices(np.atleast_1d(np.asarray(vertices)))
+        ids = self._triangulation_vertices(np.atleast_1d(array_of(vertices, f"vertex ids of a {name}", SourceError)))
         mesh = self.triangulation
         corners = corners_at(mesh.faces, ids, mesh.n_vertices, name)
         return corners // 3, np.eye(3)[corners % 3]

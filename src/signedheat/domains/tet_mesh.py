@@ -21,7 +21,7 @@ from ..packages import lazy_module
 from .display import Displayed
 from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
-from .validation import element_ids, finite_rows, frozen
+from .validation import coordinates, element_ids, frozen
 
 if TYPE_CHECKING:
     import meshio
@@ -68,7 +68,7 @@ class TetMesh(Displayed, Frozen):
     reoriented: NDArray[np.int64]
 
     def __init__(self, vertices: ArrayLike, tets: ArrayLike) -> None:
-        positions = finite_rows(vertices, "vertices", 3)
+        positions = coordinates(vertices, "vertices", 3)
         ids = element_ids(tets, "tets", 4, len(positions))
         volumes = signed_volumes(positions, ids)
         if not volumes.any():

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry.edges import EdgeTable, edge_table
 from .exchange import Exchangeable
 from .surface import Surface
-from .validation import element_ids, finite_rows, used_bounds
+from .validation import coordinates, element_ids, used_bounds
 
 if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
@@ -45,7 +45,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     faces: NDArray[np.int64]
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
-        positions = finite_rows(vertices, "vertices", 3)
+        positions = coordinates(vertices, "vertices", 3)
         object.__setattr__(self, "vertices", positions)
         object.__setattr__(self, "faces", element_ids(faces, "faces", 3, len(positions)))
 

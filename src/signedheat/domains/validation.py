@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from numbers import Real
-from typing import TypeVar
+import math
+import warnings
+from numbers import Integral, Real
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..errors import GeometryError, SignedHeatError
 
 Scalar = TypeVar("Scalar", bound=np.generic)
+
+LARGEST = 1e40
+"""Of coordinates. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
+SMALLEST = 1e-40
+"""Of the extent of a shape."""
+_MOST = 2**63
 
 
 def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
@@ -20,15 +28,60 @@ def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
     return array
 
 
-def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDArray[np.float64]:
+def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.float64]:
+    """`values` as a new float64 array of any shape; whatever holds anything but real numbers is refused.
+
+    Examples
+    --------
+    >>> numbers([[1, 2]], "points")
+    array([[1., 2.]])
+    """
+    array = array_of(values, name, error)
+    try:
+        if array.dtype.kind not in "biufO":
+            raise TypeError
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # whatever is lost in converting
+            return np.array(array, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError, RuntimeWarning):
+        raise error(f"{name} must be real numbers, not {_described(array)}", element=name) from None
+
+
+def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.int64]:
+    """`values` as a new int64 array of any shape; whatever holds anything but integers is refused."""
+    array = array_of(values, name, error)
+    if array.dtype.kind == "O" and array.size and all(isinstance(value, Integral) for value in array.ravel()):
+        array = array.astype(np.int64) if all(abs(int(value)) < _MOST for value in array.ravel()) else array
+    if array.dtype.kind not in "iu" or (array.size and array.dtype == np.uint64 and array.max() >= _MOST):
+        raise error(f"{name} must be integers of at most 63 bits, not {_described(array)}", element=name)
+    return array.astype(np.int64)
+
+
+def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[Any]:
+    """`values` as an array of any type."""
+    if np.ma.isMaskedArray(values):
+        raise error(f"{name} are a masked array", remedy="drop what is masked, or fill it in", element=name)
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError, OverflowError):
+        raise error(f"{name} do not form an array: rows differ in length or kind", element=name) from None
+
+
+def _described(array: NDArray[Any]) -> str:
+    return f"an array of {array.dtype}" if array.ndim else f"{array[()]!r:.50}"
+
+
+def finite_rows(
+    values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
+) -> NDArray[np.float64]:
     """`values` as a read-only float64 array of shape (n, columns), without NaN or infinity."""
-    array = np.array(values, dtype=np.float64)
-    if array.ndim != 2 or (columns is not None and array.shape[1] != columns):
+    array = numbers(values, name, error)
+    if array.ndim != 2 or (columns is not None and array.shape[1] != columns) or array.shape[1] == 0:
         wanted = f"(n, {columns})" if columns is not None else "(n, d)"
-        raise GeometryError(f"{name} must have shape {wanted}, not {array.shape}", element=name)
+        raise error(f"{name} must have shape {wanted}, not {array.shape}", element=name)
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
-        raise GeometryError(
+        raise error(
             f"{len(bad)} of {len(array)} {name} hold NaN or infinity, first number {bad[0]}",
             remedy="remove or repair them",
             element=f"number {bad[0]}",
@@ -36,7 +89,40 @@ def finite_rows(values: ArrayLike, name: str, columns: int | None = None) -> NDA
     return frozen(array)
 
 
-def finite_number(value: object, name: str, least: float = -np.inf) -> float:
+def coordinates(
+    values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
+) -> NDArray[np.float64]:
+    """The same, within what can be computed with: powers of lengths must not leave the range of numbers.
+
+    Examples
+    --------
+    >>> coordinates([[0, 0], [1, 1e-200]], "points")
+    array([[0.e+000, 0.e+000],
+           [1.e+000, 1.e-200]])
+    """
+    array = finite_rows(values, name, columns, error)
+    if len(array):
+        refuse_extreme(array.min(axis=0), array.max(axis=0), name, error)
+    return array
+
+
+def refuse_extreme(
+    lower: NDArray[np.float64], upper: NDArray[np.float64], name: str, error: type[SignedHeatError] = GeometryError
+) -> None:
+    """Refuse a box that reaches beyond `LARGEST`, or is smaller than `SMALLEST` but no point."""
+    farthest, extent = float(max(-lower.min(), upper.max())), float((upper - lower).max())
+    if farthest > LARGEST or 0 < extent < SMALLEST:
+        what = f"reach as far as {farthest:.3g}" if farthest > LARGEST else f"extend over {extent:.3g} only"
+        raise error(
+            f"{name} {what}, and lengths from {SMALLEST:g} to {LARGEST:g} can be computed with",
+            remedy="scale and move the shape, for instance to a size of 1 around the origin",
+            element=name,
+        )
+
+
+def finite_number(
+    value: object, name: str, least: float = -np.inf, error: type[SignedHeatError] = SignedHeatError
+) -> float:
     """`value` as a finite float, at least `least`.
 
     Examples
@@ -45,12 +131,19 @@ def finite_number(value: object, name: str, least: float = -np.inf) -> float:
     2.0
     """
     if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
-        raise SignedHeatError(f"{name} must be a number, not {value!r}", element=name)
-    number = float(value)
+        raise error(f"{name} must be a number, not {value!r}", element=name)
+    number = _float(value)
     if not (np.isfinite(number) and number >= least):
         wanted = "finite" if least == -np.inf else "finite and not negative" if least == 0 else f"at least {least:g}"
-        raise SignedHeatError(f"{name} must be {wanted}, not {number:g}", element=name)
+        raise error(f"{name} must be {wanted}, not {number:g}", element=name)
     return number
+
+
+def _float(value: Real | NDArray[Any]) -> float:
+    try:
+        return float(value)
+    except (OverflowError, TypeError, ValueError):
+        return math.nan
 
 
 def positive_number(value: object, name: str) -> float:
@@ -61,16 +154,52 @@ def positive_number(value: object, name: str) -> float:
     return number
 
 
-def element_ids(values: ArrayLike, name: str, corners: int, n_vertices: int) -> NDArray[np.int64]:
+def whole_number(value: object, name: str, least: int, error: type[SignedHeatError] = GeometryError) -> int:
+    """`value` as an integer, at least `least`."""
+    number = finite_number(value, name, error=error)
+    if number % 1 or number < least:
+        raise error(f"{name} must be a whole number of at least {least}, not {number:g}", element=name)
+    return int(number)
+
+
+def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.bool_]:
+    """`values` as a boolean array of any shape, not copied; other types than booleans are refused."""
+    array = array_of(values, name, error)
+    if array.dtype != np.bool_:
+        raise error(
+            f"{name} must be boolean, not {_described(array)}", remedy="compare it with a threshold first", element=name
+        )
+    return array
+
+
+def flag(value: object, name: str) -> bool:
+    """`value` as True or False."""
+    if not isinstance(value, bool | np.bool_):
+        raise SignedHeatError(f"{name} must be True or False, not {value!r:.50}", element=name)
+    return bool(value)
+
+
+def positive_steps(values: object, name: str, count: int) -> NDArray[np.float64]:
+    """`values`, one positive number for all axes or one for each, as one for each."""
+    steps = numbers(values, name)
+    if steps.shape not in ((), (count,)) or not (np.isfinite(steps).all() and (steps > 0).all()):
+        raise GeometryError(
+            f"{name} must be positive and finite, one number or {count}, not {steps.tolist()}", element=name
+        )
+    refuse_extreme(0 * steps, steps, name)
+    return frozen(np.broadcast_to(steps, count).copy())
+
+
+def element_ids(values: object, name: str, corners: int, n_vertices: int) -> NDArray[np.int64]:
     """`values` as a read-only int64 array of shape (m, corners), with all ids within 0 … n_vertices − 1."""
-    array = np.asarray(values)
+    array = array_of(values, name, GeometryError)
     if array.size == 0:
         raise GeometryError(f"there are no {name}: the shape is empty", element=name)
     if array.ndim != 2 or array.shape[1] != corners:
         raise GeometryError(f"{name} must have shape (m, {corners}), not {array.shape}", element=name)
-    if not np.issubdtype(array.dtype, np.integer):
+    if array.dtype.kind not in "iuO":
         raise GeometryError(f"{name} must hold integer vertex ids, not {array.dtype}", element=name)
-    ids = array.astype(np.int64)
+    ids = whole_numbers(array, name)
     outside = np.flatnonzero(((ids < 0) | (ids >= n_vertices)).any(axis=1))
     if len(outside):
         first = outside[0]

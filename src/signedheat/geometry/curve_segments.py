@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from ..errors import SourceError
+from .directions import unit
 from .intrinsic_mesh import IntrinsicMesh
 from .surface_points import EDGE, VERTEX, LocatedPoints, incident_faces
 
@@ -99,9 +100,8 @@ def in_layout(
     """(k,) vectors in space projected into the planes of their faces, in layout coordinates."""
     of_faces = positions[faces] if positions.ndim == 3 else positions[triangles.corner_vertices[faces]]
     a, b, c = of_faces.transpose(1, 0, 2)
-    first = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
-    normal = np.cross(first, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    first = unit(b - a)
+    normal = unit(np.cross(first, c - a))
     second = np.cross(normal, first)
     seen = np.einsum("ij,ij->i", vectors, first) + 1j * np.einsum("ij,ij->i", vectors, second)
     edge = triangles.edge_vectors[faces, 0]

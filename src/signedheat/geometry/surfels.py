@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .edges import EdgeTable
 
 _STEEPEST = 0.05  # least cosine of the angle between a corrected normal and the square's own
+_WIDEST, _NARROWEST = 1e3, 1e-3  # of blurs, in extents of the volume and in voxels: beyond, the normals are the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,15 +101,16 @@ def corrected_normals(
     own[np.arange(len(own)), surfels.axes] = surfels.signs
     if radius == 0:
         return own
-    width = 0.5 * radius / spacing
-    margin = int(np.ceil(4 * width.max())) + 1
-    padded = np.pad(volume, margin).astype(np.float32)
-    inside = tuple((surfels.voxels + margin).T)
-    outside = tuple((surfels.voxels + own.astype(np.int64) + margin).T)
+    extent = spacing * volume.shape
+    width = np.maximum(0.5 * min(radius, _WIDEST * float(extent.max())) / spacing, _NARROWEST)
+    padded = np.pad(volume, 1).astype(np.float32)
+    reach = [min(int(4 * w + 0.5), n) for w, n in zip(width, padded.shape, strict=True)]  # beyond, there is nothing
+    inside = tuple((surfels.voxels + 1).T)
+    outside = tuple((surfels.voxels + own.astype(np.int64) + 1).T)
     gradient = np.empty_like(own)
     for axis in range(3):
         order = [int(a == axis) for a in range(3)]
-        slope = scipy.ndimage.gaussian_filter(padded, width, order=order)
+        slope = scipy.ndimage.gaussian_filter(padded, width, order=order, mode="constant", radius=reach)
         gradient[:, axis] = (slope[inside].astype(np.float64) + slope[outside]) / spacing[axis]
     length = np.linalg.norm(gradient, axis=1, keepdims=True)
     normals = np.divide(-gradient, length, out=own.copy(), where=length > 0)

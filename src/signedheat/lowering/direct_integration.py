@@ -19,6 +19,8 @@ from ..linear.conjugate_gradients import conjugate_gradients
 
 _MAX_ROUNDS = 12
 _MAX_INNER = 30
+SOFTEST, STIFFEST = 1e-10, 1e10
+"""Strengths of springs, relative to C, below and above which their strength makes no difference beyond rounding."""
 BATCH = 32
 """Right-hand sides solved at a time."""
 
@@ -105,8 +107,14 @@ class DirectIntegration(Frozen):
         return self._centered(fitted[:, 0], source)
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
-        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements of the samples."""
-        rows = source.interpolation
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements of the samples.
+
+        λ → 0 is the solution of Eq. 13, and what exceeds λ = ∞ by less than rounding is solved as well as that.
+        """
+        rows, stiffest = source.interpolation, float(self.stiffness.diagonal().max())
+        if strength * float(source.weights.sum()) < SOFTEST * stiffest:
+            return self.solve(divergence, source)
+        strength = min(strength, STIFFEST * stiffest / float(source.weights.max()))
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
 
     def anchored(self, source: SourceTerm) -> Factor:

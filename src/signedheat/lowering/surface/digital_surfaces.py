@@ -7,6 +7,7 @@ import numpy as np
 from ...discretization import discretize
 from ...domains.digital_surface import DigitalSurface
 from ...geometry.intrinsic_mesh import IntrinsicMesh
+from ...geometry.mollification import mollify
 from ...geometry.surfels import flattened_sides, separated_edges
 from .discretization import SurfaceDiscretization
 
@@ -22,10 +23,11 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
     around = np.stack([np.zeros_like(first), first, first + last, last], axis=1)
     middle = np.broadcast_to(0.5 * (first + last)[:, None], around.shape)
     corners = np.stack([around, np.roll(around, -1, axis=1), middle], axis=2).reshape(-1, 3, 3)
-    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    lengths, _ = mollify(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2), 1e-6)
     mesh = domain.triangulation
     edges = separated_edges(mesh.edges, domain.surfels)
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
-    spacing = max(0.5 * domain.radius, float(domain.spacing.mean()))
+    extent = float((domain.bounds[1] - domain.bounds[0]).max())
+    spacing = max(min(0.5 * domain.radius, extent), float(domain.spacing.mean()))
     own = np.arange(domain.n_vertices)
     return SurfaceDiscretization(domain, triangles, restriction=own, positions=corners, spacing=spacing)

@@ -17,10 +17,9 @@ from ...diagnostics import EdgesLengthened, LargeAngles, Note, VerticesAdded
 from ...discretization import discretize
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
-from ...errors import GeometryError
 from ...geometry.intrinsic.conforming_refinement import refine_to_conform
 from ...geometry.intrinsic_mesh import IntrinsicMesh
-from ...geometry.mollification import mollify
+from ...geometry.mollification import laid_out
 from ...linear import elimination_order, factorize
 from ...operators.cotan import cotan_matrix, divergence
 from ..direct_integration import DirectIntegration
@@ -162,12 +161,7 @@ class SurfaceDiscretization:
 
 @discretize.register
 def _(domain: TriangleMesh) -> SurfaceDiscretization:
-    lengths, added = mollify(domain.edge_lengths[domain.edges.face_edges], 1e-6)
-    if not lengths.max() > 0:
-        raise GeometryError(
-            "all edges of the mesh have length zero: it has no area to measure distance on", element="edges"
-        )
-    triangles = IntrinsicMesh.from_lengths(domain.faces, lengths, domain.n_vertices, domain.edges)
+    triangles, added = laid_out(domain, 1e-6)
     share = large_angles(triangles)
     notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))
     return SurfaceDiscretization(domain, triangles, notes=notes)

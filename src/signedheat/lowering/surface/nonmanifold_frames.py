@@ -51,6 +51,8 @@ def nonmanifold_frames(
     if table.face_counts.max(initial=0) <= 2:
         return triangles, groups
     parts = [part for group in groups for part in group]
+    if not parts:
+        return triangles, groups
     distance = from_sources(triangles, parts)
     holds = np.zeros(triangles.n_faces, dtype=bool)
     holds[np.concatenate([part.faces[part.edges < 0] for part in parts])] = True

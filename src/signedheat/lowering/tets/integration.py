@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...discretization import Levels, SourceTerm
-from ..direct_integration import BATCH, DirectIntegration
+from ..direct_integration import BATCH, STIFFEST, DirectIntegration
 
 PIN = 1e6
 """Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
@@ -74,6 +74,7 @@ class TetIntegration(DirectIntegration):
 
     def penalize(self, divergence: NDArray[np.float64], source: SourceTerm, strength: float) -> NDArray[np.float64]:
         """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), where A φ is corrected for the curvature of φ."""
+        strength = min(strength, STIFFEST * float(self.stiffness.diagonal().max()) / float(source.weights.max()))
         free = super().penalize(divergence, source, strength)
         pull = source.interpolation.T @ (strength * source.weights * self._quadratic_correction(free, source))
         return super().penalize(divergence - pull, source, strength)

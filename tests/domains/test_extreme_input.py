@@ -1,0 +1,149 @@
+"""Numbers of extreme size, nonsense instead of numbers, shapes without area: a right answer or one clear refusal."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.surface_cases import sphere
+from signedheat import samples
+
+BALL = samples.sphere(1)
+NONSENSE = [
+    None,
+    "three",
+    b"abc",
+    object(),
+    1 + 2j,
+    {},
+    [[1, 2, 3], [4, 5]],
+    [["a", "b", "c"]],
+    np.zeros((2, 3), dtype=complex),
+    np.zeros((2, 3), dtype="datetime64[s]"),
+    np.array([[1, 2, object()]], dtype=object),
+    np.ma.masked_array(np.zeros((2, 3)), mask=True),
+    np.zeros(3, dtype=[("a", float)]),
+    [[10**400, 0, 0]],
+    iter([1, 2]),
+]
+
+
+@pytest.fixture(autouse=True)
+def no_warnings():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+@pytest.mark.parametrize("scale", [1e150, 1e300, 1e-150, 1e-300])
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda s: sh.TriangleMesh(s * BALL.vertices, BALL.faces),
+        lambda s: sh.PolygonMesh(s * BALL.vertices, BALL.faces.tolist()),
+        lambda s: sh.PointCloud(s * BALL.vertices),
+        lambda s: sh.TetMesh(s * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]]), [[0, 1, 2, 3]]),
+        lambda s: sh.Polyline([[0, 0], [s, s]]),
+        lambda s: sh.Grid((0, 0, 0), s, (4, 4, 4)),
+        lambda s: sh.DigitalSurface(np.ones((2, 2, 2), dtype=bool), spacing=s),
+    ],
+)
+def test_sizes_beyond_computing_are_refused(make, scale):
+    with pytest.raises(sh.GeometryError) as caught:
+        make(scale)
+    assert caught.value.remedy or f"{scale:g}" in caught.value.cause
+
+
+@pytest.mark.parametrize("scale", [1e30, 1e12, 1e-12, 1e-30])
+def test_sizes_within_give_the_same_distances(scale):
+    mesh = sh.TriangleMesh(scale * BALL.vertices, BALL.faces)
+    ring = BALL.level_set(BALL.vertices[:, 2], 0.1)
+    one, other = sh.signed_distance(ring, BALL), sh.signed_distance(ring, mesh)
+    np.testing.assert_allclose(other.values / scale, one.values, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("thing", NONSENSE, ids=repr)
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda x: sh.TriangleMesh(x, BALL.faces),
+        lambda x: sh.TriangleMesh(BALL.vertices, x),
+        lambda x: sh.PolygonMesh(x, [[0, 1, 2]]),
+        lambda x: sh.PolygonMesh(BALL.vertices, x),
+        lambda x: sh.PointCloud(x),
+        lambda x: sh.PointCloud(BALL.vertices, normals=x) if x is not None else sh.PointCloud(x),
+        lambda x: sh.TetMesh(x, [[0, 1, 2, 3]]),
+        lambda x: sh.TetMesh(BALL.vertices, x),
+        lambda x: sh.Polyline(x),
+        lambda x: sh.Grid(x, 1.0, (4, 4)),
+        lambda x: sh.Grid((0, 0), x, (4, 4)),
+        lambda x: sh.Grid((0, 0), 1.0, x),
+        lambda x: sh.Grid.around(x),
+        lambda x: sh.DigitalSurface(x),
+        lambda x: sh.DigitalSurface(np.ones((2, 2, 2), dtype=bool), spacing=x),
+        lambda x: sh.Curve(x, [[1, 0, 0], [0, 1, 0]]),
+        lambda x: sh.Curve([0, 0], x),
+        lambda x: sh.SurfacePoints(x, [[1, 0, 0]]),
+        lambda x: sh.SurfacePoints([0], x),
+        lambda x: BALL.path(x),
+        lambda x: BALL.polyline(x),
+        lambda x: BALL.level_set(x),
+        lambda x: BALL.region_boundary(x),
+    ],
+)
+def test_what_holds_no_numbers_is_refused(make, thing):
+    with pytest.raises(sh.SignedHeatError) as caught:
+        make(thing)
+    assert len(caught.value.cause) > 15
+
+
+@pytest.mark.parametrize("radius", [5.0, 1e3, 1e9, 1e30])
+def test_wide_neighbourhoods_of_voxels_cost_no_memory(radius):
+    """Normals under a blur much wider than the shape tend to those of its first moments."""
+    index = np.stack(np.indices((9, 9, 9)), axis=-1) - 4.0
+    surface = sh.DigitalSurface(np.linalg.norm(index, axis=-1) < 4, radius=radius)
+    outward = surface.vertices[surface.surfels.corners].mean(axis=1)
+    outward -= outward.mean(axis=0)
+    assert ((surface.normals * outward).sum(axis=1) / np.linalg.norm(outward, axis=1)).min() > 0.9
+    field = sh.signed_distance(surface.points_at(0), surface)
+    assert np.isfinite(field.values).all()
+
+
+def test_anisotropic_voxels_need_no_cube_of_padding():
+    surface = sh.DigitalSurface(np.ones((3, 3, 3), dtype=bool), spacing=(1.0, 1e-3, 1e-3), radius=4.0)
+    assert np.isfinite(surface.normals).all()
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: sh.DigitalSurface(np.ones((2, 2, 2), bool)), lambda: sh.PointCloud(BALL.vertices)]
+)
+def test_level_sets_need_a_value_for_each_vertex(make):
+    surface = make()
+    with pytest.raises(sh.SourceError):
+        surface.level_set(np.zeros(surface.n_vertices + 1))
+
+
+@pytest.mark.parametrize("points", [np.ones((3, 3)), [[0, 0, 0], [1, 0.1, 0.3], [2, 0.2, 0.6]], np.eye(3) + 1e18])
+def test_no_distance_without_area(points):
+    mesh = sh.TriangleMesh(points, [[0, 1, 2]])
+    for use in (
+        lambda: sh.SignedHeatSolver(mesh).distance(mesh.points_at(0)),
+        lambda: sh.SignedHeatSolver(mesh, intrinsic=True).distance(mesh.points_at(0)),
+        lambda: mesh.polyline([points[0], points[1]]),
+    ):
+        with pytest.raises(sh.GeometryError):
+            use()
+
+
+def test_weights_of_soft_constraints_have_limits_on_both_ends():
+    mesh = sphere(2)
+    ring = mesh.level_set(mesh.vertices[:, 2], 0.15)
+    solver = sh.SignedHeatSolver(mesh)
+    free, held = solver.distance(ring, sh.Free()).values, solver.distance(ring, sh.ZeroSet(hard=True)).values
+    for weak in (1e-300, 1e-12):
+        np.testing.assert_allclose(solver.distance(ring, sh.Soft(weak)).values, free, atol=1e-8)
+    for strong in (1e12, 1e300):
+        np.testing.assert_allclose(solver.distance(ring, sh.Soft(strong)).values, held, atol=1e-5)
