@@ -165,6 +165,31 @@ class SharpenedToShape(Note):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class SharpenedToCurves(Note):
+    """What a field sharpened to curves was measured to, and how its sides were told.
+
+    Attributes
+    ----------
+    completed_length : float
+        Fraction of what distance is measured to that is zero set of φ, standing in for missing curve.
+    free_ends : int
+        Ends of oriented curves, but for those at the boundary of the surface, and points where curves run head to head.
+    sides_by_curves : float
+        Fraction of the vertices whose side the curves tell by themselves; φ tells that of the others.
+    """
+
+    completed_length: float
+    free_ends: int
+    sides_by_curves: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.completed_length:.1%} of the curve completed between {self.free_ends} free ends; "
+            f"curves tell the side of {self.sides_by_curves:.1%} of the vertices"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class OrientedPoints(Note):
     """Number of normals of a point cloud that were fitted, and that were turned."""
 

@@ -31,6 +31,7 @@ from .errors import (
 )
 from .extensions.close_curves import close_curves
 from .extensions.common_subdivision import common_subdivision
+from .extensions.curve_distance import curve_distance
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.orientation import Orientation, orient, orientation
 from .extensions.piecewise import piecewise_distance
@@ -108,6 +109,7 @@ __all__ = [
     "close_curves",
     "closing",
     "common_subdivision",
+    "curve_distance",
     "dilate",
     "erode",
     "intrinsic_delaunay",

@@ -10,7 +10,10 @@ import signedheat as sh
 from refusals import refused
 from signedheat.diagnostics import ConvexRounds, SlopeErrors
 from signedheat.discretization import discretize
-from signedheat.geometry.geodesics.exact import distance_to_edges_and_points, distance_to_zero_line
+from signedheat.geometry.curve_segments import CurveSegments
+from signedheat.geometry.geodesics.exact import distance_to_segments, distance_to_zero_line
+from signedheat.geometry.geodesics.sources import PlacedSegments
+from signedheat.geometry.surface_points import points_at_vertices
 from signedheat.samples import sphere, torus
 
 
@@ -99,14 +102,12 @@ def test_no_vertex_is_lost_between_merged_windows():
 
     shape = trimesh.creation.capsule(1, 0.3)
     triangles = discretize(sh.TriangleMesh(shape.vertices, shape.faces)).triangles
-    none, edge = np.empty(0, dtype=int), triangles.edge_lengths.mean()
+    edge = triangles.edge_lengths.mean()
     for seed in (3, 7, 11, 15, 21):
         rng = np.random.default_rng(seed)
         points = rng.integers(0, triangles.n_vertices, rng.integers(1, 9))
-        exact, fast = (
-            distance_to_edges_and_points(triangles, none, points, none, np.empty(0, complex), tolerance)[0]
-            for tolerance in (0.0, 1e-4)
-        )
+        source = PlacedSegments.of(triangles, [CurveSegments.of_points(points_at_vertices(triangles, points))])
+        exact, fast = (distance_to_segments(triangles, [source], tolerance)[0] for tolerance in (0.0, 1e-4))
         assert np.abs(fast - exact).max() < 0.01 * edge
 
 

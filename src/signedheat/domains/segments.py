@@ -80,10 +80,7 @@ def _(source: CurveSegments, triangles: IntrinsicMesh, positions: Positions = No
 @segments_of.register
 def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
     located = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
-    none = np.empty(0, dtype=np.int64)
-    return CurveSegments(
-        located[unique_points(located)[0]], np.empty((0, 2), np.int64), none, none, np.empty(0, complex), False
-    )
+    return CurveSegments.of_points(located[unique_points(located)[0]])
 
 
 @segments_of.register

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics, Note, SlopeErrors
 from ..discretization import Discretization, SourceTerm
+from ..domains.curves import CurvesAndPoints
 from ..domains.grid import Dimension
 from ..domains.kinds import Shapes
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
@@ -41,6 +42,7 @@ class Method(Protocol):
 
 
 AnyField = TypeVar("AnyField", bound=VertexField | TetField)
+OnSurface = TypeVar("OnSurface", bound=VertexField)
 
 
 @overload
@@ -53,11 +55,13 @@ def sharpen(
     progress: Progress | None = None,
 ) -> GridField[Dimension]: ...
 @overload
+def sharpen(field: OnSurface, curves: CurvesAndPoints, *, progress: Progress | None = None) -> OnSurface: ...
+@overload
 def sharpen(field: AnyField, method: Method | None = None, progress: Progress | None = None) -> AnyField: ...
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
 def sharpen(field: Field, *arguments: object, **options: object) -> Field:
-    """Replace a field by the distance to its own zero set, or to the shape that it was computed from (Sec. 7.3).
+    """Replace a field by the distance to its own zero set, or to what it was computed from (Sec. 7.3).
 
     On grids: the distance of every node to the zero set, second order, with the signs of the field. With a ``shape``:
     exact distance to the faces of the shape where they are, and to the zero set where it is farther than 1.5 cells from
@@ -68,8 +72,11 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     fitted: the zero set is moved onto a smooth surface through them.
 
     On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
-    smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. On tets:
-    distance along straight lines in space, which bend around the boundary of the mesh.
+    smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With
+    ``curves``: exact distance to the curves and points themselves, however they cross the faces. In regions that curves
+    bound, these tell the side; elsewhere the field does, and its zero set stands in for missing curve where it is
+    farther from any curve than the triangles are large, or begins at the free end of one. On tets: distance along
+    straight lines in space, which bend around the boundary of the mesh.
 
     On surfaces and tets ``method=Convex()`` is the method of the paper, which is less accurate but can correct wrong
     signs. On tets it usually increases the error: gradients of length at most one in every tet make the field too
@@ -83,6 +90,8 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
         On grids in space: what the field was computed from, oriented, and without parts inside others.
     fit : "auto", "exact" or "smooth"
         With a shape: whether to tell layers from shape, to measure to every face, or to the zero set alone.
+    curves : Curve, SurfacePoints or a sequence of them, optional
+        On surfaces: what the field was computed from.
     sides : (*grid.shape) float, optional
         With a shape: values whose signs and zero set take the place of the field's.
     method : Geodesic or Convex, optional
@@ -94,9 +103,9 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     -------
     GridField, VertexField or TetField
         The same kind of field. Sharpened to a shape, it has a `confidence`, contours whose vertices lie on the level
-        exactly, and ``diagnostics`` with a note `diagnostics.SharpenedToShape`. On surfaces and tets ``diagnostics``
-        has a note `diagnostics.SlopeErrors`, the root mean squares of ``|∇φ| − 1`` over the domain before and after,
-        and notes of the method.
+        exactly, and ``diagnostics`` with a note `diagnostics.SharpenedToShape`; sharpened to curves, a note
+        `diagnostics.SharpenedToCurves`. On surfaces and tets ``diagnostics`` has a note `diagnostics.SlopeErrors`, the
+        root mean squares of ``|∇φ| − 1`` over the domain before and after, and notes of the method.
 
     Raises
     ------

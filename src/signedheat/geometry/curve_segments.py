@@ -42,6 +42,12 @@ class CurveSegments:
     vectors: NDArray[np.complex128]
     oriented: bool
 
+    @classmethod
+    def of_points(cls, nodes: LocatedPoints) -> CurveSegments:
+        """Isolated points as a source without segments."""
+        none = np.empty(0, dtype=np.int64)
+        return cls(nodes, np.empty((0, 2), dtype=np.int64), none, none, np.empty(0, dtype=np.complex128), False)
+
     @cached_property
     def lengths(self) -> NDArray[np.float64]:
         """(k,) length of each segment."""

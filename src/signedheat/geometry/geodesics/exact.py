@@ -10,7 +10,7 @@ stays in proportion to the number of faces.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -19,8 +19,9 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..intrinsic_mesh import IntrinsicMesh
-from .initial_windows import MADE, WANTED, Faces, GeodesicSources, Search
+from .initial_windows import MADE, WANTED, Faces, Search
 from .propagation_kernels import ROUND, continue_search, start_search
+from .sources import GeodesicSources, PlacedSegments, zero_line
 
 WINDOWS_PER_HALFEDGE = 300
 """A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual."""
@@ -29,7 +30,6 @@ Report: TypeAlias = Callable[[], None]
 """Called every tenth of a second or so; an exception that it raises ends the search."""
 
 _CHUNK = 1 << 16
-_NO_ID, _NO_POINT = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.complex128)
 
 
 def distance_to_zero_line(
@@ -57,35 +57,30 @@ def distance_to_zero_line(
         some distances are lengths of paths that run along edges from where it ended.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
-    sources = GeodesicSources(values, _NO_ID, _NO_ID, _NO_ID, _NO_POINT)
-    return _distances(triangles, is_pseudosource(triangles), sources, tolerance, report)
+    return distance_to_segments(triangles, [zero_line(triangles, values)], tolerance, report)
 
 
-def distance_to_edges_and_points(
+def distance_to_segments(
     triangles: IntrinsicMesh,
-    edges: NDArray[np.int64],
-    vertices: NDArray[np.int64],
-    faces: NDArray[np.int64],
-    positions: NDArray[np.complex128],
+    placed: Sequence[PlacedSegments],
     tolerance: float = 1e-4,
     report: Report | None = None,
 ) -> tuple[NDArray[np.float64], int]:
-    """Distance of every vertex to some edges, vertices, and points inside faces; and the number of windows.
-
-    Points are given by their faces and their `positions` in the layouts of these; a point on an edge has to be given in
-    every face at the edge. For the rest see `distance_to_zero_line`.
+    """Distance of every vertex to segments and points: inside faces, along edges, at vertices; for the rest see above.
 
     Examples
     --------
+    >>> from signedheat.geometry.curve_segments import CurveSegments
+    >>> from signedheat.geometry.surface_points import points_at_vertices
     >>> triangles = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3)
-    >>> none = np.empty(0, dtype=np.int64)
-    >>> distance_to_edges_and_points(triangles, none, np.array([1]), none, np.empty(0, complex))[0].tolist()
+    >>> point = CurveSegments.of_points(points_at_vertices(triangles, np.array([1])))
+    >>> distance_to_segments(triangles, [PlacedSegments.of(triangles, [point])])[0].tolist()
     [4.0, 0.0, 5.0]
     """
+    each = [part.sources(triangles) for part in placed]
+    sources = GeodesicSources(*(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
     pseudosources = is_pseudosource(triangles)
-    ends = np.concatenate([np.asarray(vertices, dtype=np.int64), triangles.edges.vertices[edges].ravel()])
-    pseudosources[ends] = True
-    sources = GeodesicSources(np.ones(triangles.n_vertices), edges, ends, faces, positions)
+    pseudosources[sources.vertices] = True
     return _distances(triangles, pseudosources, sources, tolerance, report)
 
 

@@ -1,4 +1,4 @@
-"""Kernels: sources of exact distance on a polyhedral surface, and their initial windows."""
+"""Kernels: the initial windows of exact distance on a polyhedral surface."""
 
 from __future__ import annotations
 
@@ -46,16 +46,6 @@ class Faces(NamedTuple):
             np.argsort(at_vertex, kind="stable"),
             np.concatenate([[0], np.cumsum(vertex_counts)]),
         )
-
-
-class GeodesicSources(NamedTuple):
-    """Where distance is zero: on the zero set of vertex values, on edges, at vertices, and at points inside faces."""
-
-    values: NDArray[np.float64]
-    edges: NDArray[np.int64]
-    vertices: NDArray[np.int64]
-    faces: NDArray[np.int64]
-    positions: NDArray[np.complex128]
 
 
 class Search(NamedTuple):
@@ -172,22 +162,6 @@ def propagate_across(faces, search, face, side, kind, t0, t1, point, normal, sig
 
 
 @compiled(nogil=True)
-def _segment(faces, values, face):
-    """Whether the zero set crosses a face, the two sides that it crosses, and where."""
-    first, second, start, end = -1, -1, 0j, 0j
-    for side in range(3):
-        a, b = values[faces.vertices[face, side]], values[faces.vertices[face, (side + 1) % 3]]
-        if (a < 0.0 < b) or (b < 0.0 < a):
-            t = a / (a - b)
-            place = faces.positions[face, side] * (1.0 - t) + faces.positions[face, (side + 1) % 3] * t
-            if first < 0:
-                first, start = side, place
-            else:
-                second, end = side, place
-    return second >= 0 and abs(end - start) > 0.0, first, second, start, end
-
-
-@compiled(nogil=True)
 def _reach_corners(faces, distance, face, start, end):
     """Distance of the corners of a face to a segment or a point in it."""
     along = end - start
@@ -199,15 +173,18 @@ def _reach_corners(faces, distance, face, start, end):
 
 
 @compiled(nogil=True)
-def _first_beam(faces, search, face, start, end, normal, slack):
-    """Parallel beam from a segment in a face, along one of its normals, to the sides of the face that it meets."""
+def _first_beam(faces, search, face, start, end, slack):
+    """Parallel beam from a segment in a face, to the left of it, to the sides of the face that it meets."""
     along = (end - start) / abs(end - start)
+    normal = 1j * along
     for side in range(3):
         a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
         foot = ((a - start) * along.conjugate()).real
         rate = ((b - a) * along.conjugate()).real
         height = ((a - start) * normal.conjugate()).real
         climb = ((b - a) * normal.conjugate()).real
+        if abs(height) + abs(climb) <= 1e-9 * abs(b - a):  # the segment lies on this side, and the beam leaves it
+            continue
         t0, t1 = clip(0.0, 1.0, -foot, -rate)
         t0, t1 = clip(t0, t1, foot - abs(end - start), rate)
         t0, t1 = clip(t0, t1, -height, -climb)
@@ -218,77 +195,36 @@ def _first_beam(faces, search, face, start, end, normal, slack):
 
 
 @compiled(nogil=True)
-def _first_fan(faces, values, search, face, side, point, other, slack):
-    """Circular waves from the end of a segment, between its beam and the beam of the next segment, across the side."""
-    here = (other - point) / abs(other - point)
-    edge = faces.edges[face, side]
-    alone = faces.first_halfedge[edge + 1] - faces.first_halfedge[edge] == 1
-    for k in range(faces.first_halfedge[edge], faces.first_halfedge[edge + 1]):
-        beyond, there = faces.halfedges[k] // 3, faces.halfedges[k] % 3
-        if beyond == face and not alone:
+def _first_fan(faces, search, face, point, first, second, slack):
+    """Circular waves from a point in a face, in directions of more than 90° from two given ones."""
+    for side in range(3):
+        a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
+        if ((point - a) * (1j * (b - a)).conjugate()).real <= 1e-9 * abs(b - a) ** 2:  # the point lies on this side
             continue
-        # the fan in this face: between the beam of its own segment and that of the face beyond, unfolded next to it
-        back = here
-        if not alone:
-            _, one, _, p, q = _segment(faces, values, beyond)
-            back = q - p if one == there else p - q
-            back /= abs(back)
-            a, b = faces.positions[beyond, there], faces.positions[beyond, (there + 1) % 3]
-            back *= (b - a).conjugate() / abs(b - a)
-            same = faces.forward[beyond, there] == faces.forward[face, side]
-            back = back.conjugate() if same else -back
-            a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
-            back *= (b - a) / abs(b - a)
-        for step in range(1, 3):
-            far = (side + step) % 3
-            a, b = faces.positions[face, far], faces.positions[face, (far + 1) % 3]
-            t0, t1 = clip(0.0, 1.0, ((a - point) * here.conjugate()).real, ((b - a) * here.conjugate()).real)
-            t0, t1 = clip(t0, t1, ((a - point) * back.conjugate()).real, ((b - a) * back.conjugate()).real)
-            if t1 > t0:
-                propagate_across(
-                    faces, search, face, far, POINT, t0, t1, point, 0j, 0.0, slack
-                )  # fmt: skip
+        t0, t1 = clip(0.0, 1.0, ((a - point) * first.conjugate()).real, ((b - a) * first.conjugate()).real)
+        t0, t1 = clip(t0, t1, ((a - point) * second.conjugate()).real, ((b - a) * second.conjugate()).real)
+        if t1 > t0:
+            propagate_across(
+                faces, search, face, side, POINT, t0, t1, point, 0j, 0.0, slack
+            )  # fmt: skip
 
 
 @compiled(nogil=True)
 def initial_windows(faces, sources, search, slack):
     """Set distances at the corners of faces with sources, then make the initial windows."""
-    for face in range(len(faces.vertices)):
-        crossed, _, _, start, end = _segment(faces, sources.values, face)
-        if crossed:
-            _reach_corners(faces, search.distance, face, start, end)
-    for edge in sources.edges:
-        for k in range(faces.first_halfedge[edge], faces.first_halfedge[edge + 1]):
-            face, side = faces.halfedges[k] // 3, faces.halfedges[k] % 3
-            _reach_corners(
-                faces, search.distance, face, faces.positions[face, side], faces.positions[face, (side + 1) % 3]
-            )  # fmt: skip
-    for i in range(len(sources.faces)):
-        _reach_corners(faces, search.distance, sources.faces[i], sources.positions[i], sources.positions[i])
     for v in sources.vertices:
         search.distance[v] = 0.0
-
-    for face in range(len(faces.vertices)):
-        crossed, first, second, start, end = _segment(faces, sources.values, face)
-        if crossed:
-            normal = 1j * (end - start) / abs(end - start)
-            _first_beam(faces, search, face, start, end, normal, slack)
-            _first_beam(faces, search, face, start, end, -normal, slack)
-            for side, point, other in ((first, start, end), (second, end, start)):
-                _first_fan(
-                    faces, sources.values, search, face, side, point, other, slack
-                )  # fmt: skip
-    for edge in sources.edges:
-        for k in range(faces.first_halfedge[edge], faces.first_halfedge[edge + 1]):
-            face, side = faces.halfedges[k] // 3, faces.halfedges[k] % 3
-            start, end = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
-            normal = 1j * (end - start) / abs(end - start)  # faces lie to the left of their sides
-            _first_beam(faces, search, face, start, end, normal, slack)
-    for i in range(len(sources.faces)):
-        face, point = sources.faces[i], sources.positions[i]
-        for side in range(3):
-            a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
-            if ((point - a) * (1j * (b - a)).conjugate()).real > 1e-9 * abs(b - a) ** 2:  # not on that side
-                propagate_across(
-                    faces, search, face, side, POINT, 0.0, 1.0, point, 0j, 0.0, slack
-                )  # fmt: skip
+    for i in range(len(sources.beam_faces)):
+        _reach_corners(faces, search.distance, sources.beam_faces[i], sources.beam_starts[i], sources.beam_stops[i])
+    for i in range(len(sources.fan_faces)):
+        _reach_corners(faces, search.distance, sources.fan_faces[i], sources.fan_points[i], sources.fan_points[i])
+    for i in range(len(sources.beam_faces)):
+        _first_beam(
+            faces, search, sources.beam_faces[i], sources.beam_starts[i], sources.beam_stops[i],
+            slack,
+        )  # fmt: skip
+    for i in range(len(sources.fan_faces)):
+        _first_fan(
+            faces, search, sources.fan_faces[i], sources.fan_points[i], sources.fan_firsts[i],
+            sources.fan_seconds[i], slack,
+        )  # fmt: skip

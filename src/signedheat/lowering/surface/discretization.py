@@ -17,6 +17,7 @@ from ...diagnostics import EdgesLengthened, LargeAngles, Note, VerticesAdded
 from ...discretization import discretize
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
+from ...geometry.curve_segments import CurveSegments
 from ...geometry.intrinsic.conforming_refinement import refine_to_conform
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import laid_out
@@ -82,16 +83,20 @@ class SurfaceDiscretization:
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
+        groups = self.segments(sources)
+        triangles, groups = refine_to_conform(self.triangles, groups)
+        surface = self if triangles is self.triangles else self._cut_into(triangles)
+        triangles, groups = nonmanifold_frames(triangles, groups)
+        return surface._turned_to(triangles), groups
+
+    def segments(self, sources: Sequence[Any]) -> list[list[CurveSegments]]:
+        """The sources, given on the domain, as segments on the triangles."""
         if self.transfer is not None:
             sources = [self.transfer(source) for source in sources]
         positions = self.positions
         if positions is None and self.transfer is None:
             positions = self.domain.triangulation.vertices
-        groups = segments_of_each(sources, self.triangles, positions)
-        triangles, groups = refine_to_conform(self.triangles, groups)
-        surface = self if triangles is self.triangles else self._cut_into(triangles)
-        triangles, groups = nonmanifold_frames(triangles, groups)
-        return surface._turned_to(triangles), groups
+        return segments_of_each(sources, self.triangles, positions)
 
     def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
         """The same surface with other first faces at nonmanifold edges; shares all of step 3, which ignores them."""

@@ -1,0 +1,191 @@
+"""Sharpening to curves: exact distance where they are there, a zero set where they are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..diagnostics import GeodesicWindows, Note, SharpenedToCurves
+from ..discretization import Discretization, SourceTerm
+from ..errors import InexactWarning, warn_user
+from ..geometry.components import connected_components
+from ..geometry.curve_segments import CurveSegments
+from ..geometry.curve_sides import CurveSides, curve_sides
+from ..geometry.geodesics.exact import Report, cleared, distance_to_segments, window_limit
+from ..geometry.geodesics.sources import PlacedSegments, zero_line
+from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.surface_points import incident_faces
+from ..lowering.surface.discretization import SurfaceDiscretization
+from ..operators.linear_elements import LinearElements
+from ..progress import Progress
+
+FAR = 1.0
+"""Triangle sizes: what the zero set has farther from any curve stands in for missing curve."""
+
+HALO = 4.0
+"""Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class CurvesThere:
+    """The curves on the triangles of a surface, and exact distance to them.
+
+    Attributes
+    ----------
+    placed : PlacedSegments
+        All of them.
+    distance : (n,) float
+        Of every vertex to them.
+    sides : CurveSides
+        What the oriented ones tell.
+    windows : int
+        A measure of the work.
+    """
+
+    placed: PlacedSegments
+    distance: NDArray[np.float64]
+    sides: CurveSides
+    windows: int
+
+    @classmethod
+    def on(
+        cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], tolerance: float, report: Report | None
+    ) -> CurvesThere:
+        """Measure to curves and points."""
+        placed = PlacedSegments.of(triangles, parts)
+        distance, windows = distance_to_segments(triangles, [placed], tolerance, report)
+        return cls(placed, distance, curve_sides(triangles, placed), windows)
+
+
+@dataclass(frozen=True, eq=False)
+class ToCurves:
+    """A method of sharpening: distance to curves and points, and to the zero set of φ where oriented ones are missing.
+
+    1. Exact distance to the curves themselves.
+    2. Sides: in regions that curves bound, and at vertices beside a curve, the curve tells; elsewhere φ does.
+    3. The zero set of φ, in regions that no curve bounds, where it is farther from any curve than the triangles there
+       are large, or beyond the free end of one: it stands in for missing curve.
+    4. The smaller of both distances, with the sides of 2.
+
+    Attributes
+    ----------
+    parts : sequence of CurveSegments
+        The curves and points, on the triangles of the field.
+    tolerance : float
+        As that of `Geodesic`.
+    """
+
+    parts: Sequence[CurveSegments]
+    tolerance: float = 1e-4
+
+    def sharpened(
+        self,
+        discretization: Discretization,
+        elements: LinearElements,
+        values: NDArray[np.float64],
+        source: SourceTerm | None,
+        progress: Progress | None,
+    ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+        """Distances with the signs of the curves and of φ."""
+        assert isinstance(discretization, SurfaceDiscretization)
+        triangles, spacing = discretization.triangles, discretization.spacing
+        report = None if progress is None else lambda: progress(0.0, "sharpen")
+        return sharpened_to_curves(triangles, values, self.parts, spacing, self.tolerance, report)
+
+
+def sharpened_to_curves(
+    triangles: IntrinsicMesh,
+    values: NDArray[np.float64],
+    parts: Sequence[CurveSegments],
+    spacing: float,
+    tolerance: float,
+    report: Report | None,
+) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+    """The steps of `ToCurves`."""
+    there = CurvesThere.on(triangles, parts, tolerance, report)
+    distance, counts = there.distance, [there.windows]
+    if not any(part.oriented for part in parts):
+        return np.where(np.isnan(values), np.nan, distance), (told(triangles, *counts),)
+    sides, known = there.sides, there.sides.regions != 0
+    beside = sides.reach <= distance * (1 + 1e-9)
+    side = np.where(known, sides.regions, np.where(beside, sides.nearby, 0))
+    values = np.where((side != 0) & (np.sign(values) != side), side * distance, values)
+    missing, more = missing_parts(triangles, values, parts, there, spacing, tolerance, report)
+    counts += more
+    completed = float(missing.lengths.sum())
+    if completed > 0:
+        to_missing, windows = distance_to_segments(triangles, [missing], tolerance, report)
+        distance = np.where(known, distance, np.minimum(distance, to_missing))
+        counts.append(windows)
+    there_length = sum(float(part.lengths.sum()) for part in parts)
+    note = SharpenedToCurves(completed / (completed + there_length or 1.0), len(sides.free_ends), float(known.mean()))
+    new = np.copysign(distance, np.where(side != 0, side, values))
+    return np.where(np.isnan(values), np.nan, new), (note, told(triangles, *counts))
+
+
+def missing_parts(
+    triangles: IntrinsicMesh,
+    values: NDArray[np.float64],
+    parts: Sequence[CurveSegments],
+    there: CurvesThere,
+    spacing: float,
+    tolerance: float,
+    report: Report | None,
+) -> tuple[PlacedSegments, list[int]]:
+    """The parts of the zero set of φ that stand in for missing curve; and the number of windows of each search."""
+    size = np.sqrt(2 * triangles.face_areas)
+    corners = triangles.corner_vertices
+    apart = there.distance[corners].mean(axis=1) > FAR * size
+    counts = []
+    if len(there.sides.free_ends):
+        ends = CurveSegments.of_points(there.placed.nodes[there.sides.free_ends])
+        to_ends, windows = distance_to_segments(triangles, [PlacedSegments.of(triangles, [ends])], tolerance, report)
+        counts.append(windows)
+        beyond = to_ends <= there.distance * (1 + 1e-3)
+        apart |= beyond[corners].all(axis=1)
+    apart[there.placed.faces] = False
+    apart &= (there.sides.regions[corners] == 0).any(axis=1)
+    values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
+    unsided = [part for part in parts if not part.oriented]
+    if unsided:
+        near, windows = distance_to_segments(triangles, [PlacedSegments.of(triangles, unsided)], tolerance, report)
+        sided = [incident_faces(triangles, part.nodes)[1] for part in parts if part.oriented]
+        values = without_halos(triangles, values, near < HALO * spacing, corners[np.concatenate(sided)].ravel())
+        counts.append(windows)
+    return zero_line(triangles, values, apart), counts
+
+
+def without_halos(
+    triangles: IntrinsicMesh, values: NDArray[np.float64], beside: NDArray[np.bool_], sided: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Values with NaN along those parts of the zero set that are due to unoriented sources.
+
+    φ is zero at such a source only on average, so it may change sign around it. A connected part of the zero set that
+    lies entirely beside the source, and at no vertex of an oriented curve, is due to the source alone.
+    """
+    signs = np.sign(values)[triangles.corner_vertices]
+    crossed = np.flatnonzero((signs.min(axis=1) < 0) & (signs.max(axis=1) > 0))
+    m, e = len(crossed), triangles.n_edges
+    through = np.roll(signs, -1, axis=1)[crossed] * signs[crossed] < 0
+    face, side = np.nonzero(through)
+    line = connected_components(m + e, face, m + triangles.edges.face_edges[crossed[face], side])[:m]
+    corners = triangles.corner_vertices[crossed]
+    is_sided = np.zeros(len(values), dtype=bool)
+    is_sided[sided] = True
+    own = np.ones(line.max(initial=-1) + 1, dtype=bool)
+    own[line[(~beside[corners] | is_sided[corners]).any(axis=1)]] = False
+    result = values.copy()
+    result[corners[own[line]]] = np.nan
+    answer: NDArray[np.float64] = result
+    return answer
+
+
+def told(triangles: IntrinsicMesh, *counts: int) -> GeodesicWindows:
+    """The note on searches with so many windows, and a warning if one was cut short."""
+    note = GeodesicWindows(sum(counts), cut_short=max(counts) >= window_limit(triangles))
+    if note.cut_short:
+        warn_user(f"exact distance was cut short: {note}", InexactWarning)
+    return note

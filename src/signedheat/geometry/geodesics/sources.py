@@ -1,0 +1,298 @@
+"""Sources of exact distance on a polyhedral surface: beams from segments, and fans from their ends.
+
+The waves that leave a segment are two parallel beams, one to each side, and at its ends circular waves. Of these only
+the fan between the beams of neighbouring segments can be shortest, so that curves of many segments start few windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..curve_segments import CurveSegments
+from ..intrinsic_mesh import IntrinsicMesh
+from ..surface_points import EDGE, FACE, VERTEX, LocatedPoints, barycentric_in, concatenated, unique_points
+
+Mask = NDArray[np.bool_]
+Ids = NDArray[np.int64]
+Points = NDArray[np.complex128]
+
+
+class GeodesicSources(NamedTuple):
+    """Where distance is zero, and the directions in which it grows. Positions are in the layouts of the faces.
+
+    Attributes
+    ----------
+    vertices : (v,) int
+        Vertices at which distance is zero; those of curves among them.
+    beam_faces, beam_starts, beam_stops : (b,) int, complex, complex
+        Segments from which a parallel beam leaves to the left.
+    fan_faces, fan_points, fan_firsts, fan_seconds : (a,) int, complex, complex, complex
+        Points from which circular waves leave, in directions of more than 90° from the first and the second given; 0
+        for none.
+    """
+
+    vertices: Ids
+    beam_faces: Ids
+    beam_starts: Points
+    beam_stops: Points
+    fan_faces: Ids
+    fan_points: Points
+    fan_firsts: Points
+    fan_seconds: Points
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedSegments:
+    """Segments with the positions of their ends in the layouts of faces; unlike nodes, these are never ambiguous.
+
+    Attributes
+    ----------
+    nodes : LocatedPoints
+        (s,) distinct points.
+    ends : (k, 2) int
+        The nodes that each segment joins.
+    faces : (k,) int
+        The face that each segment lies in. A segment along an edge is listed once for every face at the edge.
+    positions : (k, 2) complex
+        Of both ends, in the layout of the face; along an edge in the direction that has the face to its left.
+    along_edge : (k,) bool
+        Whether the segment runs along an edge of its face.
+    sides : (k,) int
+        1 where φ grows to the left of the segment, −1 where it grows to the right, 0 where it does so on both sides.
+    given : (k,) int
+        Index of the segment among those given.
+    """
+
+    nodes: LocatedPoints
+    ends: Ids
+    faces: Ids
+    positions: Points
+    along_edge: Mask
+    sides: Ids
+    given: Ids
+
+    @classmethod
+    def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> PlacedSegments:
+        """Place the segments of curves that run as they like: across faces, along edges and through vertices."""
+        located = concatenated([part.nodes for part in parts])
+        first, who = unique_points(located)
+        offsets = np.cumsum([0] + [len(part.nodes) for part in parts[:-1]])
+        ends = who[np.concatenate([part.ends + offset for part, offset in zip(parts, offsets, strict=True)])]
+        faces, edges, vectors = (
+            np.concatenate([getattr(p, name) for p in parts]) for name in ("faces", "edges", "vectors")
+        )
+        oriented = np.concatenate([np.full(len(part.ends), part.oriented) for part in parts])
+        nodes = located[first]
+        placed = cls._inside(triangles, nodes, ends, faces, vectors, oriented, np.flatnonzero(edges < 0))
+        beside = cls._beside(triangles, nodes, ends, edges, vectors, oriented, np.flatnonzero(edges >= 0))
+        return cls(nodes, *(np.concatenate(both) for both in zip(placed, beside, strict=True)))
+
+    @staticmethod
+    def _inside(
+        triangles: IntrinsicMesh,
+        nodes: LocatedPoints,
+        ends: Ids,
+        faces: Ids,
+        vectors: Points,
+        oriented: Mask,
+        rows: Ids,
+    ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
+        ends, faces, vectors = ends[rows], faces[rows], vectors[rows]
+        corners = triangles.corner_positions[faces]
+        positions = np.stack(
+            [(barycentric_in(triangles, faces, nodes[ends[:, k]]) * corners).sum(axis=1) for k in range(2)], axis=1
+        )
+        steps = positions[:, 1] - positions[:, 0]
+        for i in np.flatnonzero(np.abs(np.abs(steps) - np.abs(vectors)) > 1e-6 * np.abs(corners).max(axis=1)).tolist():
+            positions[i] = best_match(triangles, faces[i], nodes, ends[i], abs(vectors[i]))
+            steps[i] = positions[i, 1] - positions[i, 0]
+        sides = np.sign((np.conj(1j * steps) * vectors).real).astype(np.int64) * oriented[rows]
+        return ends, faces, positions, np.zeros(len(rows), dtype=bool), sides, rows
+
+    @staticmethod
+    def _beside(
+        triangles: IntrinsicMesh,
+        nodes: LocatedPoints,
+        ends: Ids,
+        edges: Ids,
+        vectors: Points,
+        oriented: Mask,
+        rows: Ids,
+    ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
+        ends, edges, vectors = ends[rows], edges[rows], vectors[rows]
+        along = np.stack([along_edges(triangles, nodes[ends[:, k]], edges) for k in range(2)], axis=1)
+        loops = triangles.edges.vertices[edges, 0] == triangles.edges.vertices[edges, 1]
+        vertex = nodes.kinds[ends] == VERTEX
+        along[loops & vertex.all(axis=1)] = (0.0, 1.0)
+        for k in range(2):
+            i = np.flatnonzero(loops & vertex[:, k] & ~vertex[:, 1 - k])
+            shares = np.abs(vectors[i]) / triangles.lengths_of_edges[edges[i]]
+            along[i, k] = np.where(np.abs(along[i, 1 - k] - shares) < np.abs(1 - along[i, 1 - k] - shares), 0.0, 1.0)
+        which, halfedges = halfedges_of(triangles, edges)
+        faces, at = halfedges // 3, halfedges % 3
+        forward = triangles.edges.forward[faces, at]
+        along, ends = along[which], ends[which]
+        swapped = (along[:, 1] < along[:, 0]) == forward
+        along[swapped], ends[swapped] = along[swapped, ::-1], ends[swapped, ::-1]
+        positions = on_sides(triangles, faces, at, along)
+        seen = vectors[which]
+        seen = triangles.edge_directions[faces, at] * np.where(triangles.reflected[faces, at], np.conj(seen), seen)
+        sides = np.sign((np.conj(1j * triangles.edge_vectors[faces, at]) * seen).real).astype(np.int64)
+        return ends, faces, positions, np.ones(len(faces), dtype=bool), sides * oriented[rows][which], rows[which]
+
+    @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """(k,) length of each segment."""
+        return np.abs(self.positions[:, 1] - self.positions[:, 0])
+
+    def sources(self, triangles: IntrinsicMesh) -> GeodesicSources:
+        """The waves that leave the segments, and points that no segment ends at."""
+        inside = np.flatnonzero(~self.along_edge)
+        faces = np.concatenate([self.faces, self.faces[inside]])
+        starts = np.concatenate([self.positions[:, 0], self.positions[inside, 1]])
+        stops = np.concatenate([self.positions[:, 1], self.positions[inside, 0]])
+        at_vertex = self.nodes.kinds == VERTEX
+        return GeodesicSources(self.nodes.elements[at_vertex], faces, starts, stops, *self._fans(triangles))
+
+    def _fans(self, triangles: IntrinsicMesh) -> tuple[Ids, Points, Points, Points]:
+        """Fans at nodes inside faces and on edges; at the latter one in every face at the edge."""
+        nodes = self.nodes
+        first, second = self._directions(triangles)
+        inside, on_edge = np.flatnonzero(nodes.kinds == FACE), np.flatnonzero(nodes.kinds == EDGE)
+        which, halfedges = halfedges_of(triangles, nodes.elements[on_edge])
+        faces, k, node = halfedges // 3, halfedges % 3, on_edge[which]
+        turns, over = triangles.edge_directions[faces, k], triangles.reflected[faces, k]
+        home = nodes.elements[inside]
+        points = (nodes.barycentric[inside] * triangles.corner_positions[nodes.faces[inside]]).sum(axis=1)
+        firsts, seconds = (
+            np.concatenate([d[inside], turns * np.where(over, np.conj(d[node]), d[node])]) for d in (first, second)
+        )
+        across = on_sides(triangles, faces, k, nodes.along[node][:, None])[:, 0]
+        return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
+
+    def _directions(self, triangles: IntrinsicMesh) -> tuple[Points, Points]:
+        """(s,) directions of two segments at each node: in the layout of the face, or in the frame of the edge.
+
+        0 for none, and at nonmanifold edges for segments inside faces, as straight on is not one direction there.
+        """
+        nodes, kinds = self.nodes, self.nodes.kinds
+        steps = self.positions[:, 1] - self.positions[:, 0]
+        steps /= np.abs(steps)
+        node, seg = self.ends.T.ravel(), np.tile(np.arange(len(self.ends)), 2)
+        away = np.concatenate([steps, -steps])
+        at_edge = np.flatnonzero(kinds[node] == EDGE)
+        faces, edges = self.faces[seg[at_edge]], nodes.elements[node[at_edge]]
+        places = on_sides(
+            triangles,
+            np.repeat(faces, 3),
+            np.tile(np.arange(3), len(faces)),
+            np.repeat(nodes.along[node[at_edge]], 3)[:, None],
+        )
+        gap = np.abs(places.reshape(-1, 3) - self.positions.T.ravel()[at_edge][:, None])
+        k = np.where(triangles.edges.face_edges[faces] == edges[:, None], gap, np.inf).argmin(axis=1)
+        away[at_edge] = triangles.in_edge_frames(away[at_edge], faces, k)
+        branching = (triangles.edges.face_counts[edges] > 2) & ~self.along_edge[seg[at_edge]]
+        away[at_edge[branching]] = 0
+        row = np.flatnonzero(away != 0)
+        row = row[np.argsort(node[row], kind="stable")]
+        begin = np.searchsorted(node[row], np.arange(len(nodes)))
+        count = np.searchsorted(node[row], np.arange(len(nodes)), side="right") - begin
+        found = np.zeros((2, len(nodes)), dtype=np.complex128)
+        has = count > 0  # the first and the last: of a segment along an edge the two copies say the same
+        found[0, has], found[1, has] = away[row[begin[has]]], away[row[(begin + count - 1)[has]]]
+        return found[0], found[1]
+
+
+def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask | None = None) -> PlacedSegments:
+    """The zero set of a function that is linear in every face, zero at no vertex; NaN where it is not known.
+
+    Parameters
+    ----------
+    triangles : IntrinsicMesh
+        Any surface.
+    values : (n,) float
+        The function at the vertices.
+    among : (m,) bool, optional
+        Faces whose part of the zero set is wanted.
+    """
+    here = values[triangles.corner_vertices]
+    there = np.roll(here, -1, axis=1)
+    through = ((here < 0) & (there > 0)) | ((here > 0) & (there < 0))
+    faces = np.flatnonzero((through.sum(axis=1) == 2) & (True if among is None else among))
+    sides = np.stack([through[faces].argmax(axis=1), 2 - through[faces, ::-1].argmax(axis=1)], axis=1)
+    up = (here[faces, sides[:, 0]] < 0)[:, None]  # the first side goes up, so that the larger values are to the left
+    sides = np.where(up, sides[:, ::-1], sides)
+    edges = triangles.edges.face_edges[faces[:, None], sides]
+    used, first, ends = np.unique(edges, return_index=True, return_inverse=True)
+    tail, head = values[triangles.edges.vertices[used]].T
+    along = tail / (tail - head)
+    at_face, at_side = faces[first // 2], sides.ravel()[first]
+    share = np.where(triangles.edges.forward[at_face, at_side], along, 1 - along)
+    weights = np.zeros((len(used), 3))
+    weights[np.arange(len(used)), at_side] = 1 - share
+    weights[np.arange(len(used)), (at_side + 1) % 3] = share
+    ends = ends.reshape(-1, 2)
+    flat = on_sides(triangles, np.repeat(faces, 2), sides.ravel(), along[ends].reshape(-1, 1))
+    keep = np.flatnonzero(np.abs(np.diff(flat.reshape(-1, 2), axis=1)[:, 0]) > 0)
+    return PlacedSegments(
+        LocatedPoints(at_face, weights, np.full(len(used), EDGE), used, along),
+        ends[keep],
+        faces[keep],
+        flat.reshape(-1, 2)[keep],
+        np.zeros(len(keep), dtype=bool),
+        np.ones(len(keep), dtype=np.int64),
+        np.arange(len(keep)),
+    )
+
+
+def halfedges_of(triangles: IntrinsicMesh, edges: Ids) -> tuple[Ids, Ids]:
+    """All halfedges ``3 face + side`` of each of some edges, as pairs: index into `edges`, and halfedge."""
+    flat = triangles.edges.face_edges.ravel()
+    order = np.argsort(flat, kind="stable")
+    begin = np.searchsorted(flat[order], edges)
+    count = np.searchsorted(flat[order], edges, side="right") - begin
+    which = np.repeat(np.arange(len(edges)), count)
+    return which, order[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
+
+
+def on_sides(triangles: IntrinsicMesh, faces: Ids, sides: Ids, along: NDArray[np.float64]) -> Points:
+    """(n, k) positions at fractions (n, k) along the edges, tail to head, that are given sides of faces."""
+    share = np.where(triangles.edges.forward[faces, sides][:, None], along, 1 - along)
+    position: Points = (
+        triangles.corner_positions[faces, sides][:, None] + share * triangles.edge_vectors[faces, sides][:, None]
+    )
+    return position
+
+
+def along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ids) -> NDArray[np.float64]:
+    """(n,) fraction of the way from tail to head at which point k lies on edge k."""
+    return np.where(
+        located.kinds == EDGE, located.along, (triangles.edges.vertices[edges, 0] != located.elements).astype(float)
+    )
+
+
+def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: Ids, length: float) -> Points:
+    """(2,) the positions of two nodes in a face that are closest to a given distance apart.
+
+    In intrinsic triangulations a vertex may be two corners of one face, and an edge two of its sides.
+    """
+    places = []
+    for node in ends:
+        kind, element = nodes.kinds[node], nodes.elements[node]
+        if kind == VERTEX:
+            places.append(triangles.corner_positions[face, triangles.corner_vertices[face] == element])
+        elif kind == EDGE:
+            sides = np.flatnonzero(triangles.edges.face_edges[face] == element)
+            along = np.full((len(sides), 1), nodes.along[node])
+            places.append(on_sides(triangles, np.full(len(sides), face), sides, along)[:, 0])
+        else:
+            places.append((nodes.barycentric[[node]] * triangles.corner_positions[face]).sum(axis=1))
+    gap = np.abs(np.abs(places[1][None] - places[0][:, None]) - length)
+    i, j = np.unravel_index(int(gap.argmin()), gap.shape)
+    return np.array([places[0][i], places[1][j]])

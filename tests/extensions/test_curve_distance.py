@@ -1,0 +1,115 @@
+"""Distance to the curves themselves: exact where they are there, completed where they are missing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.surfaces import disk
+from signedheat.diagnostics import SharpenedToCurves
+from signedheat.samples import sphere, torus
+
+
+def to_polygon(points: np.ndarray, corners: np.ndarray, closed: bool) -> np.ndarray:
+    """Unsigned distance in the plane."""
+    following = np.roll(corners, -1, axis=0) if closed else corners[1:]
+    distance = np.full(len(points), np.inf)
+    for a, b in zip(corners, following, strict=False):
+        t = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        distance = np.minimum(distance, np.linalg.norm(points - a - t[:, None] * (b - a), axis=1))
+    return distance
+
+
+def star(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    angle = np.sort((np.arange(9) + 0.8 * rng.random(9)) * 2 * np.pi / 9)
+    radius = rng.uniform(0.25, 0.75, 9)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle], axis=1)
+
+
+def inside(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    from matplotlib.path import Path
+
+    return Path(corners[:, :2]).contains_points(points[:, :2])
+
+
+@pytest.mark.parametrize("rings", [4, 20])
+@pytest.mark.parametrize("seed", range(3))
+def test_closed_polygons_in_the_plane(rings, seed):
+    """However coarse the triangles, and however the polygon crosses them: exact, with the right sides."""
+    mesh, corners = disk(rings), star(seed)
+    phi = sh.curve_distance(mesh, mesh.polyline(corners, closed=True))
+    exact = to_polygon(mesh.vertices, corners, True)
+    assert np.abs(np.abs(phi.values) - exact).max() < 2e-5
+    clear = exact > 1e-9
+    assert ((phi.values > 0) == inside(mesh.vertices, corners))[clear].all()
+    assert phi.diagnostics.note(SharpenedToCurves).sides_by_curves > 0.9
+
+
+@pytest.mark.parametrize("oriented", [True, False])
+def test_open_polygons_and_points(oriented):
+    mesh, corners = disk(20), star(5)[:5]
+    points = sh.SurfacePoints([3, 40], [[0.2, 0.3, 0.5], [0.0, 0.5, 0.5]])
+    places = np.einsum("ij,ijk->ik", points.barycentric, mesh.vertices[mesh.faces[points.faces]])
+    curve = mesh.polyline(corners, oriented=oriented)
+    plain = sh.SignedHeatSolver(mesh).distance([curve, points])
+    phi = sh.sharpen(plain, [curve, points])
+    exact = np.minimum(
+        to_polygon(mesh.vertices, corners, False),
+        np.linalg.norm(mesh.vertices[:, None] - places[None], axis=2).min(axis=1),
+    )
+    if oriented:  # beyond its ends the zero set goes on
+        assert (np.abs(phi.values) < exact + 2e-5).all()
+        assert phi.diagnostics.note(SharpenedToCurves).free_ends == 2
+    else:
+        assert np.abs(phi.values - exact).max() < 2e-5
+
+
+def test_a_gap_is_completed():
+    """A line with a gap: distance to the whole line, which a straight zero set completes."""
+    x, y = np.meshgrid(np.arange(31.0), np.arange(21.0), indexing="ij")
+    corner = np.arange(31 * 21).reshape(31, 21)[:-1, :-1].ravel()
+    faces = np.concatenate([corner[:, None] + [0, 21, 22], corner[:, None] + [0, 22, 1]])
+    mesh = sh.TriangleMesh(np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1), faces)
+    pieces = [mesh.polyline([[0, 10.3, 0], [12, 10.3, 0]]), mesh.polyline([[18, 10.3, 0], [30, 10.3, 0]])]
+    phi = sh.curve_distance(mesh, pieces)
+    assert np.abs(phi.values - (y.ravel() - 10.3)).max() < 0.3
+    note = phi.diagnostics.note(SharpenedToCurves)
+    assert note.free_ends == 2
+    assert 0.1 < note.completed_length < 0.3
+
+
+@pytest.mark.parametrize("build", [lambda: sphere(3), lambda: torus(n_around=30, n_across=16)])
+def test_level_sets_are_measured_to_exactly(build):
+    """To a level set of the mesh there are two routes: to the curve, and to the zero line of the function."""
+    mesh = build()
+    values = mesh.vertices @ [0.3, 0.2, 0.9] - 0.21
+    curves = mesh.level_set(values)
+    phi = sh.curve_distance(mesh, curves)
+    line = sh.sharpen(sh.VertexField(mesh, values))
+    assert np.abs(phi.values - line.values).max() < 1e-3 * mesh.edge_lengths.mean()
+
+
+def test_turning_a_curve_turns_the_sign():
+    mesh = sphere(3)
+    curve = mesh.level_set(mesh.vertices[:, 2], 0.31)[0]
+    phi, turned = (sh.curve_distance(mesh, c).values for c in (curve, curve.reversed()))
+    assert np.abs(phi + turned).max() < 1e-12
+
+
+def test_a_curve_that_bounds_nothing():
+    """Round the tube of a torus: the curve tells no sides, and the method completes it on the far side."""
+    mesh = torus(n_around=60, n_across=24)
+    note = sh.curve_distance(mesh, mesh.path(np.arange(24), closed=True)).diagnostics.note(SharpenedToCurves)
+    assert note.free_ends == 0
+    assert note.sides_by_curves < 0.1
+    assert note.completed_length > 0.3
+
+
+def test_levels_of_their_own_are_refused():
+    mesh = sphere(2)
+    curve = mesh.level_set(mesh.vertices[:, 2], 0.3)
+    with pytest.raises(sh.ConstraintError) as caught:
+        sh.curve_distance(mesh, curve, constraint=sh.EachComponent())
+    assert caught.value.remedy
