@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Generic, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -12,7 +13,7 @@ R = TypeVar("R")
 class Slot(Generic[P, R]):
     """A function that a lower floor declares and calls, and a higher floor provides when it is imported.
 
-    ``import signedheat`` imports every floor, so that all slots are filled.
+    Calling an empty slot imports all floors first, which fills it.
 
     Examples
     --------
@@ -35,5 +36,7 @@ class Slot(Generic[P, R]):
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         if self._function is None:
-            raise RuntimeError(f"nothing provides {self.name}: import signedheat first")
+            import_module(f"{__package__}.public")  # imports every floor
+        if self._function is None:
+            raise RuntimeError(f"nothing provides {self.name}")
         return self._function(*args, **kwargs)
