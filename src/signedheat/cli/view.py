@@ -1,9 +1,13 @@
-"""``signedheat view``: a picture of a shape or a field."""
+"""``signedheat view``: a shape or a field in a window, on a page, or as a picture."""
 
 from __future__ import annotations
 
+import os
+import sys
 from argparse import Namespace
 from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from ..domains.tet_mesh import TetMesh
@@ -13,27 +17,60 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
 from ..io import FIELD_FORMATS, load_field, read
-from ..io.files import extension
+from ..io.files import ensure_writable, extension
 from ..io.tets import TET_FIELD_FORMATS
-from ..visualization import ensure_picture_writable, save_scene, save_slices, save_surface
+from ..visualization import (
+    PAGE_FORMATS,
+    PICTURE_FORMATS,
+    ensure_picture_writable,
+    save_page,
+    save_scene,
+    save_slices,
+    save_surface,
+)
 from .computing import Summary, drawable, prefix_errors
 from .tets import on_grid
 
 
 def run(arguments: Namespace) -> Summary:
     """Draw."""
-    ensure_picture_writable(arguments.output)
-    thing, up = shape_or_field(arguments.file), "xyz".index(arguments.up)
+    output, up = arguments.output, "xyz".index(arguments.up)
+    if output is None and has_window():
+        with prefix_errors(arguments.file):
+            shape_or_field(arguments.file).plot()
+        return {"input": arguments.file, "output": None}, ""
+    if output is None:
+        output = str(Path(Path(arguments.file).name).with_suffix(".html"))
+    ensure_output_writable(output)
+    thing = shape_or_field(arguments.file)
     with prefix_errors(arguments.file):
-        if isinstance(thing, VertexField):
-            save_surface(thing, arguments.output, up=up)
+        if extension(output) in PAGE_FORMATS:
+            save_page(thing, output, Path(arguments.file).name, up)
+        elif isinstance(thing, VertexField):
+            save_surface(thing, output, up=up)
         elif isinstance(thing, GridField | BandField):
-            save_slices(drawable(thing), arguments.output)
+            save_slices(drawable(thing), output)
         elif isinstance(thing, TetField):
-            save_slices(on_grid(thing), arguments.output)
+            save_slices(on_grid(thing), output)
         else:
-            save_scene(thing.boundary if isinstance(thing, TetMesh) else thing, arguments.output, up)
-    return {"input": arguments.file, "output": arguments.output}, arguments.output
+            save_scene(thing.boundary if isinstance(thing, TetMesh) else thing, output, up)
+    return {"input": arguments.file, "output": output}, output
+
+
+def has_window() -> bool:
+    """Whether there is a display, and PyVista to open a window on it."""
+    display = sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )
+    return display and find_spec("pyvista") is not None
+
+
+def ensure_output_writable(output: str) -> None:
+    """Find out before reading whether the page or the picture can be written."""
+    if extension(output) in PICTURE_FORMATS:
+        ensure_picture_writable(output)
+    else:
+        ensure_writable(output, PAGE_FORMATS | PICTURE_FORMATS, "a page or a picture")
 
 
 def shape_or_field(path: str) -> Any:

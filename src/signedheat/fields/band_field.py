@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from os import PathLike
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
+from ..domains.display import Displayed, to_pyvista
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
@@ -18,11 +20,14 @@ from ..operators.grid.exact_surface import ExactSurface
 from .files import save_field
 from .grid_field import GridField
 
+if TYPE_CHECKING:
+    import pyvista
+
 NODES = SIDE**3
 
 
 @dataclass(frozen=True, eq=False)
-class BandField:
+class BandField(Displayed):
     """Signed distance at the nodes of a fine grid that are near a surface, and at those of a coarse grid elsewhere.
 
     Nodes come in blocks of 8³, where at least one node is within the band. Everything a `GridField` does works alike:
@@ -208,6 +213,11 @@ class BandField:
             part = tuple(slice(p, min(p + SIDE, n)) for p, n in zip(place, self.grid.shape, strict=True))
             values[part] = block[tuple(slice(0, s.stop - s.start) for s in part)]
         return GridField(self.grid, values, self.diagnostics)
+
+    def to_pyvista(self) -> pyvista.ImageData:
+        """The coarse field as a `pyvista.ImageData`; ``dense().to_pyvista()`` has all nodes."""
+        image: pyvista.ImageData = to_pyvista(self)
+        return image
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format given by its extension: ``.npz`` or ``.vdb``."""

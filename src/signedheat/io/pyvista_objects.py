@@ -17,6 +17,7 @@ from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, UnsupportedTypeError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
@@ -80,6 +81,11 @@ def _(grid: Grid) -> Any:
 @as_pyvista.register
 def _(field: GridField) -> Any:
     return _with_values(as_pyvista(field.grid), field.values.ravel(order="F"))
+
+
+@as_pyvista.register
+def _(field: BandField) -> Any:
+    return as_pyvista(field.coarse)
 
 
 @as_pyvista.register

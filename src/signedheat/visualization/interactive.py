@@ -13,6 +13,7 @@ from ..domains.grid import Grid
 from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError, OutsideError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
@@ -74,6 +75,11 @@ def _(field: GridField, plotter: Any) -> None:
         return
     _add_section(plotter, image, look)
     _add_zero_set(plotter, field)
+
+
+@add.register
+def _(field: BandField, plotter: Any) -> None:
+    add(field.coarse, plotter)
 
 
 @add.register

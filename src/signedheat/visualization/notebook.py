@@ -19,6 +19,7 @@ from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import MissingPackageError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
@@ -107,6 +108,11 @@ def _(field: GridField, axes: Any) -> bool:
     else:
         draw_slices(field, [axes], across=(_best_axis(field),))
     return True
+
+
+@draw.register
+def _(field: BandField, axes: Any) -> bool:
+    return draw(field.coarse, axes)
 
 
 @draw.register

@@ -18,6 +18,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, UnsupportedTypeError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
@@ -125,6 +126,11 @@ def _(field: PiecewiseField) -> dict[str, Any]:
 def _(field: TetField) -> dict[str, Any]:
     grid = Grid.around(field.mesh.bounds, resolution=TET_NODES, padding=0.0)
     return shown(GridField(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape)))
+
+
+@shown.register
+def _(field: BandField) -> dict[str, Any]:
+    return shown(field.coarse)
 
 
 @shown.register

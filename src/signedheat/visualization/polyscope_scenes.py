@@ -15,6 +15,7 @@ from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import UnsupportedTypeError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
@@ -86,6 +87,11 @@ def _(field: PiecewiseField, name: str) -> Any:
 @register.register
 def _(field: TetField, name: str) -> Any:
     return _colored(register(field.mesh, name), field.values)
+
+
+@register.register
+def _(field: BandField, name: str) -> Any:
+    return register(field.coarse, name)
 
 
 @register.register

@@ -12,9 +12,13 @@ def add_to(commands: Any) -> None:
     parser = add_command(
         commands,
         "view",
-        help="picture of a shape or a field",
-        description="Slices through a field; a shape in perspective, outsides yellow, insides red.",
+        help="a shape or a field in a window, on a page, or as a picture",
+        description="In a window where there is a display and PyVista; otherwise, or with --output NAME.html, on a "
+        "page that any browser shows: turn, slice, choose a level. As a picture: slices through a field; a shape, "
+        "outsides yellow, insides red.",
     )
     parser.add_argument("file", metavar="FILE", help="a shape or a field")
     parser.add_argument("--up", choices="xyz", default="z", help="axis that points upwards (default: z)")
-    parser.add_argument("-o", "--output", required=True, metavar="PNG", help="picture: .png .pdf .svg .jpg")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="page: .html; picture: .png .pdf .svg .jpg (a window, or FILE.html here)"
+    )
