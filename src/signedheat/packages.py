@@ -17,7 +17,6 @@ REMEDIES = {
     "distributed": "pip install signedheat[cluster]",
     "mpl_toolkits": "pip install matplotlib",
     "nrrd": "pip install pynrrd",
-    "openvdb": "conda install -c conda-forge openvdb, or use .vti files",
     "polyscope": "pip install polyscope",
     "pytetwild": "pip install signedheat[tetwild]",
     "pyvista": "pip install signedheat[plot]",

@@ -57,6 +57,7 @@ from .io import (
     save,
     write_curves,
     write_polylines,
+    write_vdb,
 )
 from .solver import SignedHeatSolver, signed_distance
 from .visualization import new_figure as _new_figure  # noqa: F401  provides notebooks, windows and Polyscope
@@ -137,4 +138,5 @@ __all__ = [
     "unite",
     "write_curves",
     "write_polylines",
+    "write_vdb",
 ]

@@ -9,6 +9,7 @@ from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable
 from .polylines import POLYLINE_FORMATS, read_polylines, write_polylines
 from .shapes import SHAPE_FORMATS, read, save
+from .vdb import write_vdb
 from .volumes import read_mask, read_volume
 
 __all__ = [
@@ -29,4 +30,5 @@ __all__ = [
     "save_field",
     "write_curves",
     "write_polylines",
+    "write_vdb",
 ]

@@ -15,6 +15,7 @@ from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..operators.grid.blocks import Blocks
 from .files import PathLike, ensure_writable, extension, replacing
+from .vdb import write_vdb
 
 CONVENTION = (
     "signed distance, negative inside; values[n, i, j, k] at origin + (8 * places[n] + (i, j, k)) * spacing, axes "
@@ -97,6 +98,6 @@ def _write_npz(field: BandField, path: Path) -> None:
         )
 
 
-WRITERS: dict[str, Callable[[BandField, Path], None]] = {".npz": _write_npz}
+WRITERS: dict[str, Callable[[BandField, Path], None]] = {".npz": _write_npz, ".vdb": write_vdb}
 
 BAND_FORMATS = frozenset(WRITERS)

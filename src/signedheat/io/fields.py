@@ -24,11 +24,12 @@ from .files import PathLike, contents, ensure_writable, extension, reading, repl
 from .nrrd_files import read_image
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
 from .tets import TET_FIELD_FORMATS, load_tet_field, save_tet_field
+from .vdb import write_vdb
+from .vdb_reader import read_vdb_image
 from .vtk_xml import read_vti, write_vti
 
-_NEEDED = {".nrrd": ("nrrd", "NRRD files"), ".vdb": ("openvdb", ".vdb files")}
+_NEEDED = {".nrrd": ("nrrd", "NRRD files")}
 nrrd = lazy_module(*_NEEDED[".nrrd"])
-openvdb = lazy_module(*_NEEDED[".vdb"])
 
 CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
@@ -62,7 +63,7 @@ def save_field(field: GridField, path: PathLike) -> None:
     """Write a field on a grid, in the format given by the extension.
 
     ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
-    same name beside it, ``.vdb`` (OpenVDB; single precision, and only where a module for it is installed).
+    same name beside it, ``.vdb`` (OpenVDB; single precision).
 
     Parameters
     ----------
@@ -241,46 +242,11 @@ def _read_nrrd(path: PathLike) -> Parts:
     return values, np.asarray(header.get("space origin", np.zeros(values.ndim))), spacing
 
 
-def _write_vdb(field: GridField, path: Path) -> None:
-    # A VDB tree omits nodes that equal the background value, so it must differ from all values.
-    volume = openvdb.FloatGrid(float(np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))))
-    volume.copyFromArray(field.values.astype(np.float32))
-    matrix = np.diag([*field.grid.spacing, 1.0])
-    matrix[3, :3] = field.grid.origin
-    volume.transform = openvdb.createLinearTransform(matrix.tolist())
-    volume.name = NAME
-    volume["convention"] = CONVENTION
-    volume["spacing"] = " ".join(map(repr, field.grid.spacing.tolist()))  # the transform has it rounded
-    openvdb.write(str(path), grids=[volume])
-
-
-def _read_vdb(path: PathLike) -> Parts:
-    contents(path)
-    read = openvdb.read
-    try:
-        volume = openvdb.readAllGridMetadata(str(path))[0]
-        volume = read(str(path), volume.name)
-        lower, upper = (np.array(corner) for corner in volume.evalActiveVoxelBoundingBox())
-        values = np.empty(tuple(upper - lower + 1), dtype=np.float32)
-        volume.copyToArray(values, ijk=tuple(int(i) for i in lower))
-        origin = np.array(volume.transform.indexToWorld(tuple(float(i) for i in lower)))
-        spacing = np.array(volume.transform.voxelSize())
-        written = np.array(str(volume.metadata.get("spacing", "")).split(), dtype=np.float64)
-        same = written.shape == spacing.shape and np.allclose(written, spacing, rtol=1e-9, atol=0)
-        return values, origin, written if same else spacing
-    except Exception as error:
-        raise FileFormatError(
-            f"it cannot be read as a VDB volume ({error})",
-            remedy="write it again",
-            path=path,
-        ) from error
-
-
 _FORMATS: dict[str, tuple[Callable[[GridField, Path], None], Callable[[PathLike], Parts]]] = {
     ".npy": (_write_npy, _read_npy),
     ".npz": (_write_npz, _read_npz),
     ".nrrd": (_write_nrrd, _read_nrrd),
-    ".vdb": (_write_vdb, _read_vdb),
+    ".vdb": (write_vdb, read_vdb_image),
     ".vti": (_write_vti, read_vti),
 }
 
