@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import signedheat as sh
 from refusals import refused
+from shapes.tet_cases import boxes
+from signedheat import memory, samples
 from signedheat.lowering.grid.discretization import fitting_spacing, memory_estimate
 from signedheat.memory import available_memory
 
@@ -47,3 +53,54 @@ def test_the_spacing_that_is_proposed_fits(shape):
     assert 0.9 * 8e9 < fitting <= 8e9
     with refused(sh.MemoryLimitError):
         _ = sh.SignedHeatSolver(grid).discretization
+
+
+BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "memory.py"
+
+
+@pytest.mark.parametrize(
+    ("kind", "size"), [("triangles", 140), ("polygons", 100), ("points", 30_000), ("voxels", 80), ("tets", 20)]
+)
+def test_estimates_are_near_the_peak_of_a_process_of_its_own(kind, size):
+    command = [sys.executable, str(BENCHMARK), kind, str(size)]
+    row = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    assert 0.75 < row["estimated"] / row["measured"] < 1.3, row
+
+
+BALL = samples.sphere(3)
+INSIDE = sh.TriangleMesh(0.3 * BALL.vertices + 0.5, BALL.faces)
+DOMAINS = {
+    "triangles": (BALL, lambda d: d.points_at(0)),
+    "intrinsic": (sh.intrinsic_delaunay(BALL), lambda d: BALL.points_at(0)),
+    "polygons": (sh.PolygonMesh(BALL.vertices, BALL.faces), lambda d: d.points_at(0)),
+    "points": (sh.PointCloud(BALL.vertices), lambda d: d.points_at(0)),
+    "faces of voxels": (sh.DigitalSurface(np.ones((9, 9, 9), dtype=bool)), lambda d: d.points_at(0)),
+    "tets": (boxes((3, 3, 3), 0.3), lambda d: INSIDE),
+    "grid": (sh.Grid((0, 0, 0), 0.1, (9, 9, 9)), lambda d: INSIDE),
+}
+
+
+@pytest.mark.parametrize("name", DOMAINS)
+def test_what_does_not_fit_is_refused_and_what_would_is_named(name, monkeypatch):
+    domain, source = DOMAINS[name]
+    sh.SignedHeatSolver(domain).distance(source(domain))
+    monkeypatch.setattr(memory, "_free", lambda: 20_100_000)
+    with refused(sh.MemoryLimitError) as caught:
+        sh.SignedHeatSolver(domain).distance(source(domain))
+    assert any(letter.isdigit() for letter in caught.value.remedy)
+
+
+@given(st.integers(1, 10**12), st.floats(0, 1e13), st.floats(0.1, 1e4))
+def test_the_largest_number_that_fits_fits(count, available, each):
+    found = memory.fitting_count(count, lambda n: each * n, available)
+    assert 0 <= found <= count and each * found <= available
+    assert found == count or each * (found + 1) > available
+
+
+def test_lattices_name_the_resolution_that_fits(monkeypatch):
+    shape = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [[0, 1, 2]])
+    for grading in (3.0, np.inf):
+        with refused(sh.MemoryLimitError) as caught:
+            sh.tetrahedralize(shape, resolution=100_000, grading=grading)
+        fitting = float(caught.value.remedy.split()[-1])
+        assert 20 < fitting < 100_000

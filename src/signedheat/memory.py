@@ -3,13 +3,64 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
+
+from .errors import MemoryLimitError
 
 LIMITS = (
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
 )
 """Files with the memory limit of a container and its present use, for version 2 and version 1 of cgroups."""
+
+
+UNLOADED, LOADED = 130_000_000, 20_000_000
+"""Bytes that libraries and compiled kernels still take, whatever is computed, before and after their first use."""
+
+
+def libraries() -> int:
+    """What libraries still take: most of it is the compiler, which the first kernel loads."""
+    return LOADED if "numba" in sys.modules else UNLOADED
+
+
+def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]) -> None:
+    """Raise `MemoryLimitError` if there is not enough memory for so many elements.
+
+    Parameters
+    ----------
+    what : str
+        What is to be computed, for the message.
+    count : int
+        Number of elements.
+    estimate : callable
+        From a number of elements to the bytes that they take at the most, growing.
+    remedy : callable
+        From the largest number of elements that fits to what to do.
+    """
+    available = available_memory()
+    needed = estimate(count) + libraries()
+    if available is None or needed <= available:
+        return
+    raise MemoryLimitError(
+        f"{what} needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
+        remedy=remedy(fitting_count(count, estimate, available - libraries())),
+    )
+
+
+def fitting_count(count: int, estimate: Callable[[int], float], available: float) -> int:
+    """The largest number of elements, at most `count`, that takes no more than the memory available.
+
+    Examples
+    --------
+    >>> fitting_count(10**9, lambda n: 100 * n, 1e6)
+    10000
+    """
+    low, high = 0, count
+    while low < high:
+        middle = (low + high + 1) // 2
+        low, high = (middle, high) if estimate(middle) <= available else (low, middle - 1)
+    return low
 
 
 def available_memory() -> int | None:

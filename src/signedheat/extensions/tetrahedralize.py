@@ -9,6 +9,7 @@ angles of 60° and 90°; where sizes change angles stay between 30° and 135°.
 from __future__ import annotations
 
 import itertools
+import math
 from typing import Any, cast
 
 import numpy as np
@@ -22,12 +23,16 @@ from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError, MemoryLimitError
 from ..lowering.area_elements import area_elements, bounds_around
+from ..memory import refuse_beyond_memory
 
 LEAST_GRADING = 2.7
 """Below this, neighbouring leaves could differ by more than a factor of two in size: g/2 must exceed √3·¾."""
 
 MOST_TETS = 50_000_000
-"""More would need over 20 GB to build."""
+"""More are no use: distance on them would need over 70 GB."""
+
+BYTES_PER_TET = 350
+"""Peak of meshing; distance takes more. Measured."""
 
 
 def tetrahedralize(
@@ -95,7 +100,9 @@ def tetrahedralize(
     coarse = spacing * 2**depth
     counts = np.maximum(np.ceil(sides / coarse - 1e-9).astype(np.int64), 1)
     area = 0.0 if isinstance(own, PointCloud) else float(area_elements(own).weights.sum())
-    _refuse_too_many(12 * max(float(counts.prod()), (2 * grading * area / spacing**2) if depth else 0.0))
+    volume_cells = float(counts.astype(np.float64).prod())
+    surface_cells = 2 * grading * area / spacing**2 if depth else 0.0
+    _refuse_too_many(12 * max(volume_cells, surface_cells), resolution, 2 if surface_cells > volume_cells else 3)
     origin = lower - (counts * coarse - sides) / 2
     samples = scipy.spatial.cKDTree(sample_points(own, spacing))
     corners, sizes = _octree(samples, origin, spacing, counts, depth, grading)
@@ -119,12 +126,16 @@ def sample_points(shape: Shape, spacing: float) -> NDArray[np.float64]:
     return np.concatenate(found)
 
 
-def _refuse_too_many(tets: float) -> None:
+def _refuse_too_many(tets: float, resolution: float, power: int) -> None:
+    """Refuse a lattice whose tets, in proportion to a power of the resolution, do not fit into memory."""
+
+    def lower(fitting: int) -> str:
+        return f"lower the resolution from {resolution:g} to at most {resolution * (fitting / tets) ** (1 / power):.3g}"
+
+    count = math.ceil(min(tets, 1e18))
+    refuse_beyond_memory(f"a lattice of {tets:,.3g} tets", count, lambda number: BYTES_PER_TET * number, lower)
     if tets > MOST_TETS:
-        raise MemoryLimitError(
-            f"the lattice would have over {tets:,.0f} tets",
-            remedy="lower the resolution",
-        )
+        raise MemoryLimitError(f"the lattice would have over {tets:,.0f} tets", remedy=lower(MOST_TETS))
 
 
 def _octree(

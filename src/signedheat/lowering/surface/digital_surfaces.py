@@ -8,8 +8,12 @@ from ...discretization import discretize
 from ...domains.digital_surface import DigitalSurface
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
-from ...geometry.surfels import flattened_sides, separated_edges
+from ...geometry.surfels import count_surfels, flattened_sides, separated_edges
 from .discretization import SurfaceDiscretization
+from .memory import refuse_too_many
+
+BYTES_PER_VOXEL = 20
+"""Blurred copies of the volume, from which normals are estimated."""
 
 
 @discretize.register
@@ -19,6 +23,8 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
     h is the standard deviation of the Gaussian with which normals are estimated, and at least the voxel size. At a
     smaller scale the shape of the surface is unknown, and diffusion would follow the directions of the lattice.
     """
+    faces = count_surfels(domain.volume)
+    refuse_too_many(4 * faces, faces, "faces of voxels", beside=BYTES_PER_VOXEL * domain.volume.size)
     first, last = flattened_sides(domain.surfels, domain.spacing, domain.normals)
     around = np.stack([np.zeros_like(first), first, first + last, last], axis=1)
     middle = np.broadcast_to(0.5 * (first + last)[:, None], around.shape)

@@ -24,6 +24,7 @@ from ...geometry.mollification import laid_out
 from ...linear import elimination_order, factorize
 from ...operators.cotan import cotan_matrix, divergence
 from ..direct_integration import DirectIntegration
+from .memory import refuse_too_many
 from .nonmanifold_frames import nonmanifold_frames
 from .source import surface_source
 from .vector_heat import VectorHeat
@@ -166,6 +167,7 @@ class SurfaceDiscretization:
 
 @discretize.register
 def _(domain: TriangleMesh) -> SurfaceDiscretization:
+    refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     triangles, added = laid_out(domain, 1e-6)
     share = large_angles(triangles)
     notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))

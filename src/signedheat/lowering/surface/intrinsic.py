@@ -15,6 +15,7 @@ from ...domains.triangle_mesh import TriangleMesh
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from .discretization import SurfaceDiscretization
+from .memory import refuse_too_many
 
 THICKNESS = 1e-9
 """Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
@@ -46,6 +47,7 @@ class Retriangulated:
 def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
     """The discretisation of an intrinsic triangulation; triangles that are nearly flat are mollified."""
     triangles = triangulation.triangles
+    refuse_too_many(triangles.n_faces, triangles.n_faces, "triangles")
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
     if added:
         corners, edges = triangles.corner_vertices, triangles.edges

@@ -10,6 +10,7 @@ from ...diagnostics import PointsLeftOut
 from ...discretization import discretize
 from ...domains.point_cloud import PointCloud
 from .discretization import SurfaceDiscretization
+from .memory import refuse_too_many
 
 
 @discretize.register
@@ -18,6 +19,7 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
 
     h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
     """
+    refuse_too_many(2 * domain.n_points, domain.n_points, "points")
     mesh = domain.triangulation
     used = np.zeros(domain.n_points, dtype=bool)
     used[mesh.faces] = True

@@ -9,6 +9,7 @@ import numpy as np
 from ...discretization import discretize
 from ...domains.polygon_mesh import PolygonMesh
 from .discretization import SurfaceDiscretization
+from .memory import refuse_too_many
 
 
 @discretize.register
@@ -19,6 +20,7 @@ def _(domain: PolygonMesh) -> SurfaceDiscretization:
     crosses more edges of triangles than its polygons have corners, and φ would be constant on whole polygons. h is half
     the mean length of the polygons' own edges, so that virtual vertices do not change t.
     """
+    refuse_too_many(len(domain.corners), domain.n_polygons, "polygons")
     lowered = discretize(domain.triangulation)
     own = (domain.triangulation.edges.vertices < domain.n_vertices).all(axis=1)
     spacing = 0.5 * float(domain.triangulation.edge_lengths[own].mean())

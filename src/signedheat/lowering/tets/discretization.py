@@ -20,6 +20,7 @@ from ...geometry.visibility import tet_neighbors, visible
 from ...linear import upper_triangle
 from ...linear.incomplete_cholesky import from_first
 from ...linear.restarts import Stage
+from ...memory import refuse_beyond_memory
 from ..heat_system import HeatSystem, bend_around_corners
 from .integration import TetIntegration
 from .source import TetSource, tet_source
@@ -35,6 +36,22 @@ DIRECTION_ERROR = 1e-3
 
 SPRINGS = 30.0
 """Strength of the springs that impose levels, times the mean edge length."""
+
+
+BYTES_PER_TET, BYTES_PER_FACTORED = 1500, 2900
+"""Peak for each tet, by conjugate gradients and by factorisation. Measured."""
+
+
+def memory_estimate(n_tets: int) -> float:
+    """Bytes that a first distance on so many tets takes at the most.
+
+    Examples
+    --------
+    >>> 0.8e9 < memory_estimate(580_000) < 1e9
+    True
+    """
+    factored = min(n_tets, DIRECT_FACES // 2)  # a tet has about two faces of its own
+    return max(BYTES_PER_TET * n_tets, BYTES_PER_FACTORED * factored)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,4 +195,10 @@ class TetDiscretization(DiffusesEach):
 
 @discretize.register
 def _(domain: TetMesh) -> TetDiscretization:
+    refuse_beyond_memory(
+        f"distance on {domain.n_tets:,} tets",
+        domain.n_tets,
+        memory_estimate,
+        lambda number: f"use at most {number:,} tets, as with a lower resolution of tetrahedralize",
+    )
     return TetDiscretization(domain, direct=len(domain.faces.vertices) <= DIRECT_FACES)
