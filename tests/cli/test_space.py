@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+import trimesh
 
 import signedheat as sh
 from refusals import refused
@@ -103,6 +104,26 @@ def test_offsets_are_closed_one_file_each(tmp_path, ball, capsys):
         np.testing.assert_allclose(np.linalg.norm(surface.vertices, axis=1).mean(), radius, rtol=0.02)
         volume = np.einsum("ij,ij->", surface.vertices[surface.faces[:, 0]], surface.face_area_vectors) / 3
         assert volume > 0
+
+
+@pytest.mark.parametrize("ending", ["ply", "vtp"])
+def test_offsets_tell_at_each_vertex_what_was_completed(tmp_path, capsys, ending):
+    """Of a ball without its cap: 1 below, less over the hole, least in its middle; and one number in the summary."""
+    ball = samples.sphere(4)
+    kept = ball.faces[ball.vertices[ball.faces].mean(axis=1)[:, 2] < 0.7]
+    shape, output = tmp_path / "open.ply", tmp_path / f"offset.{ending}"
+    sh.TriangleMesh(ball.vertices, kept).save(shape)
+    assert main(["offset", str(shape), "0.1", "-o", str(output), "--resolution", "40", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert 0.5 < summary["field"]["confidence"] < 0.999
+    places = sh.read(output).vertices
+    height, middle = places[:, 2], np.hypot(places[:, 0], places[:, 1]) < 0.3
+    if ending == "ply":
+        found = trimesh.load(output, process=False).metadata["_ply_raw"]["vertex"]["data"]["confidence"]
+    else:
+        found = pytest.importorskip("pyvista").read(output)["confidence"]
+    assert (found[height < 0.4] == 1).all()
+    assert found[middle & (height > 0.5)].max() < 0.7
 
 
 def test_offset_of_one_distance_has_the_name_given(tmp_path, ball, capsys):

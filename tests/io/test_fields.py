@@ -31,6 +31,18 @@ def test_round_trip_is_exact(tmp_path, ending, dimension):
     assert back.grid.shape == phi.grid.shape
 
 
+@pytest.mark.parametrize("ending", ["npz", "vti"])
+def test_confidence_comes_back(tmp_path, ending):
+    phi = field()
+    told = sh.GridField(phi.grid, phi.values, confidence=np.linspace(0, 1, phi.values.size).reshape(phi.values.shape))
+    told.save(tmp_path / f"phi.{ending}")
+    back = load_field(tmp_path / f"phi.{ending}")
+    np.testing.assert_array_equal(back.values, phi.values)
+    np.testing.assert_array_equal(back.confidence, told.confidence)
+    with refused(sh.GeometryError, element="confidence"):
+        sh.GridField(phi.grid, phi.values, confidence=np.ones(3))
+
+
 def test_npz_needs_no_pickle_and_says_what_it_holds(tmp_path):
     field().save(tmp_path / "phi.npz")
     with np.load(tmp_path / "phi.npz", allow_pickle=False) as file:

@@ -6,7 +6,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples, visualization
-from signedheat.visualization.slices import cross_section
+from signedheat.visualization.slices import cross_section, level_pieces
 
 
 def test_cross_section_of_a_sphere_is_a_circle():
@@ -35,6 +35,20 @@ def test_slices_of_fields_with_one_sign(tmp_path, shape):
     grid = sh.Grid((-1, -1, -1), 0.2, (11, 11, 11))
     visualization.save_slices(sh.GridField(grid, 2 + grid.points[..., 0]), tmp_path / "a.png", shape)
     assert (tmp_path / "a.png").stat().st_size > 1000
+
+
+def test_completed_parts_of_levels_are_dashed():
+    """A circle, of which the right half is completed: solid on the left, dashed on the right, both whole."""
+    u = v = np.linspace(-1, 1, 41)
+    radius = np.hypot(*np.meshgrid(u, v, indexing="ij"))
+    trusted = np.where(u[:, None] > 0.025, 0.5, 1.0) * np.ones((1, 41))
+    pieces = level_pieces(u, v, radius - 0.8, 0.0, trusted.astype(np.float32))
+    solid, dashed = np.concatenate(pieces["solid"]), np.concatenate(pieces["dashed"])
+    np.testing.assert_allclose(np.hypot(*solid.T), 0.8, atol=2e-3)
+    assert solid[:, 0].max() < 0.06 < 0.75 < dashed[:, 0].max() and dashed[:, 0].min() > -0.06
+    lengths = [sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in pieces[k]) for k in pieces]
+    np.testing.assert_allclose(sum(lengths), 1.6 * np.pi, rtol=1e-2)
+    assert not level_pieces(u, v, radius - 0.8, 0.0)["dashed"]
 
 
 def test_a_picture_of_unknown_kind_is_refused(tmp_path):

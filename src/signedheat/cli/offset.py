@@ -6,7 +6,11 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from ..fields.grid_field import GridField
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
+from ..io.fields import CONFIDENCE
+from ..io.files import extension
+from ..io.surface_fields import VALUE_FORMATS, save_with_values
 from ..visualization import ensure_picture_writable, save_slices
 from .computing import Summary, compute, describe, drawable, grid_for, hint, prefix_errors, read_source
 from .usage.options import is_planar
@@ -29,7 +33,7 @@ def run(arguments: Namespace) -> Summary:
         if planar:
             write_polylines(output, what)
         else:
-            save(what, output)
+            save_surface(field, what, output)
     if arguments.preview:
         save_slices(drawable(field), arguments.preview, shape, arguments.distances)
     written = [
@@ -39,6 +43,15 @@ def run(arguments: Namespace) -> Summary:
     kind = "{lines} lines ({closed} closed), length {length:.6g}" if planar else "closed surface, {faces} faces"
     text = "\n".join(f"{w['output']}: at {w['distance']:+g}, {kind.format(**w)}" for w in written) + hint(field)
     return {"input": arguments.shape, "lines" if planar else "surfaces": written, "field": describe(field)}, text
+
+
+def save_surface(field: Any, surface: Any, output: str) -> None:
+    """With the confidence at each vertex, where the field knows it and the format has room for it."""
+    known = isinstance(field, GridField) and field.confidence is not None
+    if known and extension(output) in VALUE_FORMATS:
+        save_with_values(surface, output, CONFIDENCE, field.confidence_at(surface.vertices))
+    else:
+        save(surface, output)
 
 
 def ensure_offset_writable(output: str, planar: bool) -> None:

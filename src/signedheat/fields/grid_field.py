@@ -79,6 +79,13 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
                 f"values have shape {values.shape}, but the grid has {self.grid.shape} nodes", element="values"
             )
         object.__setattr__(self, "values", values)
+        if self.confidence is not None:
+            confidence = np.asarray(self.confidence, dtype=np.float32)
+            if confidence.shape != values.shape:
+                raise GeometryError(
+                    f"confidence has shape {confidence.shape}, and the values {values.shape}", element="confidence"
+                )
+            object.__setattr__(self, "confidence", confidence)
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
         """φ at points in space, by multilinear interpolation between nodes.
@@ -253,6 +260,35 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         """As a `pyvista.ImageData` with point data ``signed_distance``; a field in the plane has z = 0."""
         made: pyvista.ImageData = to_pyvista(self)
         return made
+
+    def confidence_at(self, points: ArrayLike) -> NDArray[np.float32]:
+        """How far the surface that is nearest was there (1), or had to be completed (less), interpolated.
+
+        Parameters
+        ----------
+        points : (n, d) float
+            Positions, such as the vertices of an offset.
+
+        Returns
+        -------
+        (n,) float
+            From 0 to 1; at points outside the grid, that of the nearest point of its box. 1 if nothing is known of it.
+        """
+        inside = self._into_box(np.atleast_2d(self._checked(points)))
+        if self.confidence is None:
+            return np.ones(len(inside), dtype=np.float32)
+        index = ((inside - self.grid.origin) / self.grid.spacing).T
+        found = scipy.ndimage.map_coordinates(self.confidence, index, np.float32, order=1, mode="nearest")
+        clipped: NDArray[np.float32] = np.clip(found, 0, 1)
+        return clipped
+
+    @property
+    def surface_confidence(self) -> float | None:
+        """Mean confidence at the nodes within a cell of the zero set, one number for the whole field; or None."""
+        near = np.abs(self.values) < float(self.grid.spacing.max())
+        if self.confidence is None or not near.any():
+            return None
+        return float(self.confidence[near].mean(dtype=np.float64))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format given by its extension; `signedheat.load_field` reads it."""

@@ -26,7 +26,7 @@ from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_fiel
 from .tets import TET_FIELD_FORMATS, load_tet_field, save_tet_field
 from .vdb import write_vdb
 from .vdb_reader import read_vdb_image
-from .vtk_xml import read_vti, write_vti
+from .vtk_xml import read_vti_with, write_vti
 
 _NEEDED = {".nrrd": ("nrrd", "NRRD files")}
 nrrd = lazy_module(*_NEEDED[".nrrd"])
@@ -36,9 +36,10 @@ CONVENTION = (
     "values[i, j, k] at origin + (i, j, k) * spacing, axes x, y, z, in the units of the shape"
 )
 NAME = "signed_distance"
+CONFIDENCE = "confidence"
 
 Parts = tuple[Any, ...]
-"""Values, origin, spacing; and the mask, if there is one."""
+"""Values, origin, spacing; then the mask and the confidence, or None, as far as the format has them."""
 
 
 @save_any_field.provide
@@ -157,14 +158,15 @@ def load_field(path: PathLike) -> Field | BandField:
 
 
 def _field_of(parts: Parts, path: PathLike) -> GridField:
-    values, origin, spacing, *mask = parts
+    values, origin, spacing, mask, confidence = (*parts, None, None)[:5]
     try:
         if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
             raise FileFormatError(
                 f"the values are no real numbers but {values.dtype}: it holds no field",
                 path=path,
             )
-        return GridField(Grid(origin, spacing, values.shape, *mask), np.ascontiguousarray(values))
+        grid = Grid(origin, spacing, values.shape, mask)
+        return GridField(grid, np.ascontiguousarray(values), confidence=confidence)
     except GeometryError as error:
         raise FileFormatError(error.cause, remedy=error.remedy, element=error.element, path=path) from error
 
@@ -174,7 +176,7 @@ def _description(grid: Grid) -> dict[str, Any]:
 
 
 def _write_npz(field: GridField, path: Path) -> None:
-    mask: dict[str, Any] = {} if field.grid.mask is None else {"mask": field.grid.mask}
+    optional: dict[str, Any] = {"mask": field.grid.mask, CONFIDENCE: field.confidence}
     with path.open("wb") as file:
         np.savez(
             file,
@@ -182,12 +184,12 @@ def _write_npz(field: GridField, path: Path) -> None:
             origin=field.grid.origin,
             spacing=field.grid.spacing,
             convention=np.array(CONVENTION),
-            **mask,
+            **{name: values for name, values in optional.items() if values is not None},
         )
 
 
 def _read_npz(path: PathLike) -> Parts:
-    found = read_npz(path, ("values", "origin", "spacing", "mask"))
+    found = read_npz(path, ("values", "origin", "spacing", "mask", CONFIDENCE))
     lacking = [name for name in ("values", "origin", "spacing") if name not in found]
     if lacking:
         raise FileFormatError(
@@ -195,7 +197,7 @@ def _read_npz(path: PathLike) -> Parts:
             element=lacking[0],
             path=path,
         )
-    return found["values"], found["origin"], found["spacing"], *([found["mask"]] if "mask" in found else [])
+    return found["values"], found["origin"], found["spacing"], found.get("mask"), found.get(CONFIDENCE)
 
 
 def _write_npy(field: GridField, path: Path) -> None:
@@ -212,7 +214,13 @@ def _read_npy(path: PathLike) -> Parts:
 
 
 def _write_vti(field: GridField, path: Path) -> None:
-    path.write_bytes(write_vti(field.values, field.grid.origin, field.grid.spacing, NAME, CONVENTION))
+    others = {} if field.confidence is None else {CONFIDENCE: field.confidence}
+    path.write_bytes(write_vti(field.values, field.grid.origin, field.grid.spacing, NAME, CONVENTION, others))
+
+
+def _read_vti(path: PathLike) -> Parts:
+    values, origin, spacing, confidence = read_vti_with(path, CONFIDENCE)
+    return values, origin, spacing, None, confidence
 
 
 def _write_nrrd(field: GridField, path: Path) -> None:
@@ -247,7 +255,7 @@ _FORMATS: dict[str, tuple[Callable[[GridField, Path], None], Callable[[PathLike]
     ".npz": (_write_npz, _read_npz),
     ".nrrd": (_write_nrrd, _read_nrrd),
     ".vdb": (write_vdb, read_vdb_image),
-    ".vti": (_write_vti, read_vti),
+    ".vti": (_write_vti, _read_vti),
 }
 
 _DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.point_cloud import PointCloud
@@ -85,29 +86,46 @@ def write_npz(field: VertexField[SurfaceShape]) -> bytes:
 
 
 def write_ply(field: VertexField[SurfaceShape]) -> bytes:
-    """Binary PLY in double precision."""
-    corners, counts = faces_of(field.domain)
-    table = np.column_stack([points_of(field.domain), field.values]).astype("<f8")
+    return ply_of(field.domain, NAME, field.values)
+
+
+def write_vtp(field: VertexField[SurfaceShape]) -> bytes:
+    return vtp_of(field.domain, NAME, field.values)
+
+
+def ply_of(shape: SurfaceShape, name: str, values: NDArray[np.floating]) -> bytes:
+    """Binary PLY in double precision, with one named value at each vertex."""
+    corners, counts = faces_of(shape)
+    table = np.column_stack([points_of(shape), values]).astype("<f8")
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
-    lines += [f"property double {name}" for name in ("x", "y", "z", NAME)]
+    lines += [f"property double {column}" for column in ("x", "y", "z", name)]
     lines += [f"element face {len(counts)}", "property list int int vertex_indices"] * (len(counts) > 0)
     listed = np.insert(corners, np.cumsum(counts) - counts, counts).astype("<i4")
     return ("\n".join([*lines, "end_header"]) + "\n").encode() + table.tobytes() + listed.tobytes()
 
 
-def write_vtp(field: VertexField[SurfaceShape]) -> bytes:
-    """VTK polygonal data, for ParaView."""
-    points, (corners, counts) = points_of(field.domain), faces_of(field.domain)
+def vtp_of(shape: SurfaceShape, name: str, values: NDArray[np.floating]) -> bytes:
+    """VTK polygonal data, for ParaView, with one named value at each vertex."""
+    points, (corners, counts) = points_of(shape), faces_of(shape)
     group = "Polys" if len(counts) else "Verts"
     if not len(counts):
         corners, counts = np.arange(len(points)), np.ones(len(points), dtype=np.int64)
     writer = _Writer()
-    data = f'<PointData Scalars="{NAME}">{writer.array(NAME, field.values)}</PointData>'
+    data = f'<PointData Scalars="{name}">{writer.array(name, values)}</PointData>'
     xyz = f"<Points>{writer.array('Points', points)}</Points>"
     ends = np.cumsum(counts)
     cells = f"<{group}>{writer.array('connectivity', corners)}{writer.array('offsets', ends)}</{group}>"
     sizes = f'NumberOfPoints="{len(points)}" NumberOf{group}="{len(counts)}"'
     return writer.file("PolyData", f"<PolyData><Piece {sizes}>{data}{xyz}{cells}</Piece></PolyData>")
+
+
+def save_with_values(shape: SurfaceShape, path: PathLike, name: str, values: NDArray[np.floating]) -> None:
+    """Write a surface with a named value at each vertex, in a format of `VALUE_FORMATS`."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(VALUE_FORMATS[extension(path)](shape, name, values))
+
+
+VALUE_FORMATS: dict[str, Callable[[SurfaceShape, str, NDArray[np.floating]], bytes]] = {".ply": ply_of, ".vtp": vtp_of}
 
 
 def write_obj(field: VertexField[SurfaceShape]) -> bytes:

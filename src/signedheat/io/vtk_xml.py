@@ -10,8 +10,10 @@ import base64
 import binascii
 import math
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -39,13 +41,18 @@ _NAMES = {code: name for name, code in _TYPES.items()}
 
 
 def write_vti(
-    values: NDArray[Any], origin: NDArray[np.float64], spacing: NDArray[np.float64], name: str, convention: str
+    values: NDArray[Any],
+    origin: NDArray[np.float64],
+    spacing: NDArray[np.float64],
+    name: str,
+    convention: str,
+    others: Mapping[str, NDArray[Any]] = MappingProxyType({}),
 ) -> bytes:
-    """Image data of up to three axes; a missing axis has one node."""
+    """Image data of up to three axes; a missing axis has one node. `others` are further values at the nodes."""
     missing = 3 - values.ndim
     extent = " ".join(f"0 {n - 1}" for n in values.shape + (1,) * missing)
     writer = _Writer()
-    array = writer.array(name, values.ravel(order="F"))
+    arrays = "".join(writer.array(key, at.ravel(order="F")) for key, at in {name: values, **others}.items())
     attributes = (
         f'WholeExtent="{extent}" Origin="{_words([*origin, *[0.0] * missing])}" '
         f'Spacing="{_words([*spacing, *[1.0] * missing])}" Direction="1 0 0 0 1 0 0 0 1"'
@@ -53,13 +60,20 @@ def write_vti(
     body = (
         f"<!-- {convention} -->\n"
         f'<ImageData {attributes}><Piece Extent="{extent}">'
-        f'<PointData Scalars="{name}">{array}</PointData></Piece></ImageData>'
+        f'<PointData Scalars="{name}">{arrays}</PointData></Piece></ImageData>'
     )
     return writer.file("ImageData", body)
 
 
 def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
     """Values (first scalar array), origin and spacing of image data."""
+    return read_vti_with(path, "")[:3]
+
+
+def read_vti_with(
+    path: PathLike, other: str
+) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64], NDArray[Any] | None]:
+    """The same, and a further array of this name, if there is one."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
     extent = numbers(image.get("WholeExtent", "").split() if image is not None else [], path, "extent", int)
@@ -95,21 +109,23 @@ def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray
     if extent[::2].any():
         origin = origin + spacing * extent[::2]
     nodes = piece.find("PointData")
-    element = nodes.find("DataArray") if nodes is not None else None
-    if element is None:
+    found = [] if nodes is None else nodes.findall("DataArray")
+    if not found:
         raise FileFormatError(
             "there are no values at the nodes",
             remedy="save them as point data",
             path=path,
         )
-    if element.get("NumberOfComponents", "1") not in ("1", ""):
-        raise FileFormatError(
-            f"'{element.get('Name')}' has {element.get('NumberOfComponents')} numbers at each node",
-            remedy="save a scalar",
-            path=path,
-        )
-    values = arrays.of(element, n_nodes)
-    return values.reshape(shape[:dimension], order="F"), origin[:dimension], spacing[:dimension]
+    images = []
+    for element in [found[0], *(each for each in found[1:] if each.get("Name") == other)][:2]:
+        if element.get("NumberOfComponents", "1") not in ("1", ""):
+            raise FileFormatError(
+                f"'{element.get('Name')}' has {element.get('NumberOfComponents')} numbers at each node",
+                remedy="save a scalar",
+                path=path,
+            )
+        images.append(arrays.of(element, n_nodes).reshape(shape[:dimension], order="F"))
+    return images[0], origin[:dimension], spacing[:dimension], images[1] if len(images) > 1 else None
 
 
 def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:

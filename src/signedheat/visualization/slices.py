@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
+from ..geometry.marching import level_lines
 from ..io.files import PathLike
 from ..packages import lazy_module
 from .colors import add_color_bar, distance_colors, isolines_between
@@ -30,7 +33,8 @@ AXES = "xyz"
 def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Sequence[float] = ()) -> None:
     """Write three orthogonal slices through a field, each where it cuts most of the inside, with the shape.
 
-    Blue is inside, orange outside; the black line is φ = 0; the shape is red; solid nodes are grey. A field in the
+    Blue is inside, orange outside; the black line is φ = 0, dashed where surface was completed; the shape is red; solid
+    nodes are grey. A field in the
     plane is drawn whole.
 
     Parameters
@@ -81,7 +85,9 @@ def draw_slices(
         layer = telling_layer(field, normal)
         position = float(field.grid.axes[normal][layer])
         u, v = field.grid.axes[horizontal], field.grid.axes[vertical]
-        _draw_panel(panel, u, v, field.values.take(layer, normal), colors, isolines, levels)
+        at = (slice(None),) * normal + (layer,)
+        trusted = None if field.confidence is None else field.confidence[at]
+        _draw_panel(panel, u, v, field.values[at], colors, isolines, levels, trusted)
         _draw_section(panel, shape, normal, position, float(field.grid.spacing[normal]))
         panel.set(xlabel=AXES[horizontal], ylabel=AXES[vertical])
         panel.set_title(f"{AXES[normal]} = {rounded(position, field.grid.spacing[normal])}", fontsize=10)
@@ -142,25 +148,50 @@ def _draw_panel(
     colors: ScalarMappable,
     isolines: NDArray[np.float64],
     levels: Sequence[float],
+    trusted: NDArray[np.float32] | None = None,
 ) -> None:
-    """Draw values on a plane, indexed [u, v], as colours and isolines."""
+    """Draw values on a plane, indexed [u, v], as colours and isolines; dashed levels where confidence is low."""
     shown = np.ma.masked_invalid(values.T)
     shading = "nearest" if shown.mask.any() else "gouraud"
     panel.pcolormesh(u, v, shown, cmap=colors.cmap, norm=colors.norm, shading=shading, rasterized=True)
     panel.set_facecolor("#b9b9b9")
     low, high = float(shown.min()), float(shown.max())
     isolines = isolines[(isolines > low) & (isolines < high)]
-    for lines, color, width, alpha in (
-        (isolines, "#20303c", 0.35, 0.7),
-        ([0.0], "black", 1.3, 1.0),
-        *(([level], "#1b6e3c", 1.3, 1.0) for level in levels),
-    ):
-        if any(low < line < high for line in lines):
-            panel.contour(u, v, shown, lines, colors=color, linewidths=width, alpha=alpha)
+    if len(isolines):
+        panel.contour(u, v, shown, isolines, colors="#20303c", linewidths=0.35, alpha=0.7)
+    for level, color in ((0.0, "black"), *((level, "#1b6e3c") for level in levels)):
+        if low < level < high:
+            for style, lines in level_pieces(u, v, values, level, trusted).items():
+                panel.add_collection(
+                    mpl_collections.LineCollection(lines, colors=color, linewidths=1.3, linestyles=style, zorder=2)
+                )
     panel.set(aspect="equal", xlim=u[[0, -1]], ylim=v[[0, -1]])
     panel.tick_params(labelsize=8)
     for spine in panel.spines.values():
         spine.set_visible(False)
+
+
+def level_pieces(
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+    values: NDArray[np.float64],
+    level: float,
+    trusted: NDArray[np.float32] | None = None,
+) -> dict[str, list[NDArray[np.float64]]]:
+    """Lines of a level on a plane: solid where the surface was there, dashed where it was completed."""
+    spacing = np.array([u[1] - u[0], v[1] - v[0]])
+    pieces: dict[str, list[NDArray[np.float64]]] = {"solid": [], "dashed": []}
+    for line, _ in level_lines(values, np.zeros(2), np.ones(2), level):
+        places = line * spacing + [u[0], v[0]]
+        there = np.ones(len(line), dtype=bool)
+        if trusted is not None:
+            there = scipy.ndimage.map_coordinates(trusted, line.T, order=0, mode="nearest") >= 1.0
+        of_edge = there[1:] & there[:-1]
+        ends = np.flatnonzero(np.diff(of_edge)) + 1
+        for first, last in pairwise([0, *ends.tolist(), len(of_edge)]):
+            if last > first:
+                pieces["solid" if of_edge[first] else "dashed"].append(places[first : last + 1])
+    return pieces
 
 
 def cross_section(mesh: TriangleMesh, axis: int, position: float) -> NDArray[np.float64]:
