@@ -95,7 +95,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
                 shape,
                 domain,
                 band=arguments.band,
-                constraint=arguments.constraint,
+                constraint=constraint_of(arguments.constraint),
                 diffusion=arguments.diffusion,
                 as_oriented=arguments.as_oriented,
                 keep_overlaps=arguments.keep_overlaps,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from typing import cast
 
 from ..extensions.sampling import sample
+from ..fields.grid_field import GridField
 from ..io import ensure_writable, read
 from ..io.samples import SAMPLE_FORMATS
 from .computing import Summary, compute, describe, grid_for, prefix_errors
@@ -15,7 +17,7 @@ def run(arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, SAMPLE_FORMATS, "samples")
     shape = read(arguments.shape)
     with prefix_errors(arguments.shape):
-        field = compute(shape, grid_for(shape, arguments), arguments)
+        field = cast("GridField", compute(shape, grid_for(shape, arguments), arguments))
         taken = sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
     (taken.normalized() if arguments.normalize else taken).save(arguments.output, arguments.layout)
     figures = taken.figures

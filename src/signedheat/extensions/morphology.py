@@ -41,6 +41,8 @@ ROOM = 0.15
 
 Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
 """The boundary of a result, of the same kind as the shape."""
+Measure: TypeAlias = Callable[[Sources, Domain], Field]
+"""Called as ``measure(shape, domain)`` for the distance whose level sets are the offsets."""
 
 
 class _Morphology(Protocol):
@@ -48,15 +50,33 @@ class _Morphology(Protocol):
 
     @overload
     def __call__(
-        self, shape: Shapes, distance: float, domain: Grid | TetMesh | None = None, *, resolution: int = ...
+        self,
+        shape: Shapes,
+        distance: float,
+        domain: Grid | TetMesh | None = None,
+        *,
+        resolution: int = ...,
+        measure: Measure | None = ...,
     ) -> TriangleMesh: ...
     @overload
     def __call__(
-        self, shape: Polylines, distance: float, domain: Grid | None = None, *, resolution: int = ...
+        self,
+        shape: Polylines,
+        distance: float,
+        domain: Grid | None = None,
+        *,
+        resolution: int = ...,
+        measure: Measure | None = ...,
     ) -> list[Polyline]: ...
     @overload
     def __call__(
-        self, shape: CurvesAndPoints, distance: float, domain: SurfaceDomain, *, resolution: int = ...
+        self,
+        shape: CurvesAndPoints,
+        distance: float,
+        domain: SurfaceDomain,
+        *,
+        resolution: int = ...,
+        measure: Measure | None = ...,
     ) -> list[Curve]: ...
 
 
@@ -65,7 +85,14 @@ def _by_kind_of_shape(function: Callable[..., Boundary]) -> _Morphology:
 
 
 @_by_kind_of_shape
-def dilate(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
+def dilate(
+    shape: Sources,
+    distance: float,
+    domain: Domain | None = None,
+    *,
+    resolution: int = RESOLUTION,
+    measure: Measure | None = None,
+) -> Boundary:
     """Dilate a shape: offset it outward by a distance.
 
     Parameters
@@ -78,6 +105,9 @@ def dilate(shape: Sources, distance: float, domain: Domain | None = None, *, res
         Where the distance is computed; by default on a grid around the shape with room for the result.
     resolution : int
         Number of nodes along the longest side of that default grid.
+    measure : callable, optional
+        Called as ``measure(shape, domain)`` in place of what is usual there, which is `solid_distance` on grids in
+        space, to choose its options: ``partial(solid_distance, keep_overlaps=True)``.
 
     Returns
     -------
@@ -101,11 +131,18 @@ def dilate(shape: Sources, distance: float, domain: Domain | None = None, *, res
     True
     """
     distance = finite_number(distance, "the distance", least=0)
-    return _offsets(shape, (distance,), domain, resolution)
+    return _offsets(shape, (distance,), domain, resolution, measure)
 
 
 @_by_kind_of_shape
-def erode(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
+def erode(
+    shape: Sources,
+    distance: float,
+    domain: Domain | None = None,
+    *,
+    resolution: int = RESOLUTION,
+    measure: Measure | None = None,
+) -> Boundary:
     """Erode a shape: offset it inward by a distance. Parameters, result and errors are those of `dilate`.
 
     Examples
@@ -116,25 +153,45 @@ def erode(shape: Sources, distance: float, domain: Domain | None = None, *, reso
     True
     """
     distance = finite_number(distance, "the distance", least=0)
-    return _offsets(shape, (-distance,), domain, resolution)
+    return _offsets(shape, (-distance,), domain, resolution, measure)
 
 
 @_by_kind_of_shape
-def opening(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
+def opening(
+    shape: Sources,
+    distance: float,
+    domain: Domain | None = None,
+    *,
+    resolution: int = RESOLUTION,
+    measure: Measure | None = None,
+) -> Boundary:
     """Erode, then dilate: removes parts thinner than twice the distance, rounds convex corners. See `dilate`."""
     distance = finite_number(distance, "the distance", least=0)
-    return _offsets(shape, (-distance, distance), domain, resolution)
+    return _offsets(shape, (-distance, distance), domain, resolution, measure)
 
 
 @_by_kind_of_shape
-def closing(shape: Sources, distance: float, domain: Domain | None = None, *, resolution: int = RESOLUTION) -> Boundary:
+def closing(
+    shape: Sources,
+    distance: float,
+    domain: Domain | None = None,
+    *,
+    resolution: int = RESOLUTION,
+    measure: Measure | None = None,
+) -> Boundary:
     """Dilate, then erode: fills gaps narrower than twice the distance, rounds concave corners. See `dilate`."""
     distance = finite_number(distance, "the distance", least=0)
-    return _offsets(shape, (distance, -distance), domain, resolution)
+    return _offsets(shape, (distance, -distance), domain, resolution, measure)
 
 
 def shell(
-    shape: Shapes, inner: float, outer: float, domain: Grid | None = None, *, resolution: int = RESOLUTION
+    shape: Shapes,
+    inner: float,
+    outer: float,
+    domain: Grid | None = None,
+    *,
+    resolution: int = RESOLUTION,
+    measure: Measure | None = None,
 ) -> TriangleMesh:
     """The solid between two offsets of a shape, ``inner ≤ φ ≤ outer``: a wall, in which holes of the shape are closed.
 
@@ -148,6 +205,8 @@ def shell(
         By default a grid around the shape with room for the result.
     resolution : int
         Number of nodes along the longest side of that default grid.
+    measure : callable, optional
+        As in `dilate`.
 
     Returns
     -------
@@ -168,7 +227,7 @@ def shell(
             remedy="swap them, or set them apart",
         )
     grid = _grid(_room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else domain)
-    phi = _field(grid, shape).values
+    phi = (measure or _field)(shape, grid).values
     return _wall(grid, np.maximum(inner - phi, phi - outer), outer - inner)
 
 
@@ -222,7 +281,7 @@ def thicken(
     return _wall(grid, depth, above + below)
 
 
-def _field(domain: Domain, shape: Sources) -> Field:
+def _field(shape: Sources, domain: Domain) -> Field:
     """The distance whose level sets are the offsets: that to a solid, where the domain is a grid in space."""
     shape = converted(shape)
     if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
@@ -237,12 +296,14 @@ def _sided(domain: Domain, shape: Sources) -> Field:
     return sharpen(field) if isinstance(field, GridField) else field
 
 
-def _offsets(shape: Sources, distances: tuple[float, ...], domain: Domain | None, resolution: int) -> Boundary:
+def _offsets(
+    shape: Sources, distances: tuple[float, ...], domain: Domain | None, resolution: int, measure: Measure | None
+) -> Boundary:
     """Successive offsets, each of the distance to the previous one."""
     if domain is None:
         domain = _room(shape, max(0.0, *distances), resolution)
     for distance in distances:
-        field = _field(domain, shape)
+        field = (measure or _field)(shape, domain)
         boundary = field.contour(distance) if isinstance(field, VertexField) else field.offset(distance)
         shape = boundary
     return boundary

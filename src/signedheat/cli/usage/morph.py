@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from .options import add_command, finite, whole_number
+from .options import add_command, add_method_options, add_room_options, add_step_options, check_grid_options, finite
 
 DISTANCES = {
     "dilate": (1, 1),
@@ -34,14 +34,19 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("distances", metavar="DISTANCE", type=finite, nargs="+", help="in the units of the file")
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="surface: .stl .obj .ply .off .vtp")
-    parser.add_argument(
-        "--resolution", type=whole_number(2), default=128, metavar="N", help="nodes along the longest side (128)"
-    )
+    add_room_options(parser)
+    add_step_options(parser)
+    add_method_options(parser)
+    parser.add_argument("--preview", metavar="PNG", help="draw the distance to the shape in slices, with the offsets")
+    parser.set_defaults(origin=None, grid_shape=None, mask=None, band=None)
     parser.set_defaults(check=check)
 
 
 def check(arguments: Namespace) -> None:
-    """Reject a wrong number of distances."""
+    """Reject a wrong number of distances, and options that contradict each other."""
+    check_grid_options(arguments)
+    if arguments.operation == "thicken" and (arguments.as_oriented or arguments.keep_overlaps or arguments.plain):
+        arguments.parser.error("--as-oriented, --keep-overlaps and --plain are for solids, and thicken takes sheets")
     fewest, most = DISTANCES[arguments.operation]
     if not fewest <= len(arguments.distances) <= most:
         wanted = str(fewest) if fewest == most else f"{fewest} or {most}"
