@@ -10,7 +10,7 @@ from ..domains.grid import Grid
 from ..domains.inspection import inspect
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import SourceError
+from ..errors import SignedHeatError, SourceError
 from ..extensions.orientation import Orientation, orientation
 from ..extensions.thickness import Thickness, thickness
 from ..io import FIELD_FORMATS, load_field, read, read_curves, read_polylines
@@ -21,22 +21,40 @@ from ..lowering.grid.discretization import fitting_spacing, memory_estimate
 from ..memory import available_memory
 from .computing import Summary, describe
 from .curve_report import as_text, curve_reports
+from .streams import say
 from .usage.options import is_planar
 
 
 def run(arguments: Namespace) -> Summary:
+    """Inspect files; of several, those that cannot be read do not stop the others."""
+    if len(arguments.files) == 1:
+        return report(arguments.files[0], arguments)
+    summaries, texts, failed = [], [], 0
+    for file in arguments.files:
+        try:
+            summary, text = report(file, arguments)
+        except SignedHeatError as error:
+            say(f"signedheat: {' '.join(str(error if error.path else error.at(file)).split())}")
+            failed += 1
+        else:
+            summaries.append(summary)
+            texts.append(text)
+    return {"files": summaries, "failed": failed}, "\n\n".join(texts)
+
+
+def report(file: str, arguments: Namespace) -> Summary:
     """Inspect a shape or a field."""
-    if extension(arguments.file) in FIELD_FORMATS:
-        field = load_field(arguments.file)
-        summary = {"file": arguments.file, "kind": type(field).__name__, **describe(field)}
+    if extension(file) in FIELD_FORMATS:
+        field = load_field(file)
+        summary = {"file": file, "kind": type(field).__name__, **describe(field)}
         del summary["seconds"]
         return summary, _table(summary)
-    if is_planar(arguments.file):
-        return lines_report(arguments)
-    shape = read(arguments.file)
-    summary = {"file": arguments.file, "kind": type(shape).__name__, **asdict(inspect(shape))}
-    if extension(arguments.file) == ".obj":
-        summary["line_elements"] = len(read_obj_lines(arguments.file)[1])
+    if is_planar(file):
+        return lines_report(file)
+    shape = read(file)
+    summary = {"file": file, "kind": type(shape).__name__, **asdict(inspect(shape))}
+    if extension(file) == ".obj":
+        summary["line_elements"] = len(read_obj_lines(file)[1])
     rows = dict(summary)
     if isinstance(shape, TriangleMesh | PolygonMesh):
         found = orientation(shape)
@@ -60,12 +78,12 @@ def run(arguments: Namespace) -> Summary:
     return summary, text
 
 
-def lines_report(arguments: Namespace) -> Summary:
+def lines_report(file: str) -> Summary:
     """Inspect polylines in the plane."""
-    lines = read_polylines(arguments.file)
+    lines = read_polylines(file)
     bounds = bounds_around(lines)
     summary = {
-        "file": arguments.file,
+        "file": file,
         "kind": "Polyline",
         "n_polylines": len(lines),
         "n_closed": sum(line.closed for line in lines),

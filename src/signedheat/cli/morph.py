@@ -39,7 +39,7 @@ def run(arguments: Namespace) -> Summary:
     options = {} if arguments.operation == "thicken" else {"measure": measure}
     with prefix_errors(arguments.shape):
         grid = grid_for(shape, arguments, max(abs(distance) for distance in arguments.distances))
-        surface = OPERATIONS[arguments.operation](shape, *arguments.distances, grid, **options)
+        surface = OPERATIONS[arguments.operation](shape, *arguments.distances, domain=grid, **options)
     save(surface, arguments.output)
     if arguments.preview and fields:
         save_slices(fields[0], arguments.preview, shape, levels(arguments))

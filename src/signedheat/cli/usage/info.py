@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 from .options import add_command, whole_number
+
+CURVES = (".txt", ".json")
+"""Extensions of files that have curves, and nothing else."""
 
 
 def add_to(commands: Any) -> None:
@@ -17,8 +22,14 @@ def add_to(commands: Any) -> None:
         "which way the parts of a mesh face, doubled walls, bodies within others, sheets, the thinnest wall and gap; "
         "the memory that grids around a shape take. Of a field: its grid and range.",
     )
-    parser.add_argument("file", metavar="FILE", help="a shape, polylines in the plane or a field")
-    parser.add_argument("curves", metavar="CURVES", nargs="?", help="curves on the shape: .txt .obj .json")
+    parser.usage = "%(prog)s FILE [FILE ...] [--curves CURVES] [options]"
+    parser.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="shapes, polylines in the plane or fields; a .txt or .json file after a shape has curves on it",
+    )
+    parser.add_argument("--curves", metavar="CURVES", help="curves on the shape: .txt .json .obj .csv")
     parser.add_argument(
         "--resolution",
         type=whole_number(2),
@@ -27,3 +38,13 @@ def add_to(commands: Any) -> None:
         metavar="N",
         help="resolutions at which to estimate memory",
     )
+    parser.set_defaults(check=check)
+
+
+def check(arguments: Namespace) -> None:
+    """Tell curves from files, and reject those of several shapes."""
+    last = Path(arguments.files[-1]).suffix.lower()
+    if len(arguments.files) == 2 and last in CURVES and arguments.curves is None:
+        arguments.curves = arguments.files.pop()
+    if arguments.curves is not None and len(arguments.files) > 1:
+        arguments.parser.error(f"curves lie on one shape, and there are {len(arguments.files)}")

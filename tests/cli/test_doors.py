@@ -1,0 +1,90 @@
+"""Several files at once, and options of `morph` beside those of its sisters."""
+
+import json
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.cli import main
+
+
+@pytest.fixture
+def ball(tmp_path):
+    path = tmp_path / "ball.ply"
+    samples.without_faces(samples.sphere(3), 0.2).save(path)
+    return str(path)
+
+
+def test_info_of_several_files(tmp_path, ball, capsys):
+    other = str(tmp_path / "points.xyz")
+    samples.oriented_points(samples.sphere(2), 50).save(other)
+    assert main(["info", ball, other, "--json"]) == 0
+    files = json.loads(capsys.readouterr().out)["files"]
+    assert [each["file"] for each in files] == [ball, other]
+    alone = main(["info", ball, "--json"]), json.loads(capsys.readouterr().out)
+    assert alone[1].keys() == files[0].keys()
+    assert main(["info", ball, str(tmp_path / "missing.stl"), other]) == 1
+    printed, said = capsys.readouterr()
+    assert ball in printed and other in printed and said.count("\n") == 1 and "missing.stl" in said
+
+
+def test_two_obj_files_are_two_shapes(tmp_path, capsys):
+    for name in "ab":
+        samples.sphere(1).save(tmp_path / f"{name}.obj")
+    assert main(["info", str(tmp_path / "a.obj"), str(tmp_path / "b.obj"), "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["files"]) == 2
+    assert main(["info", str(tmp_path / "a.obj"), str(tmp_path / "b.obj"), "--curves", "c.txt"]) == 2
+
+
+def test_morph_takes_a_spacing_and_tells_what_it_found(tmp_path, ball, capsys):
+    output, picture = tmp_path / "grown.stl", tmp_path / "grown.png"
+    options = ["--spacing", "0.1", "--padding", "0.5", "--preview", str(picture), "--json"]
+    turned = samples.with_flipped_faces(samples.sphere(3), 0.1)
+    turned.save(tmp_path / "turned.ply")
+    assert main(["morph", "dilate", str(tmp_path / "turned.ply"), "0.2", "-o", str(output), *options]) == 0
+    printed, said = capsys.readouterr()
+    assert "faces turned" in said
+    field = json.loads(printed)["field"]
+    assert field["spacing"] == [0.1] * 3 and picture.stat().st_size > 5000
+    assert np.linalg.norm(sh.read(output).vertices, axis=1) == pytest.approx(1.2, abs=0.02)
+
+
+def test_morph_leaves_steps_out(tmp_path, capsys):
+    body = samples.union(samples.sphere(3), samples.sphere(2, radius=0.5))
+    body.save(tmp_path / "nested.ply")
+    volumes = []
+    for options in ([], ["--keep-overlaps"]):
+        output = tmp_path / "eroded.ply"
+        arguments = ["morph", "erode", str(tmp_path / "nested.ply"), "0.1", "-o", str(output), "--resolution", "40"]
+        assert main([*arguments, *options, "--quiet"]) == 0
+        surface = sh.read(output)
+        volumes.append(np.einsum("ij,ij->", surface.vertices[surface.faces[:, 0]], surface.face_area_vectors) / 3)
+    assert volumes[0] == pytest.approx(4 / 3 * np.pi * 0.9**3, rel=0.03)
+    assert volumes[1] < 0.97 * volumes[0]
+
+
+def test_a_measure_of_ones_own(tmp_path):
+    asked = []
+
+    def measure(shape, grid):
+        asked.append(shape)
+        return sh.solid_distance(shape, grid)
+
+    ball = samples.sphere(2)
+    same = sh.closing(ball, 0.1, resolution=20, measure=measure)
+    assert len(asked) == 2 and asked[0] is ball
+    np.testing.assert_array_equal(same.vertices, sh.closing(ball, 0.1, resolution=20).vertices)
+    sh.shell(ball, 0.0, 0.4, resolution=20, measure=measure)
+    assert len(asked) == 3
+
+
+@pytest.mark.parametrize(
+    "options", [["--spacing", "0.1", "--resolution", "20"], ["--spacing", "0.1", "0.1"], ["--plain", "thicken"]]
+)
+def test_bad_usage_of_morph(tmp_path, ball, capsys, options):
+    operation = "thicken" if "thicken" in options else "dilate"
+    given = [option for option in options if option != "thicken"]
+    assert main(["morph", operation, ball, "0.1", "-o", str(tmp_path / "a.stl"), *given]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
