@@ -40,7 +40,8 @@ def test_deepsdf_layout_in_the_unit_sphere(tmp_path, ball, capsys):
     with np.load(output) as arrays:
         rows = np.concatenate([arrays["pos"], arrays["neg"]])
     assert rows.shape == (500, 4)
-    assert np.abs(rows[:, 3] - (np.linalg.norm(rows[:, :3], axis=1) - 1)).max() < 0.13  # a cell, which the completion may be off
+    # the completion may be off a cell
+    assert np.abs(rows[:, 3] - (np.linalg.norm(rows[:, :3], axis=1) - 1)).max() < 0.13
 
 
 @pytest.mark.parametrize(
