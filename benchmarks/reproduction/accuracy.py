@@ -54,8 +54,8 @@ def sharpening(page: Page) -> None:
     the zero set instead, which is exact on triangles, and keep the convex method as `sh.Convex()`.
     """
     mesh = shapes.flat_disk(6000)
-    curve = shapes.placed(mesh, circle(0.7, (0.5, 0.0)))
     exact = np.linalg.norm(mesh.vertices[:, :2] - [0.5, 0], axis=1) - 0.7
+    curve = mesh.level_set(exact, 0.0)
     solver = sh.SignedHeatSolver(mesh, diffusion=100.0, intrinsic=False)
     field, first = seconds(lambda: solver.distance(curve))
     fields = {"before": (field, first)}
@@ -65,7 +65,7 @@ def sharpening(page: Page) -> None:
     for k, (name, (result, took)) in enumerate(fields.items()):
         page.add(field=name, **{"ε %": baselines.error(result.values, exact), "seconds": took})
         axes = picture.add_subplot(1, 3, k + 1)
-        draw_surface(result, axes, [curve], view=FROM_ABOVE)
+        draw_surface(result, axes, curve, view=FROM_ABOVE)
         axes.set_title(name)
     page.draw(picture)
 

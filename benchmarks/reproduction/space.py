@@ -246,14 +246,15 @@ def broken_geometry_on_tets(page: Page) -> None:
 
 @figure("27", "Completion that continues positions and normals")
 def natural_completion(page: Page) -> None:
-    """A sphere without a large cap. The zero set of GSD leaves the rim in the direction of the normals there and bulges
-    over the hole, like a spline; GWN closes it with a flat, minimal-like membrane. Height: how far the completion
-    rises over the plane of the rim, against the cap's own height.
+    """A sphere without a cap. The zero set of GSD leaves the rim in the direction of the surface there, and bulges
+    over the hole; GWN closes it with a flat membrane. Height of the completion over the plane of the rim: the cap's own
+    is 0.25, straight extension gives a cone of height 0.58, GWN gives 0. Which is nearer to what is missing depends on
+    the shape; only GSD continues positions and normals.
     """
     ball, rim = samples.sphere(5), 0.75
     centers = ball.vertices[ball.faces].mean(axis=1)
     cup = sh.TriangleMesh(ball.vertices, ball.faces[centers[:, 2] < rim])
-    grid = sh.Grid.around(ball.bounds, resolution=96, padding=0.6)
+    grid = sh.Grid.around(ball.bounds, resolution=96, padding=0.7)
     winding = baselines.solid_winding(grid.points.reshape(-1, 3), cup).reshape(grid.shape)
     fields = {"GWN, level ½": sh.GridField(grid, 0.5 - winding)}
     for diffusion in (1.0, 10.0, 100.0):

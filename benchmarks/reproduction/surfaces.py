@@ -184,7 +184,7 @@ def failing_gracefully(page: Page) -> None:
         field = solver.distance(curves)
         page.add(damage=name, **{"ε %": baselines.error(field.values, exact, weights)})
         axes = picture.add_subplot(2, 4, k + 1)
-        draw_surface(field, axes, curves)
+        draw_surface(field, axes, curves, view=np.array([0.3, -1.0, 0.25]))
         axes.set_title(name)
     page.draw(picture)
 
@@ -208,7 +208,7 @@ def drawn_on_higher_genus(page: Page) -> None:
     picture = new_figure(12, 5)
     for k, (name, curves) in enumerate({"strokes": strokes, "closed": closed}.items()):
         axes = picture.add_subplot(1, 2, k + 1)
-        draw_surface(solver.distance(strokes), axes, curves)
+        draw_surface(solver.distance(strokes), axes, curves, view=np.array([0.3, -0.6, 0.8]))
         axes.set_title(name)
     page.draw(picture)
 
