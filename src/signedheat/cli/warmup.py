@@ -57,6 +57,8 @@ def solids() -> None:
     field = solid_distance(broken, Grid.around(broken.bounds, 20))
     field.offset(0.1)
     sample(field, 20)
+    fine = Grid.around(ball.bounds, 48)
+    solid_distance(ball, fine, band=3 * float(fine.spacing.max())).offset(0.0)
     points = PointCloud(ball.vertices)
     solid_distance(points, Grid.around(ball.bounds, 20))
     plain = signed_distance(broken, resolution=12)
@@ -78,7 +80,7 @@ def plane() -> None:
     walls = np.zeros((9, 9), dtype=bool)
     walls[4, :6] = True
     signed_distance(line, Grid((0, 0), 1.0, (9, 9), walls))
-    sharpen(signed_distance(line, Grid((0, 0), 1.0, (9, 9)))).contour(1.0)
+    sharpen(signed_distance(line, Grid((0, 0), 1.0, (9, 9)))).contour(0.0)
     solid_walls = np.zeros((7, 7, 7), dtype=bool)
     solid_walls[3, :5] = True
     signed_distance(samples.sphere(1, 2.0, (3, 3, 3)), Grid((0, 0, 0), 1.0, (7, 7, 7), solid_walls))
