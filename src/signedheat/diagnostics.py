@@ -142,13 +142,24 @@ class PointsLeftOut(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SlopeErrors(Note):
-    """Root mean square of ``|∇φ| − 1`` over the domain, before and after sharpening."""
+    """Root mean square of ``|∇φ| − 1`` over the domain, before and after sharpening.
+
+    Attributes
+    ----------
+    slope_error_before, slope_error_after : float
+        The two.
+    worse : bool
+        Whether the slopes of most of the domain became worse, so that the field before is the better distance. Cells
+        without height and the kinks that every distance has do not count: they may raise the root mean square.
+    """
 
     slope_error_before: float
     slope_error_after: float
+    worse: bool = False
 
     def __str__(self) -> str:
-        return f"slope error before: {self.slope_error_before:.3g}; after: {self.slope_error_after:.3g}"
+        found = f"slope error before: {self.slope_error_before:.3g}; after: {self.slope_error_after:.3g}"
+        return found + ("; the field before is the better distance" if self.worse else "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -339,3 +339,84 @@ def test_progress_can_cancel():
     plain = sh.SignedHeatSolver(mesh).distance(mesh.level_set(mesh.vertices[:, 0] ** 3 + mesh.vertices[:, 1], 0.0))
     with pytest.raises(Stop):
         sh.sharpen(plain, method=sh.Convex(), progress=progress)
+
+
+def latitudes(vertices: np.ndarray) -> np.ndarray:
+    """Distance from a circle on the unit sphere, oblique to the axes, of the points nearest to some points."""
+    return np.arcsin(vertices @ [0.48, 0.6, 0.64] / np.linalg.norm(vertices, axis=1)) - 0.3
+
+
+@pytest.mark.parametrize("spacing", [(1, 1, 1), (1, 1, 2)])
+def test_on_voxels_it_is_as_right_as_on_meshes(spacing):
+    """Errors used to be ten times the range: neighbouring faces disagreed on the lengths of their edges."""
+    errors = []
+    for n in (12, 24):
+        steps = 1.2 / n * np.array(spacing)
+        counts = (2.6 / steps).astype(int)
+        centers = (np.moveaxis(np.indices(counts), 0, -1) - (counts - 1) / 2) * steps
+        volume = np.linalg.norm(centers, axis=-1) < 1
+        surface = sh.DigitalSurface(volume, steps, origin=centers[0, 0, 0])
+        exact = latitudes(surface.vertices)
+        plain = sh.SignedHeatSolver(surface).distance(surface.level_set(exact))
+        sharp = sh.sharpen(plain)
+        assert discretize(surface).triangles.agree_on_lengths
+        assert sharp.diagnostics.note(SlopeErrors).slope_error_after < 0.08
+        assert error(sharp.values, exact) < 1.1 * error(plain.values, exact)
+        errors.append(error(sharp.values, exact))
+    assert errors[0] < 0.006 and errors[1] < 0.6 * errors[0]
+
+
+def test_on_a_box_of_voxels_it_is_exact():
+    """With a radius of 0 the voxel faces are the surface: round a box, distance from a belt is that along its faces."""
+    surface = sh.DigitalSurface(np.ones((20, 12, 6)), spacing=0.5, radius=0)
+    x = surface.vertices[:, 0]
+    phi = sh.sharpen(sh.SignedHeatSolver(surface).distance(surface.level_set(x - 3.1)))
+    side = (np.abs(surface.vertices[:, 1:] - surface.vertices[:, 1:].mean(axis=0)) > [2.9, 1.4]).any(axis=1)
+    assert np.abs(phi.values - (x - 3.1))[side].max() < 1e-5
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003])
+def test_on_points_it_is_closer_to_the_truth(noise):
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(3000, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    cloud = sh.PointCloud(points * (1 + noise * rng.normal(size=(3000, 1))))
+    exact = latitudes(points)
+    plain = sh.SignedHeatSolver(cloud).distance(cloud.level_set(exact))
+    assert error(sh.sharpen(plain).values, exact) < 0.7 * error(plain.values, exact)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_on_polygons_it_is_closer_to_the_truth(jitter):
+    """A torus of quadrilaterals, planar or not, and two circles round its tube."""
+    n, m = 48, 24
+    rng = np.random.default_rng(1)
+    around, across = (2 * np.pi * (k + jitter * rng.uniform(-1, 1, (n, m))) for k in np.indices((n, m)))
+    around, across = (around / n).ravel(), (across / m).ravel()
+    radius = 2 + 0.7 * np.cos(across)
+    vertices = np.stack([radius * np.cos(around), radius * np.sin(around), 0.7 * np.sin(across)], axis=1)
+    ids = np.arange(n * m).reshape(n, m)
+    beside = np.roll(ids, -1, axis=0)
+    quads = np.stack([ids, beside, np.roll(beside, -1, axis=1), np.roll(ids, -1, axis=1)], axis=-1).reshape(-1, 4)
+    mesh = sh.PolygonMesh(vertices, quads)
+    turn = np.angle(np.exp(1j * (across - 0.5)))
+    exact = 0.7 * np.copysign(np.minimum(np.abs(turn), np.pi - np.abs(turn)), turn)
+    plain = sh.SignedHeatSolver(mesh).distance(mesh.level_set(exact))
+    sharp = sh.sharpen(plain)
+    assert error(sharp.values, exact) < 0.4 * error(plain.values, exact)
+    assert not sharp.diagnostics.note(SlopeErrors).worse
+
+
+class Doubled:
+    """A method that makes any distance twice as large."""
+
+    def sharpened(self, discretization, elements, values, source, progress):
+        return 2 * values, ()
+
+
+def test_a_field_that_became_worse_is_told():
+    mesh = sphere(2)
+    plain = sh.SignedHeatSolver(mesh).distance(mesh.level_set(latitudes(mesh.vertices)))
+    with pytest.warns(sh.InexactWarning):
+        sharp = sh.sharpen(plain, Doubled())
+    assert sharp.diagnostics.note(SlopeErrors).worse

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.surfels import Surfels, boundary_surfels, corrected_normals
+from ..operators.surfel_smoothing import smoothed_corners
 from .display import Displayed, to_pyvista
 from .polygon_mesh import PolygonMesh
 from .surface import Surface
@@ -127,6 +128,11 @@ class DigitalSurface(Displayed, Surface):
     def normals(self) -> NDArray[np.float64]:
         """(m, 3) estimated unit normal of the digitised surface at each face, outward."""
         return frozen(corrected_normals(self.volume, self.surfels, self.spacing, self.radius))
+
+    @cached_property
+    def smooth_vertices(self) -> NDArray[np.float64]:
+        """(n, 3) the vertices moved so that faces are nearly orthogonal to `normals`: what distance is measured on."""
+        return frozen(smoothed_corners(self.vertices, self.surfels.corners, self.normals))
 
     @property
     def triangulation(self) -> TriangleMesh:

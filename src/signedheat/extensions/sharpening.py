@@ -15,7 +15,7 @@ from ..discretization import Discretization, SourceTerm
 from ..domains.curves import CurvesAndPoints
 from ..domains.grid import Dimension
 from ..domains.kinds import Shapes
-from ..errors import GeometryError, OutsideError, UnsupportedTypeError
+from ..errors import GeometryError, InexactWarning, OutsideError, UnsupportedTypeError, warn_user
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
@@ -40,6 +40,9 @@ class Method(Protocol):
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """Sharpened values at the unknowns, from the old ones, and notes for the diagnostics."""
 
+
+WORSE = 0.1
+"""Mean deviation of slopes from 1, none counted above 1, that sharpening may add. Triangles on their own have .08."""
 
 AnyField = TypeVar("AnyField", bound=VertexField | TetField)
 OnSurface = TypeVar("OnSurface", bound=VertexField)
@@ -105,7 +108,8 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
         The same kind of field. Sharpened to a shape, it has a `confidence`, contours whose vertices lie on the level
         exactly, and ``diagnostics`` with a note `diagnostics.SharpenedToShape`; sharpened to curves, a note
         `diagnostics.SharpenedToCurves`. On surfaces and tets ``diagnostics`` has a note `diagnostics.SlopeErrors`, the
-        root mean squares of ``|∇φ| − 1`` over the domain before and after, and notes of the method.
+        root mean squares of ``|∇φ| − 1`` over the domain before and after, and notes of the method. If slopes became
+        clearly worse, an `InexactWarning` is issued, and the note says so.
 
     Raises
     ------
@@ -181,6 +185,9 @@ def sharpened(
     if progress is not None:
         progress(1.0, "done")
     old = field.diagnostics
-    errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new))
+    worse = elements.bounded_slope_error(new) > 1.5 * elements.bounded_slope_error(values) + WORSE
+    errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new), worse)
+    if worse:
+        warn_user(f"sharpening made the field worse: {errors}", InexactWarning)
     timings = {**old.timings, "sharpen": time.perf_counter() - begin}
     return new, replace(old, timings=timings).noting(errors, *notes)

@@ -169,13 +169,3 @@ def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
     renamed = triangles[~kept[pair.ravel()]]
     forward[renamed, 0] ^= ~edges.forward[leading, 0][of_faces[renamed, 0] - n_edges]
     return EdgeTable(np.concatenate([edges.vertices, direction]), of_faces, forward)
-
-
-def flattened_sides(
-    surfels: Surfels, spacing: NDArray[np.float64], normals: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The two sides (m, 3) of each square at its first corner, projected on the plane orthogonal to its normal."""
-    lattice = surfels.vertices * spacing
-    corner = lattice[surfels.corners]
-    first, last = corner[:, 1] - corner[:, 0], corner[:, 3] - corner[:, 0]
-    return tuple(side - (side * normals).sum(axis=1)[:, None] * normals for side in (first, last))

@@ -77,6 +77,12 @@ class LinearElements:
 
     def slope_error(self, values: NDArray[np.float64]) -> float:
         """Root mean square of ``|∇φ| − 1`` over the cells in which φ is known."""
-        error = (np.linalg.norm(self.slopes(values), axis=1) - 1.0) ** 2
-        known = np.isfinite(error) & (self.sizes > 0)
-        return float(np.sqrt(np.average(error[known], weights=self.sizes[known]))) if known.any() else float("nan")
+        return float(np.sqrt(self._mean((np.linalg.norm(self.slopes(values), axis=1) - 1.0) ** 2)))
+
+    def bounded_slope_error(self, values: NDArray[np.float64]) -> float:
+        """Mean of ``min(| |∇φ| − 1 |, 1)``: hardly moved by cells without height, nor by the kinks of a distance."""
+        return self._mean(np.minimum(np.abs(np.linalg.norm(self.slopes(values), axis=1) - 1.0), 1.0))
+
+    def _mean(self, errors: NDArray[np.float64]) -> float:
+        known = np.isfinite(errors) & (self.sizes > 0)
+        return float(np.average(errors[known], weights=self.sizes[known])) if known.any() else float("nan")

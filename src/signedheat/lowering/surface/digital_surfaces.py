@@ -1,4 +1,4 @@
-"""Digital surfaces, lowered by projecting each square on the plane orthogonal to its corrected normal (Sec. 8)."""
+"""Digital surfaces, lowered as their squares lie when orthogonal to the corrected normals (Sec. 8)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ...discretization import discretize
 from ...domains.digital_surface import DigitalSurface
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
-from ...geometry.surfels import count_surfels, flattened_sides, separated_edges
+from ...geometry.surfels import count_surfels, separated_edges
 from .discretization import SurfaceDiscretization
 from .memory import refuse_too_many
 
@@ -18,22 +18,20 @@ BYTES_PER_VOXEL = 20
 
 @discretize.register
 def _(domain: DigitalSurface) -> SurfaceDiscretization:
-    """Each square becomes a parallelogram of four triangles. Neighbours share edges, but with different lengths.
+    """Each square becomes four triangles between its corners, moved, and their mean.
 
     h is the standard deviation of the Gaussian with which normals are estimated, and at least the voxel size. At a
     smaller scale the shape of the surface is unknown, and diffusion would follow the directions of the lattice.
     """
     faces = count_surfels(domain.volume)
     refuse_too_many(4 * faces, faces, "faces of voxels", beside=BYTES_PER_VOXEL * domain.volume.size)
-    first, last = flattened_sides(domain.surfels, domain.spacing, domain.normals)
-    around = np.stack([np.zeros_like(first), first, first + last, last], axis=1)
-    middle = np.broadcast_to(0.5 * (first + last)[:, None], around.shape)
-    corners = np.stack([around, np.roll(around, -1, axis=1), middle], axis=2).reshape(-1, 3, 3)
-    lengths, _ = mollify(np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2), 1e-6)
-    mesh = domain.triangulation
+    mesh, corners = domain.triangulation, domain.smooth_vertices
+    positions = np.concatenate([corners, corners[domain.surfels.corners].mean(axis=1)])
+    placed = positions[mesh.faces]
+    lengths, _ = mollify(np.linalg.norm(np.roll(placed, -1, axis=1) - placed, axis=2), 1e-6)
     edges = separated_edges(mesh.edges, domain.surfels)
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
     extent = float((domain.bounds[1] - domain.bounds[0]).max())
     spacing = max(min(0.5 * domain.radius, extent), float(domain.spacing.mean()))
     own = np.arange(domain.n_vertices)
-    return SurfaceDiscretization(domain, triangles, restriction=own, positions=corners, spacing=spacing)
+    return SurfaceDiscretization(domain, triangles, restriction=own, positions=positions, spacing=spacing)
