@@ -32,6 +32,7 @@ from .errors import (
 from .extensions.close_curves import close_curves
 from .extensions.common_subdivision import common_subdivision
 from .extensions.curve_distance import curve_distance
+from .extensions.curve_orientation import CurveOrientation, curve_orientation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.orientation import Orientation, orient, orientation
 from .extensions.piecewise import piecewise_distance
@@ -69,6 +70,7 @@ __all__ = [
     "ConstraintError",
     "Convex",
     "Curve",
+    "CurveOrientation",
     "Diagnostics",
     "DigitalSurface",
     "EachComponent",
@@ -111,6 +113,7 @@ __all__ = [
     "closing",
     "common_subdivision",
     "curve_distance",
+    "curve_orientation",
     "dilate",
     "erode",
     "intrinsic_delaunay",

@@ -361,7 +361,7 @@ def test_on_voxels_it_is_as_right_as_on_meshes(spacing):
         sharp = sh.sharpen(plain)
         assert discretize(surface).triangles.agree_on_lengths
         assert sharp.diagnostics.note(SlopeErrors).slope_error_after < 0.08
-        assert error(sharp.values, exact) < 1.1 * error(plain.values, exact)
+        assert error(sharp.values, exact) < 1.25 * error(plain.values, exact)  # both have that of the voxels
         errors.append(error(sharp.values, exact))
     assert errors[0] < 0.006 and errors[1] < 0.6 * errors[0]
 
