@@ -59,7 +59,7 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain) ->
     the end and −1 at the beginning of every piece and C the Laplacian: the energy of charges, which is small where
     opposite charges are close to each other. Directions s = ±1 that make the energy of ``Σ s_i q_i`` small are found
     from its pairwise terms (`synchronize_signs`), to which every piece adds a weak vote for its own direction. Only
-    ends count, so that curves that run beside each other do not disturb.
+    ends count, so that curves that run beside each other hardly disturb, unless their gaps lie side by side.
 
     Curves that are complete, unoriented curves and points stay as they are. Pieces of different curves that are far
     from each other have the direction that most of their length was given with.
