@@ -34,7 +34,8 @@ from .extensions.common_subdivision import common_subdivision
 from .extensions.curve_distance import curve_distance
 from .extensions.curve_orientation import CurveOrientation, curve_orientation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
-from .extensions.orientation import Orientation, orient, orientation
+from .extensions.orient import orient
+from .extensions.orientation import Orientation, orientation
 from .extensions.piecewise import piecewise_distance
 from .extensions.sampling import Samples, sample
 from .extensions.sharpening import sharpen

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from typing import cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import ShapeOriented
-from ..domains.curves import CurveOrPoints
 from ..domains.foreign import ForeignShape, converted
-from ..domains.kinds import SurfaceDomain
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
@@ -23,7 +20,6 @@ from ..geometry.soup_orientation import disagreeing_with_neighbors, odds_at_corn
 from ..geometry.stabbing_lines import LineCrossings, aimed_lines, joined, stabbing_lines
 from ..geometry.surface_parts import SurfaceParts
 from ..reprs import ShortRepr
-from .curve_orientation import curve_orientation
 from .mesh_faces import Mesh, MeshFaces
 
 SoupSigns = Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.integer]]
@@ -116,51 +112,6 @@ class Orientation(Frozen, ShortRepr):
     def note(self) -> ShapeOriented:
         """What is told of it in diagnostics."""
         return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
-
-
-@overload
-def orient(shape: Mesh | ForeignShape) -> Mesh: ...
-@overload
-def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain) -> list[CurveOrPoints]: ...
-def orient(
-    shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | None = None
-) -> Mesh | list[CurveOrPoints]:
-    """A mesh with its faces turned so that neighbours agree and every part points outwards; or curves that agree.
-
-    See `orientation` and `curve_orientation`, which also tell what was turned.
-
-    Parameters
-    ----------
-    shape : TriangleMesh, PolygonMesh or a sequence of Curve and SurfacePoints
-        Any mesh, or the pieces of broken curves.
-    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
-        The surface that the curves lie on.
-
-    Raises
-    ------
-    GeometryError
-        If the shape is no mesh, and no domain is given.
-    SourceError
-        If a curve does not fit the domain.
-
-    Examples
-    --------
-    >>> from signedheat import samples
-    >>> sphere = samples.with_flipped_faces(samples.sphere(3), 0.4)
-    >>> bool((orient(sphere).faces == samples.sphere(3).faces).all())
-    True
-
-    Four quarters of a circle with gaps, of which one runs the wrong way:
-
-    >>> mesh = samples.torus(n_around=48, n_across=24)
-    >>> pieces = [mesh.path(24 * np.arange(begin, begin + 9)) for begin in (0, 12, 24, 36)]
-    >>> pieces[1] = pieces[1].reversed()
-    >>> [bool(piece.faces[0] == given.faces[0]) for piece, given in zip(orient(pieces, mesh), pieces)]
-    [True, False, True, True]
-    """
-    if domain is None:
-        return orientation(cast("Mesh | ForeignShape", shape)).shape
-    return curve_orientation(cast("Sequence[CurveOrPoints]", shape), domain).curves
 
 
 def orientation(shape: Mesh | ForeignShape, soup_signs: SoupSigns | None = None) -> Orientation:
