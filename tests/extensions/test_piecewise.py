@@ -355,3 +355,24 @@ def test_progress_can_cancel():
     mesh, curve = CASES["open arc"]()
     with pytest.raises(Stop):
         sh.piecewise_distance(mesh, curve, progress=progress)
+
+
+@pytest.mark.parametrize("build", [lambda: sphere(4), lambda: torus(n_around=96, n_across=48)])
+def test_curves_that_bound_take_few_rounds(build):
+    """Without a cut, nothing larger than the triangles is left to find; it used to take more than a thousand rounds."""
+    mesh = build()
+    heights = np.linalg.norm(mesh.vertices - mesh.vertices[7], axis=1) - 0.8
+    curve = mesh.level_set(heights)
+    phi = sh.piecewise_distance(mesh, curve)
+    assert phi.diagnostics.note(Jumps).rounds <= 200 and phi.diagnostics.note(Jumps).continuous
+    plain = sh.SignedHeatSolver(mesh).distance(curve, sh.Free()).values
+    difference = phi.values.mean(axis=1) - plain[mesh.faces].mean(axis=1)
+    assert np.sqrt(np.mean(difference**2)) < 0.02 * np.ptp(plain)
+
+
+@pytest.mark.parametrize("n_around", [40, 120])
+def test_a_cut_spread_over_many_edges_is_no_continuity(n_around):
+    """Round the tube of a torus all cuts cost the same, on the way to the solution φ jumps a little everywhere."""
+    mesh = torus(n_around=n_around, n_across=24)
+    phi = sh.piecewise_distance(mesh, mesh.path(range(24), closed=True))
+    assert len(phi.cut) == 1 and phi.diagnostics.note(Jumps).gap < 0.01

@@ -22,6 +22,8 @@ from ..errors import SignedHeatError
 from ..geometry.components import connected_components
 from ..linear import factorize
 
+LOOSE = 0.15
+"""Gap from which constants are asked whether they leave a cut. Without one, what is left is below the triangles."""
 _LOOK = 25  # rounds between two evaluations of the gap
 _RELAXATION = 1.6
 _THRESHOLD = 4.0  # initial threshold of the proximal step, relative to a typical difference
@@ -111,6 +113,7 @@ def minimize_fast(
     tolerance: float = 2e-3,
     max_rounds: int = 3000,
     progress: Callable[[float], None] | None = None,
+    enough: Callable[[NDArray[np.float64]], bool] | None = None,
 ) -> JumpSolution:
     """ADMM (Boyd et al. 2011) on ``min Σ 2w dist(z, [a, b])  s.t.  z = K c``, with one factorisation for all rounds.
 
@@ -127,6 +130,8 @@ def minimize_fast(
         Largest number of iterations.
     progress : callable, optional
         Called with the fraction of `max_rounds` done.
+    enough : callable, optional
+        Asked about constants whose gap is below `LOOSE` whether they will do: then no better ones are sought.
 
     Returns
     -------
@@ -164,6 +169,8 @@ def minimize_fast(
             flow = scaled * spring
             flow -= spring * problem.differences(factor.solve(transposed @ flow))
             bound = max(bound, problem.bound(flow * (2.0 * problem.weights.mean() / threshold)))
+            if enough is not None and least - bound < LOOSE * least and enough(best):
+                return JumpSolution(best, least, bound, rounds)
             if rounds % _PATIENCE == 0 and _lags(spring, difference, low, high, z, before, scaled):
                 threshold *= _GROWTH
                 scaled *= _GROWTH  # so that the unscaled multipliers stay the same

@@ -139,8 +139,7 @@ class PiecewiseField(Displayed, Frozen):
         These are the pairs across which φ jumps by more than it changes within a triangle, on connected lines with a
         jump of `FAR` times that somewhere. Errors in bad triangles are about their size, and no cuts.
         """
-        longest = self.triangles.edge_lengths.max(axis=1)
-        typical = float(np.average(longest, weights=self.triangles.face_areas))
+        longest, typical = self.triangles.edge_lengths.max(axis=1), typical_size(self.triangles)
         height = np.abs(self.jumps).max(axis=1)
         high = np.flatnonzero(height > np.maximum(longest[self.pairs.faces].max(axis=1), typical))
         ends = self.triangles.edges.vertices[self.pairs.edges[high]]
@@ -207,6 +206,11 @@ class PiecewiseField(Displayed, Frozen):
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"PiecewiseField({self.domain!r}, values from {low:.4g} to {high:.4g}, {len(self.cut)} cuts)"
+
+
+def typical_size(triangles: IntrinsicMesh) -> float:
+    """The longest side of a typical triangle."""
+    return float(np.average(triangles.edge_lengths.max(axis=1), weights=triangles.face_areas))
 
 
 def chains(edges: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
