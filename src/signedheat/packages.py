@@ -23,6 +23,7 @@ REMEDIES = {
     "skimage": "pip install scikit-image",
     "sksparse": "conda install -c conda-forge scikit-sparse",
     "tetgen": "pip install signedheat[tetgen]",
+    "zarr": "pip install signedheat[large]",
 }
 """How to get the packages that are not installed by the name by which they are imported."""
 

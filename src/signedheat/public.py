@@ -42,6 +42,7 @@ from .extensions.sharpening import sharpen
 from .extensions.sharpening_methods import Convex, Geodesic
 from .extensions.solid_distance import solid_distance
 from .extensions.tetrahedralize import tetrahedralize
+from .extensions.tiles import tiled_distance
 from .extensions.uniting import unite
 from .fields.band_field import BandField
 from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
@@ -139,6 +140,7 @@ __all__ = [
     "solid_distance",
     "tetrahedralize",
     "thicken",
+    "tiled_distance",
     "unite",
     "write_curves",
     "write_polylines",

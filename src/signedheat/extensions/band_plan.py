@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..domains.grid import Grid
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
+from ..geometry.box_tree import BoxTree
 from ..geometry.face_features import FaceFeatures
 from ..operators.grid.block_distances import FaceTree
 from ..operators.grid.blocks import CUBE, SIDE
@@ -22,8 +23,10 @@ NEAR = 2.0
 """Coarse cells from a face within which it tells the side."""
 FAR = 1.5
 """Cells from any face beyond which a zero set stands in for missing surface."""
-COARSEST, FINEST = 257, 4
-"""Most nodes of the coarse grid along any axis, and least ratio of its spacing to that of the band."""
+RATIO = 4
+"""Spacing of the coarse grid over that of the band, where nothing speaks against it."""
+FEWEST, MOST = 64, 257
+"""Nodes of the coarse grid along its longest side: with fewer it misses what it must complete, with more it is slow."""
 LEAST = 2.0
 """Cells that a band is wide on either side at least."""
 
@@ -46,6 +49,8 @@ class BandPlan:
         Those that tell a side.
     ends : (e, 3) float
         Places where the surface ends or tells no side, at most half a coarse cell apart, around the first node.
+    tree : BoxTree, optional
+        Over the boxes of the faces; made when it is first needed.
     """
 
     grid: Grid
@@ -54,6 +59,7 @@ class BandPlan:
     features: FaceFeatures
     telling: NDArray[np.bool_]
     ends: NDArray[np.float64]
+    tree: BoxTree | None = None
 
     @property
     def steps(self) -> NDArray[np.float64]:
@@ -73,7 +79,9 @@ class BandPlan:
     @cached_property
     def faces(self) -> FaceTree | None:
         """The faces in a tree; None if there are none."""
-        return FaceTree.of(self.features) if len(self.features.rows) else None
+        if not len(self.features.rows):
+            return None
+        return FaceTree.of(self.features) if self.tree is None else FaceTree(self.features, self.tree)
 
     @cached_property
     def open_places(self) -> scipy.spatial.cKDTree | None:
@@ -82,6 +90,11 @@ class BandPlan:
         crossings = np.zeros((0, 3)) if surface is None else surface.crossings[:, 1:4]
         places = np.concatenate([self.ends, crossings])
         return scipy.spatial.cKDTree(places) if len(places) else None
+
+    @cached_property
+    def end_tree(self) -> scipy.spatial.cKDTree | None:
+        """The places where the surface ends."""
+        return scipy.spatial.cKDTree(self.ends) if len(self.ends) else None
 
     @cached_property
     def tiles(self) -> NDArray[np.int64]:
@@ -157,9 +170,11 @@ class BandPlan:
 
 def coarse_grid(grid: Grid) -> Grid:
     """The grid of the coarse field for a band on a grid: its nodes are some of those, as far as they reach."""
-    factor = FINEST
-    while max(-(-(n - 1) // factor) for n in grid.shape) >= COARSEST:
+    factor, longest = RATIO, max(grid.shape) - 1
+    while longest // factor >= MOST:
         factor *= 2
+    while factor > 1 and longest // factor < FEWEST - 1:
+        factor //= 2
     return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..operators.grid.block_distances import NODES, TOGETHER, block_points
 from ..operators.grid.blocks import CUBE, SIDE, Blocks
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
+from .band_completion import completed_function, halo
 from .band_plan import FAR, NEAR, BandPlan
 
 
@@ -53,8 +54,8 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     low = np.asarray(tile, dtype=np.int64) * CUBE
     high = low + CUBE
     is_open = plan.is_open(low, high)
-    halo = 2 + int(plan.reach // (SIDE * float(plan.steps.min()))) if is_open else 0
-    blocks = Blocks.of(plan.blocks_in(low - halo, high + halo), plan.grid.shape)
+    wide = max(2 + int(plan.reach // (SIDE * float(plan.steps.min()))), halo(plan)) if is_open else 0
+    blocks = Blocks.of(plan.blocks_in(low - wide, high + wide), plan.grid.shape)
     sides = _sides(plan, blocks)
     own = ((blocks.places >= low) & (blocks.places < high)).all(axis=1)
     signs = np.where(sides.function[own] < 0, -1.0, 1.0)
@@ -62,7 +63,7 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     confidence = np.ones(distances.shape, dtype=np.float16)
     crossings = np.zeros((0, 18))
     if is_open:
-        crossings = _crossings(plan, sides, low - halo, high + halo)
+        crossings = _crossings(plan, sides, low - wide, high + wide)
         _completed(plan, places, distances, confidence, crossings)
     values = (signs * distances).astype(np.float32).reshape(-1, SIDE, SIDE, SIDE)
     confidence = confidence.reshape(values.shape)
@@ -87,6 +88,7 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
     """Distances to faces, (n, 512), and signed functions: what the nearest face tells, else the coarse field."""
     n = len(blocks)
     distances, function = np.full((n, NODES), np.inf), np.empty((n, NODES))
+    doubtful = np.zeros((n, NODES), dtype=bool)
     near = min(NEAR * plan.coarse_cell, plan.open_reach)
     for begin in range(0, n, TOGETHER):
         here = slice(begin, begin + TOGETHER)
@@ -101,6 +103,8 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
             signed[~told] = plan.coarse_function(points[~told])
         distances[here] = found.distances.reshape(-1, NODES)
         function[here] = signed.reshape(-1, NODES)
+        doubtful[here] = (~told & plan.telling[found.faces]).reshape(-1, NODES)
+    completed_function(plan, blocks, distances, function, doubtful)
     return _Sides(blocks, distances, function)
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import overload
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ..constraints import Constraint, ZeroSet
+from ..constraints import Constraint
 from ..diagnostics import Diagnostics, LeftOut, Note, OrientedPoints, SharpenedToShape
 from ..discretization import discretize
 from ..domains.grid import Grid
@@ -24,7 +24,6 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import sampled
 from ..lowering.area_elements import AreaSamples, bounds_around, sample_on_grid
-from ..lowering.grid.discretization import refuse_beyond_memory
 from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
 from ..operators.grid.boundary_areas import distances_to_samples
@@ -40,36 +39,14 @@ from .point_orientation import orient_points
 from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .sharpening import sharpen
 from .sides import FAR, Sides, choose_sides, nothing_inside
+from .steps import Steps
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
 
 STEPS = 7
 """Steps that are timed."""
-BYTES_PER_NODE, BYTES_IF_CLOSED = 64, 36
-"""Measured peak memory: of shapes with holes or overlaps, and of others, all of whose parts are closed."""
 BOUNDING = 0.22
 """Mean winding number of a face's two sides from which it tells inside from outside: 0 on a sheet, ½ on a solid, ¼ on
 one half a cell thick."""
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Which steps of `solid_distance` are taken, and how the method's own are.
-
-    Attributes
-    ----------
-    orient, unite, sharpen : bool
-        Turn faces that face the wrong way; leave out what lies inside other bodies; measure to the shape itself.
-    constraint : Constraint
-        On φ at the faces.
-    diffusion : float
-        τ in ``t = τ h²``.
-    """
-
-    orient: bool = True
-    unite: bool = True
-    sharpen: bool = True
-    constraint: Constraint = field(default_factory=ZeroSet)
-    diffusion: float = 1.0
 
 
 @overload
@@ -198,11 +175,16 @@ def solid_distance(
             raise UnsupportedTypeError(
                 "a band is computed around solids, on a grid in space without walls", remedy="leave out the band"
             )
-        coarse = _on_grid(solid, coarse_grid(domain), steps, within(progress, 0.0, 0.5))
+        coarse = coarse_distance(solid, domain, steps, within(progress, 0.0, 0.5))
         return band_around(coarse, domain, band, within(progress, 0.5, 1.0))
     if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
         return _on_grid(solid, domain, steps, progress)
     return _elsewhere(solid, domain, steps, progress)
+
+
+def coarse_distance(shape: Shape, domain: Grid, steps: Steps, progress: Progress | None) -> GridField:
+    """Distance on the coarse grid of a band; cells of its size do not tell thin walls from layers of noise."""
+    return _on_grid(shape, coarse_grid(domain), replace(steps, closed="exact"), progress)
 
 
 def _oriented(shape: Shape, notes: list[Note]) -> tuple[Merged, bool]:
@@ -239,15 +221,13 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
-    refuse_beyond_memory(grid, BYTES_IF_CLOSED if steps.sharpen and steps.orient else None)
+    discretization = discretize(grid)  # refuses what cannot fit
     with stopwatch("orient"):
         merged, closed = _oriented(shape, notes) if steps.orient else (merge_duplicates(shape), False)
     if closed and steps.sharpen:
         field = _bounded(merged, grid, steps, notes, stopwatch)
         if field is not None:
             return field
-    refuse_beyond_memory(grid, BYTES_PER_NODE if steps.sharpen else None)
-    discretization = discretize(grid)
     with stopwatch("unite"):
         shape, samples, winding = _united(merged, grid, steps, notes)
     if samples is None:  # doubled walls alone: there is no φ
@@ -268,7 +248,7 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     with stopwatch("sides"):
         sides = _closed_sides(winding, grid) if closed else _sides(phi, winding, samples, grid)
     with stopwatch("sharpen"):
-        sharpened = _sharpened(shape, phi, sides, closed, winding, grid)
+        sharpened = _sharpened(shape, phi, sides, closed, winding, grid, steps.closed)
     notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
     return _solid(sharpened, grid, notes, stopwatch, time)
 
@@ -279,25 +259,27 @@ def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwa
     None if it is not so. φ is needed where its faces lie in layers, only.
     """
     shape = merged.shape
-    if isinstance(shape, PointCloud) or not shape.triangulation.face_areas.any():
+    if isinstance(shape, PointCloud):
         return None
     with stopwatch("unite"):
         vertices, faces = triangles_of(shape)
         winding = closed_winding_numbers(((vertices - grid.origin) / grid.spacing)[faces], grid.shape)
         if winding is None or (steps.unite and winding.max() > 1):
             return None
-    if merged.count:
-        notes.append(LeftOut(merged_faces=merged.count))
-    if not grid.contains(shape.bounds).all():
-        notes.append(sampled(GridSource(sample_on_grid([shape], grid, SAMPLE_SIZE), grid, steps.diffusion)))
-    cell = float(grid.spacing.max())
-    function = np.where(winding > 0, -cell, cell)
-    del winding
-
-    def phi() -> NDArray[np.float64]:
         try:
             source = GridSource(sample_on_grid([shape], grid, SAMPLE_SIZE), grid, steps.diffusion)
         except CancellingNormalsError:
+            source = None
+    time = float("nan") if source is None else source.time
+    if merged.count:
+        notes.append(LeftOut(merged_faces=merged.count))
+    if source is not None:
+        notes.append(sampled(source))
+    cell = float(grid.spacing.max())
+    function = np.where(winding > 0, -cell, cell)
+
+    def phi() -> NDArray[np.float64]:
+        if source is None:
             return function
         discretization = discretize(grid)
         directions = normalize(discretization, diffuse(discretization, source))
@@ -305,8 +287,8 @@ def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwa
 
     stopwatch.skip(4)
     with stopwatch("sharpen"):
-        sharpened = assemble([shape], grid, function, "auto", phi)
-    return _solid(sharpened, grid, notes, stopwatch, float("nan"))
+        sharpened = assemble([shape], grid, function, steps.closed, phi)
+    return _solid(sharpened, grid, notes, stopwatch, time)
 
 
 def _solid(sharpened: Assembled, grid: Grid, notes: list[Note], stopwatch: Stopwatch, time: float) -> GridField:
@@ -326,12 +308,13 @@ def _sharpened(
     closed: bool,
     winding: NDArray[np.float64],
     grid: Grid,
+    fit: Fit,
 ) -> Assembled:
-    """Distance to the shape; faces beside which nothing is solid do not tell sides."""
+    """Distance to the shape; faces beside which nothing is solid do not tell sides. The fit is for closed shapes."""
     if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
         return assemble([shape], grid, phi, "auto")
     if phi is not None and closed:
-        return assemble([shape], grid, sides.function, "auto", _known(phi))
+        return assemble([shape], grid, sides.function, fit, _known(phi))
     refused = _widened(sides.refused)
     upper = np.array(grid.shape) - 1
 
@@ -342,7 +325,7 @@ def _sharpened(
 
     if phi is not None and refused.any():
         phi = np.where(refused, sides.function, phi)
-    fit: Fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
+    fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
     return assemble([shape], grid, sides.function, fit, None if phi is None else _known(phi), tells)
 
 

@@ -1,0 +1,116 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from shapes.grid_cases import assert_closed_manifold, sphere
+from signedheat.extensions.band_stores import TilesComputed
+
+pytest.importorskip("zarr")
+
+RESOLUTION, BAND = 150, 0.05
+
+
+def holed():
+    whole = sphere(1500)
+    centres = whole.vertices[whole.faces].mean(axis=1)
+    return sh.TriangleMesh(whole.vertices, whole.faces[(centres @ np.array([0.6, 0.0, 0.8])) < 0.9])
+
+
+@pytest.fixture(scope="module")
+def single():
+    return sh.solid_distance(holed(), resolution=RESOLUTION, band=BAND)
+
+
+def assert_same(band, single):
+    np.testing.assert_array_equal(band.blocks.places, single.blocks.places)
+    np.testing.assert_array_equal(band.values, single.values)
+    np.testing.assert_array_equal(band.confidence, single.confidence)
+
+
+def test_tiles_give_the_same_bits_and_seams_are_closed(tmp_path, single):
+    band = sh.tiled_distance(holed(), tmp_path / "store", resolution=RESOLUTION, band=BAND)
+    assert_same(band, single)
+    assert len(list((tmp_path / "store" / "tiles").iterdir())) == 8
+    for level in (0.0, 0.04):
+        assert_closed_manifold(band.contour(level))
+    note = band.diagnostics.note(TilesComputed)
+    assert (note.tiles, note.reused) == (8, 0)
+    points = np.random.default_rng(0).normal(size=(200, 3))
+    np.testing.assert_array_equal(band(points), single(points))
+
+
+def test_a_run_goes_on_where_it_was_stopped(tmp_path, single):
+    store = tmp_path / "store"
+
+    def stop(fraction, step):
+        if step == "tiles" and fraction > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sh.tiled_distance(holed(), store, resolution=RESOLUTION, band=BAND, progress=stop)
+    done = sorted(store.glob("tiles/*/zarr.json"))
+    torn = done[0].parent
+    for each in torn.glob("values/c/*"):  # as a killed process leaves it
+        each.unlink() if each.is_file() else None
+    done[0].write_text(json.dumps({"attributes": {}, "zarr_format": 3, "node_type": "group"}))
+    band = sh.tiled_distance(holed(), store, resolution=RESOLUTION, band=BAND)
+    assert_same(band, single)
+    assert 0 < band.diagnostics.note(TilesComputed).reused < 8
+    with refused(sh.FileFormatError, file="store"):
+        sh.tiled_distance(holed(), store, resolution=RESOLUTION + 10, band=BAND)
+
+
+def test_processes_give_the_same_bits(tmp_path, single):
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        band = sh.tiled_distance(holed(), tmp_path / "store", resolution=RESOLUTION, band=BAND, scheduler=pool)
+    assert_same(band, single)
+    assert band.diagnostics.note(TilesComputed).peak_memory > 1e7
+
+
+def test_a_cluster_whose_worker_is_killed_gives_the_same_bits(tmp_path, single):
+    pytest.importorskip("distributed")
+    environment = {**os.environ, "NUMBA_NUM_THREADS": "1", "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "5"}
+    address = tmp_path / "scheduler.json"
+    processes = []
+
+    def start(kind, *options):
+        command = [sys.executable, "-W", "ignore", "-m", f"distributed.cli.dask_{kind}", *options]
+        with open(os.devnull, "w") as nowhere:
+            processes.append(subprocess.Popen(command, env=environment, stdout=nowhere, stderr=nowhere, cwd=tmp_path))
+        return processes[-1]
+
+    try:
+        start("scheduler", "--scheduler-file", str(address), "--port", "0", "--no-dashboard")
+        one = start("worker", "--scheduler-file", str(address), "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        start("worker", "--scheduler-file", str(address), "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        deadline = time.monotonic() + 90
+        while not address.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.2)
+        where = json.loads(address.read_text())["address"]
+        killed = []
+
+        def kill(fraction, step):
+            if step == "tiles" and not killed:
+                killed.append(fraction)
+                one.send_signal(signal.SIGKILL)
+
+        store = Path(tmp_path) / "store"
+        band = sh.tiled_distance(holed(), store, resolution=RESOLUTION, band=BAND, scheduler=where, progress=kill)
+        assert killed
+        assert_same(band, single)
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
