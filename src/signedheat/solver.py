@@ -26,7 +26,7 @@ from .fields.to_field import Field, to_field
 from .fields.vertex_field import VertexField
 from .frozen import Frozen
 from .lowering.area_elements import grid_around
-from .lowering.surface.intrinsic import Retriangulated
+from .lowering.surface.intrinsic import Retriangulated, lowered_by_angles
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .progress import Progress, Stopwatch
 
@@ -51,10 +51,11 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         rounder lines.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
-    intrinsic : bool
-        Make an intrinsic Delaunay refinement of a triangle mesh for every set of sources. This is slower, since no
-        factorisation is reused, and far more accurate on bad triangles and for curves that cross faces. For more
-        control, or several distances on one triangulation, use `intrinsic_delaunay` as the domain.
+    intrinsic : "auto", True or False
+        Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh. "auto": where large angles would
+        make directions inaccurate, the mesh is refined once, and all sources share it and its factors. True: a
+        refinement for every set of sources, along whose edges they run. False: the triangles as they are. For more
+        control use `intrinsic_delaunay` as the domain.
 
     Raises
     ------
@@ -65,7 +66,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     domain: AnyDomain
     diffusion: float = 1.0
     progress: Progress | None = field(default=None, repr=False)
-    intrinsic: bool = False
+    intrinsic: bool | Literal["auto"] = "auto"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "domain", converted(self.domain))
@@ -74,11 +75,11 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     @cached_property
     def discretization(self) -> Adaptable:
         """The discretisation of the domain."""
-        if self.intrinsic:
-            progress = self.progress
-            report = None if progress is None else lambda share: progress((1 + share) / 5, "refine")
-            return Retriangulated(triangle_mesh(self.domain), report)
-        return discretize(self.domain)
+        progress = self.progress
+        report = None if progress is None else lambda share, _: progress((1 + share) / 5, "refine")
+        if self.intrinsic == "auto":
+            return lowered_by_angles(self.domain, report)
+        return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)
 
     def with_diffusion(self, diffusion: float) -> SignedHeatSolver[AnyDomain]:
         """The same solver with another τ; shares everything that does not depend on τ, such as the factor of C.

@@ -17,18 +17,20 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import GeometryError
+from ..errors import GeometryError, SourceError
 from ..frozen import Frozen
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
+from ..geometry.intrinsic.level_lines import level_lines
 from ..geometry.intrinsic.refinement import refine_all
 from ..geometry.intrinsic.transfer import ConformingRefinement, transfer_segments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.mollification import MARGIN, laid_out
 from ..progress import Progress, Stopwatch
-from .curves import CurveOrPoints, CurvesAndPoints
+from .curves import Curve, CurveOrPoints, CurvesAndPoints
 from .display import Displayed, to_pyvista
+from .level_sets import is_consistent, level_set
 from .segments import segments_of, segments_of_each
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
@@ -164,6 +166,31 @@ class IntrinsicTriangulation(Displayed, Frozen):
         below = self.refinement.push_forward(faces, barycentric, np.zeros((len(faces), 0, 3)))
         found, weights, _ = self.history.forward(below[0], np.maximum(below[1], 0.0))
         return found, weights / weights.sum(axis=1, keepdims=True)
+
+    def level_set(self, values: NDArray[np.float64], level: float = 0.0) -> list[Curve]:
+        """Level set of a function given at the vertices, linear on these triangles, as curves on the mesh.
+
+        Larger values are to its left; values equal to the level count as larger. On inconsistently oriented meshes
+        it is that of the values at the vertices of the mesh.
+
+        Raises
+        ------
+        SourceError
+            If there is not one value per vertex.
+        """
+        if values.shape != (self.n_vertices,):
+            raise SourceError(
+                f"a level set needs one value per vertex: {self.n_vertices}, not an array {values.shape}",
+                element="values",
+            )
+        if not is_consistent(self.mesh):
+            return level_set(self.mesh, values[: self.mesh.n_vertices], level)
+        lines = level_lines(self.history, self.refinement, values - level)
+        return [Curve(faces, np.maximum(weights, 0.0), closed=closed) for faces, weights, closed in lines]
+
+    def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the vertices of the triangles, from values at the vertices of the domain: the same."""
+        return values
 
     def edge_lines(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Edges as polylines on the mesh: for every straight part the id of the edge, and start and end in space."""

@@ -35,6 +35,10 @@ def _(
     progress: Progress | None = None,
     curves: CurvesAndPoints | None = None,
 ) -> VertexField:
+    if field.finest is not field:
+        fine = sharpen_field(field.finest, method, progress, curves)
+        assert isinstance(fine, VertexField)
+        return replace(field, values=fine.values[: len(field.values)], diagnostics=fine.diagnostics, finer=fine)
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
         raise UnsupportedTypeError(

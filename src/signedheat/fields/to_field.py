@@ -71,6 +71,7 @@ def _(
 ) -> VertexField:
     """φ at the vertices of the domain; NaN where diffusion did not reach, such as behind a single shared vertex."""
     values = np.where(discretization.reached_by(source.vectors), values, np.nan)
+    triangulation, everywhere = discretization.triangulation, values
     if discretization.restriction is not None:
         values = values[discretization.restriction]
     unreached = np.flatnonzero(np.isnan(values))
@@ -81,7 +82,10 @@ def _(
             UnreachedWarning,
         )
     told = replace(diagnostics, unreached=unreached).noting(*discretization.notes)
-    return VertexField(discretization.domain, values, told, source)
+    finer = None
+    if triangulation is not None:
+        finer = VertexField(triangulation, everywhere[: triangulation.n_vertices], told, source)
+    return VertexField(discretization.domain, values, told, source, finer)
 
 
 @to_field.register

@@ -51,6 +51,9 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         Timings, diffusion time, and notes on the computation.
     source : SourceTerm, optional
         The lowered source, which `sharpen` needs.
+    finer : VertexField, optional
+        The same on an intrinsic triangulation of the mesh, on whose vertices φ was computed: contours, values at points
+        and sharpening use these too.
 
     Examples
     --------
@@ -69,6 +72,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     source: SourceTerm | None = field(default=None, repr=False)
+    finer: VertexField[IntrinsicTriangulation] | None = field(default=None, repr=False)
 
     def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
         """φ at points of the surface, linear between vertices.
@@ -83,9 +87,24 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         (n,) float
             Signed distances.
         """
-        mesh, values, faces, weights = self._at(points)
-        result: NDArray[np.float64] = np.einsum("ik,ik->i", weights, values[mesh.faces[faces]])
+        finest = self.finest
+        if isinstance(finest.domain, IntrinsicTriangulation):
+            faces, weights = finest.domain.locate(*self._at(points)[2:])
+            corners = finest.domain.faces[faces]
+        else:
+            mesh, _, faces, weights = self._at(points)
+            corners = mesh.faces[faces]
+        values = finest.domain.on_triangulation(finest.values)
+        result: NDArray[np.float64] = np.einsum("ik,ik->i", weights, values[corners])
         return result
+
+    @property
+    def finest(self) -> VertexField[SurfaceDomain]:
+        """The field where φ was computed: `finer`, if its values are still the same, or the field itself."""
+        finer = self.finer
+        if finer is None or not np.array_equal(finer.values[: len(self.values)], self.values, equal_nan=True):
+            return cast("VertexField[SurfaceDomain]", self)
+        return cast("VertexField[SurfaceDomain]", finer)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
         """(n, 3) ∇φ in the faces of points; for `points` see `__call__`."""
@@ -128,7 +147,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         OutsideError
             If φ does not take the level.
         """
-        field = self._embedded
+        field = self.finest
         known = field.values[np.isfinite(field.values)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
         if not low <= level <= high:

@@ -15,6 +15,7 @@ from scipy import sparse
 from ...cache import LastUsed, fingerprint
 from ...diagnostics import EdgesLengthened, LargeAngles, Note, VerticesAdded
 from ...discretization import discretize
+from ...domains.intrinsic_triangulation import IntrinsicTriangulation
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
 from ...geometry.curve_segments import CurveSegments
@@ -47,6 +48,8 @@ class SurfaceDiscretization:
     positions : (n_vertices, 3) or (m, 3, 3) float, optional
         Positions in space of the vertices, or of the corners of each face (up to translation) if every face lies in a
         plane of its own; needed for curves with given normals. By default those of the domain's triangulation.
+    triangulation : IntrinsicTriangulation, optional
+        That of the domain whose vertices are the first of the triangles; φ on it is kept beside that on the domain.
     spacing : float, optional
         h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
     notes : tuple of Note
@@ -58,6 +61,7 @@ class SurfaceDiscretization:
     restriction: NDArray[np.int64] | None = None
     transfer: Callable[[Any], Any] | None = None
     positions: NDArray[np.float64] | None = None
+    triangulation: IntrinsicTriangulation | None = None
     spacing: float = math.nan
     notes: tuple[Note, ...] = ()
     _heats: LastUsed[float, VectorHeat] = field(default_factory=LastUsed, init=False, repr=False)

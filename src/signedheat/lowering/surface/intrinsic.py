@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,15 @@ from ...domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic
 from ...domains.triangle_mesh import TriangleMesh
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
+from ...progress import Progress
 from .discretization import SurfaceDiscretization
 from .memory import refuse_too_many
+
+SPOILED = 0.0015
+"""Fraction of the area in triangles with an angle above `LARGE`, from which a mesh is refined."""
+
+LARGE = 120.0
+"""Degrees."""
 
 THICKNESS = 1e-9
 """Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
@@ -34,14 +41,33 @@ class Retriangulated:
     """
 
     mesh: TriangleMesh
-    progress: Callable[[float], None] | None = field(default=None, repr=False)
+    progress: Progress | None = field(default=None, repr=False)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Make the intrinsic Delaunay refinement of the mesh that has the sources along its edges."""
-        inner = None if self.progress is None else lambda share, _: self.progress(share)
-        domain = intrinsic_delaunay(self.mesh, keep=sources, refine=True, progress=inner)
-        own = np.arange(self.mesh.n_vertices)
-        return lowered(domain, domain=self.mesh, restriction=own).adapt(sources)
+        return refined(self.mesh, self.progress, sources).adapt(sources)
+
+
+def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
+    """The discretisation of a domain; triangle meshes with many large angles are refined intrinsically."""
+    if isinstance(domain, TriangleMesh) and large_angles(domain) >= SPOILED:
+        return refined(domain, progress)
+    return discretize(domain)
+
+
+def large_angles(mesh: TriangleMesh) -> float:
+    """Fraction of the area in triangles with a large angle."""
+    a, b, c = np.sort(mesh.edge_lengths[mesh.edges.face_edges] ** 2, axis=1).T
+    large = c - a - b > -2 * np.cos(np.radians(LARGE)) * np.sqrt(a * b)
+    areas = mesh.face_areas
+    return float(areas[large].sum() / max(areas.sum(), 1e-300))
+
+
+def refined(mesh: TriangleMesh, progress: Progress | None = None, keep: Sequence[Any] = ()) -> SurfaceDiscretization:
+    """The intrinsic Delaunay refinement of a mesh; fields are reported on the mesh, and kept on the refinement."""
+    domain = intrinsic_delaunay(mesh, keep=keep, refine=True, progress=progress)
+    lowered_mesh = lowered(domain, domain=mesh, restriction=np.arange(mesh.n_vertices))
+    return replace(lowered_mesh, triangulation=domain)
 
 
 def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
