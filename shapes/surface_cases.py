@@ -77,4 +77,4 @@ def positions(mesh: sh.TriangleMesh, source) -> np.ndarray:
 
 def laid_out(mesh: sh.TriangleMesh):
     """The triangles that the solver runs on."""
-    return sh.SignedHeatSolver(mesh).discretization.triangles
+    return sh.SignedHeatSolver(mesh, intrinsic=False).discretization.triangles

@@ -47,10 +47,10 @@ class ZeroSet:
     Parameters
     ----------
     hard : bool
-        Impose φ = 0 at every sample of the source. By default, on surfaces φ is zero (up to rounding) where a curve
-        passes vertices and edges, but free at samples inside faces, since several of them in one face would force φ to
-        be constant there; on grids and tets φ is corrected to zero along the source by a smooth function or by springs,
-        which is cheaper and, on broken input, more accurate.
+        Impose φ = 0 at every point at which the source is sampled. By default φ is zero, up to rounding, on surfaces
+        along curves that follow edges; where a curve crosses faces, a linear function could follow it only by being
+        constant beside it, so that springs hold φ to within some hundredths of h. On grids and tets φ is corrected to
+        zero along the source by a smooth function or by springs, which is cheaper and, on broken input, more accurate.
 
     Examples
     --------
@@ -69,18 +69,26 @@ class ZeroSet:
 
 @dataclass(frozen=True)
 class EachComponent:
-    """φ is constant on every connected component of the source, each at its own unknown level (Eq. 14, Fig. 10).
+    """φ is level on every connected component of the source, each at its own unknown level (Eq. 14, Fig. 10).
+
+    Parameters
+    ----------
+    hard : bool
+        Exactly so at every sample; by default as exactly as `ZeroSet`.
 
     Examples
     --------
     >>> EachComponent()
-    EachComponent()
+    EachComponent(hard=False)
     """
+
+    hard: bool = False
 
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        return integration.fit(divergence, source, Levels(np.zeros(len(source.weights)), source.components))
+        levels = Levels(np.zeros(len(source.weights)), source.components)
+        return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
 
 @dataclass(frozen=True, repr=False)
@@ -92,6 +100,8 @@ class LevelValues(ShortRepr):
     values : sequence of float
         One level for each source passed to the solver; or one for each connected component of the sources, components
         of the first source first.
+    hard : bool
+        Exactly so at every sample; by default as exactly as `ZeroSet`.
 
     Raises
     ------
@@ -105,6 +115,7 @@ class LevelValues(ShortRepr):
     """
 
     values: Sequence[float]
+    hard: bool = False
 
     def __post_init__(self) -> None:
         values = tuple(float(v) for v in np.atleast_1d(np.asarray(self.values, dtype=np.float64)))
@@ -126,7 +137,8 @@ class LevelValues(ShortRepr):
                 "connected components in all",
                 remedy="give one value for each source, or one for each component",
             )
-        return integration.fit(divergence, source, Levels(np.array(self.values)[index]))
+        levels = Levels(np.array(self.values)[index])
+        return (integration.fit_exactly if self.hard else integration.fit)(divergence, source, levels)
 
 
 @dataclass(frozen=True)
@@ -135,8 +147,9 @@ class Soft:
 
     Parameters
     ----------
-    weight : float
-        λ, in 1/length: φ differs from the free solution up to a distance of about 1/λ from the source.
+    weight : float, optional
+        λ, in 1/length; by default 10/h on surfaces and grids, h the spacing, and what suits the mesh on tets: φ
+        differs from the free solution up to a distance of about 1/λ from the source.
 
     Raises
     ------
@@ -149,10 +162,10 @@ class Soft:
     Soft(weight=10.0)
     """
 
-    weight: float
+    weight: float | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.weight) and self.weight > 0):
+        if self.weight is not None and not (np.isfinite(self.weight) and self.weight > 0):
             raise ConstraintError(
                 f"the weight of a soft constraint must be positive and finite, not {self.weight}", element="weight"
             )
@@ -160,4 +173,5 @@ class Soft:
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        return integration.penalize(divergence, source, float(self.weight))
+        weight = integration.soft_weight if self.weight is None else float(self.weight)
+        return integration.penalize(divergence, source, weight)

@@ -53,6 +53,10 @@ class Integration(Protocol):
     has a weighted mean of zero over the source samples of each component. Components without samples are NaN.
     """
 
+    @property
+    def soft_weight(self) -> float:
+        """λ of `Soft` where none is given, in 1/length."""
+
     def solve(self, divergence: Any, source: Any) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² (Eq. 2) with nothing imposed: ``C φ = b`` (Eq. 13)."""
 

@@ -78,7 +78,7 @@ def constraint_of(word: str) -> Constraint:
     if name == "levels":
         return LevelValues([float(value) for value in values.split(",")])
     if name == "soft":
-        return Soft(float(values))
+        return Soft(float(values)) if values else Soft()
     return {"free": Free(), "zero-set": ZeroSet(), "hard": ZeroSet(hard=True), "each-component": EachComponent()}[word]
 
 

@@ -27,7 +27,7 @@ BATCH = 32
 
 @dataclass(frozen=True, eq=False)
 class DirectIntegration(Frozen):
-    """``C φ = b`` on vertices, under any of the constraints of Sec. 7.1.
+    """``C φ = b`` on vertices, under the constraints of Sec. 7.1 but for `fit`, which those who inherit it define.
 
     Parameters
     ----------
@@ -66,28 +66,18 @@ class DirectIntegration(Frozen):
         solved = self.factor.solve(np.stack(list(divergences)).T)
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
-    def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels exactly (Eq. 14), but only where the source asks for it: see `SurfaceSource.pinned`."""
-        return self._impose(divergence, source, levels, source.pinned)
-
     def fit_exactly(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
-        """Impose levels exactly at every sample (Eq. 14)."""
-        return self._impose(divergence, source, levels, np.ones(len(source.weights), dtype=bool))
-
-    def _impose(
-        self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels, chosen: NDArray[np.bool_]
-    ) -> NDArray[np.float64]:
-        """Impose levels at the chosen samples, or levels up to one unknown constant for each group of samples (Eq. 14).
+        """Impose levels at every sample, or levels up to one unknown constant for each group of samples (Eq. 14).
 
         The constants are those at which the multipliers of each group add up to zero. On each connected component of
         the domain one constant is arbitrary; it is fixed by the mean over the samples.
         """
-        rows, values = source.interpolation[chosen], levels.values[chosen]
+        rows, values = source.interpolation, levels.values
         if levels.groups is None:
             fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
             _refuse_contradictions(rows, values, fitted[:, 0])
             return self._reached(fitted[:, 0], rows)
-        group = levels.groups[chosen]
+        group = levels.groups
         bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a group of one sample constrains nothing
         rows, values, group = rows[bound], values[bound], np.unique(group[bound], return_inverse=True)[1]
         fixed = group[np.unique(self._component_of(rows), return_index=True)[1]]

@@ -1,5 +1,6 @@
 """Distance on surfaces: what may not matter does not, and what is asked for comes out."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -34,7 +35,7 @@ def loops(mesh):
 
 
 def distance(mesh, sources, constraint=None, diffusion=1.0):
-    return sh.SignedHeatSolver(mesh, diffusion).distance(sources, constraint).values
+    return sh.SignedHeatSolver(mesh, diffusion, intrinsic=False).distance(sources, constraint).values
 
 
 # --- invariances ------------------------------------------------------------------------------------------------------
@@ -122,13 +123,13 @@ def test_nonorientable_surfaces_equal_their_double_cover(closed):
 def test_constraints_hold_at_every_sample():
     mesh = bumpy()
     curves = loops(mesh)
-    solver = sh.SignedHeatSolver(mesh)
+    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
     tolerance = 1e-8 * solver.discretization.spacing
-    field = solver.distance(curves)
+    field = solver.distance(curves, sh.ZeroSet(hard=True))
     assert np.abs(field.source.interpolation @ field.values).max() < tolerance
-    field = solver.distance(curves, sh.LevelValues(range(len(curves))))
+    field = solver.distance(curves, sh.LevelValues(range(len(curves)), hard=True))
     assert np.abs(field.source.interpolation @ field.values - field.source.source_ids).max() < tolerance
-    field = solver.distance(curves, sh.EachComponent())
+    field = solver.distance(curves, sh.EachComponent(hard=True))
     levels = field.source.interpolation @ field.values
     means = np.bincount(field.source.components, levels) / np.bincount(field.source.components)
     assert np.abs(levels - means[field.source.components]).max() < tolerance
@@ -139,7 +140,7 @@ def test_constraints_hold_at_every_sample():
 def test_each_component_is_the_minimum_over_all_constants():
     """No other constants, imposed as levels, leave less of ∫|∇φ − Y|²."""
     mesh = bumpy()
-    curves, solver = loops(mesh), sh.SignedHeatSolver(mesh)
+    curves, solver = loops(mesh), sh.SignedHeatSolver(mesh, intrinsic=False)
     surface = solver.discretization
     source = surface.lower(surface.adapt(curves)[1], 1.0)
     load = surface.divergence(normalize(surface, diffuse(surface, source)))
@@ -162,13 +163,13 @@ def test_dependent_rows_are_no_obstacle():
     mesh = bumpy()
     curve = loops(mesh)[0]
     twice = [curve, curve, mesh.points_at(mesh.faces[100]), sh.SurfacePoints([100], [[0.2, 0.3, 0.5]])]
-    field = sh.SignedHeatSolver(mesh).distance([curve, curve])
+    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance([curve, curve], sh.ZeroSet(hard=True))
     assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
-    field = sh.SignedHeatSolver(mesh).distance(twice)
+    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance(twice, sh.ZeroSet(hard=True))
     assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
     wave = mesh.vertices[:, 2] + 1e-7 * np.sin(1e3 * mesh.vertices[:, 0])
     close = mesh.level_set(mesh.vertices[:, 2], 0.2) + mesh.level_set(wave, 0.2)
-    field = sh.SignedHeatSolver(mesh).distance(close)
+    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance(close, sh.ZeroSet(hard=True))
     assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
 
 
@@ -216,13 +217,14 @@ def almost_the_same(mesh, rng):
 
 @pytest.mark.parametrize("make", [level_sets, zigzag, there_and_back, round_a_vertex, random_polyline, almost_the_same])
 @pytest.mark.parametrize("seed", range(3))
-def test_the_zero_set_holds_to_rounding_however_curves_cross_the_mesh(make, seed):
+def test_the_zero_set_holds_however_curves_cross_the_mesh(make, seed):
     mesh = sphere(3)
     curve = make(mesh, np.random.default_rng(seed))
-    solver = sh.SignedHeatSolver(mesh)
+    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
     usual, hard = (solver.distance(curve, constraint) for constraint in (sh.ZeroSet(), sh.ZeroSet(hard=True)))
     tolerance = 1e-8 * solver.discretization.spacing
-    assert np.abs((usual.source.interpolation @ usual.values)[usual.source.pinned]).max() < tolerance
+    missed = np.abs(usual.source.interpolation @ usual.values)
+    assert np.average(missed, weights=usual.source.weights) < 0.1 * solver.discretization.spacing
     assert np.abs(hard.source.interpolation @ hard.values).max() < tolerance
     assert np.ptp(usual.values) > 0.1
 
@@ -231,18 +233,21 @@ def test_levels_that_contradict_each_other_are_refused():
     mesh = bumpy()
     x, y, _ = mesh.vertices.T
     crossing = [mesh.level_set(x, 0.1)[0], mesh.level_set(y, 0.1)[0], mesh.level_set(x, 0.1)[0]]
-    with refused(sh.ConstraintError, "vertex 169"):
-        sh.SignedHeatSolver(mesh).distance(crossing, sh.LevelValues([0.0, 0.0, 1.0]))
+    with refused(sh.ConstraintError, "vertex 281"):
+        sh.SignedHeatSolver(mesh, intrinsic=False).distance(crossing, sh.LevelValues([0.0, 0.0, 1.0]))
 
 
 def test_a_zero_set_at_every_vertex_leaves_zero():
     square = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    assert np.abs(sh.SignedHeatSolver(square).distance(square.boundary_curves()).values).max() < 1e-15
+    assert np.abs(sh.SignedHeatSolver(square, intrinsic=False).distance(square.boundary_curves()).values).max() < 1e-15
 
 
 def test_soft_lies_between_free_and_zero_set():
     mesh = bumpy()
-    solver, curves = sh.SignedHeatSolver(mesh), [mesh.region_boundary(mesh.vertices[mesh.faces[:, 0], 2] > 0.2)[0]]
+    solver, curves = (
+        sh.SignedHeatSolver(mesh, intrinsic=False),
+        [mesh.region_boundary(mesh.vertices[mesh.faces[:, 0], 2] > 0.2)[0]],
+    )
     free, hard = (solver.distance(curves, c).values for c in (sh.Free(), sh.ZeroSet()))
     np.testing.assert_allclose(solver.distance(curves, sh.Soft(1e-7)).values, free, atol=1e-5)
     np.testing.assert_allclose(solver.distance(curves, sh.Soft(1e8)).values, hard, atol=1e-5)
@@ -261,15 +266,21 @@ def test_parts_do_not_know_of_each_other(constraint):
     )
     curve = loops(one)[0]
     with pytest.warns(sh.UnreachedWarning, match=f"{one.n_vertices + 1} of"):
-        field = sh.SignedHeatSolver(both).distance(curve, constraint)
+        field = sh.SignedHeatSolver(both, intrinsic=False).distance(curve, constraint)
     assert np.array_equal(field.diagnostics.unreached, np.arange(one.n_vertices, both.n_vertices))
     assert np.isnan(field.values[one.n_vertices :]).all()
-    solver = sh.SignedHeatSolver(one, (sh.SignedHeatSolver(both).discretization.spacing / spacing(one)) ** 2)
+    solver = sh.SignedHeatSolver(
+        one, (sh.SignedHeatSolver(both).discretization.spacing / spacing(one)) ** 2, intrinsic=False
+    )
+    if isinstance(constraint, sh.ZeroSet | sh.EachComponent | sh.LevelValues):  # springs are measured in h
+        constraint = replace(constraint, hard=True)
+        with pytest.warns(sh.UnreachedWarning):
+            field = sh.SignedHeatSolver(both, intrinsic=False).distance(curve, constraint)
     np.testing.assert_allclose(field.values[: one.n_vertices], solver.distance(curve, constraint).values, atol=1e-10)
 
 
 def spacing(mesh):
-    return sh.SignedHeatSolver(mesh).discretization.spacing
+    return sh.SignedHeatSolver(mesh, intrinsic=False).discretization.spacing
 
 
 def test_parts_that_meet_in_a_vertex_only_are_not_reached():
@@ -282,7 +293,7 @@ def test_parts_that_meet_in_a_vertex_only_are_not_reached():
         np.concatenate([mesh.faces, ids[mesh.faces]]),
     )
     with pytest.warns(sh.UnreachedWarning, match=f"{mesh.n_vertices - 1} of"):
-        field = sh.SignedHeatSolver(bow).distance(bow.path([0, 1, 2, 3, 4]))
+        field = sh.SignedHeatSolver(bow, intrinsic=False).distance(bow.path([0, 1, 2, 3, 4]))
     assert np.isfinite(field.values[: mesh.n_vertices]).all() and np.isnan(field.values[mesh.n_vertices :]).all()
 
 
@@ -300,7 +311,7 @@ def test_degenerate_triangles_are_mollified(collapse):
     else:
         faces = np.concatenate([faces, [[a, a, b], [c, c, c]]])
     broken = sh.TriangleMesh(points, faces)
-    field = sh.SignedHeatSolver(broken).distance(broken.level_set(points[:, 0], -0.6))
+    field = sh.SignedHeatSolver(broken, intrinsic=False).distance(broken.level_set(points[:, 0], -0.6))
     assert field.diagnostics.note(EdgesLengthened).added_to_edge_lengths > 0
     far = np.linalg.norm(points - points[c], axis=1) > 0.6
     np.testing.assert_allclose(field.values[far], points[far, 0] + 0.6, atol=0.06)
@@ -334,7 +345,7 @@ def test_nothing_is_factorised_twice(monkeypatch):
             module, "factorize", lambda matrix, *a, f=original, **k: made.append(matrix.shape[0]) or f(matrix, *a, **k)
         )
     mesh = bumpy()
-    curves, solver = loops(mesh), sh.SignedHeatSolver(mesh)
+    curves, solver = loops(mesh), sh.SignedHeatSolver(mesh, intrinsic=False)
     solver.distance(curves[0], sh.Free())
     vertices, edges = mesh.n_vertices, len(mesh.edges.vertices)
     assert sorted(made) == [vertices, edges]
@@ -355,7 +366,7 @@ def test_nothing_is_factorised_twice(monkeypatch):
 def test_many_at_once_equal_one_by_one(constraint):
     mesh = bumpy()
     entries = [*loops(mesh), mesh.points_at([5]), mesh.path([0, 40])]
-    solver = sh.SignedHeatSolver(mesh)
+    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
     together = solver.distance_many(entries, constraint)
     assert len(together) == len(entries)
     for field, entry in zip(together, entries, strict=True):
@@ -386,7 +397,7 @@ def test_the_same_bits_every_time():
 @pytest.mark.parametrize("broken", [False, True], ids=["complex", "real"])
 def test_vector_heat_by_faces_equals_the_matrix(broken):
     mesh = flipped(bumpy(2)) if broken else bumpy(2)
-    triangles = sh.SignedHeatSolver(mesh).discretization.triangles
+    triangles = sh.SignedHeatSolver(mesh, intrinsic=False).discretization.triangles
     rng = np.random.default_rng(0)
     vectors = rng.normal(size=triangles.n_edges) + 1j * rng.normal(size=triangles.n_edges)
     matrix = whole(vector_heat_matrix(triangles, 0.3))
@@ -400,13 +411,13 @@ def test_points_inside_faces_are_interpolated_when_asked_for_and_cost_accuracy()
     angles = np.linspace(0, 2 * np.pi, 100, endpoint=False)
     circle = np.stack([np.sin(0.8) * np.cos(angles), np.sin(0.8) * np.sin(angles), np.full(100, np.cos(0.8))], axis=1)
     curve = mesh.polyline(circle, closed=True)
-    solver = sh.SignedHeatSolver(mesh)
+    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
     inside = (curve.barycentric > 1e-9).all(axis=1)
     assert inside.any()
     height = 0.5 * mesh.edge_lengths.mean()
     hard, usual = (solver.distance(curve, constraint) for constraint in (sh.ZeroSet(hard=True), sh.ZeroSet()))
     assert np.abs(hard(curve)).max() < 1e-8 * height
-    assert np.abs(usual(curve)[~inside]).max() < 1e-8 * height
+    assert np.abs(usual(curve)).max() < 0.1 * height
     exact = 0.8 - np.arccos(np.clip(mesh.vertices[:, 2], -1, 1))
     error = [np.sqrt(np.mean((phi.values - exact) ** 2)) for phi in (usual, hard)]
     assert error[0] < error[1] < 0.1

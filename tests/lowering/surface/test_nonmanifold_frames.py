@@ -27,12 +27,12 @@ def test_distance_on_every_page_of_a_book(pages, number):
     exact = np.where(page == number % pages, away, -away) - 0.51
     exact[away < 1e-9] = -0.51
     beside = exact + 0.51 - 0.03  # in the very faces at the spine
-    values = sh.SignedHeatSolver(mesh).distance(mesh.level_set(beside), sh.Free()).values
+    values = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.level_set(beside), sh.Free()).values
     assert np.sqrt(np.mean((values - beside) ** 2)) < 1e-9
-    values = sh.SignedHeatSolver(mesh).distance(mesh.level_set(exact)).values
+    values = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.level_set(exact)).values
     assert np.sqrt(np.mean((values - exact) ** 2)) < 2e-3
     better = sh.intrinsic_delaunay(mesh, keep=mesh.level_set(exact), refine=True)
-    values = sh.SignedHeatSolver(better).distance(mesh.level_set(exact)).restrict().values
+    values = sh.SignedHeatSolver(better, intrinsic=False).distance(mesh.level_set(exact)).restrict().values
     assert np.sqrt(np.mean((values - exact) ** 2)) < 2e-3
 
 
@@ -42,13 +42,15 @@ def test_the_order_and_sense_of_faces_do_not_matter(seed):
     exact = np.where((page == seed) & (away > 1e-9), away, -away) - 0.51
     order = np.random.default_rng(seed).permutation(mesh.n_faces)
     other = flipped(sh.TriangleMesh(mesh.vertices, mesh.faces[order]), seed=seed)
-    one, two = (sh.SignedHeatSolver(m).distance(m.level_set(exact), sh.Free()).values for m in (mesh, other))
+    one, two = (
+        sh.SignedHeatSolver(m, intrinsic=False).distance(m.level_set(exact), sh.Free()).values for m in (mesh, other)
+    )
     np.testing.assert_allclose(one, two, atol=1e-9)
 
 
 def test_sources_on_different_pages_share_what_is_factorised():
     mesh, away, page = loose_book(3)
-    solver = sh.SignedHeatSolver(mesh)
+    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
     curves = [mesh.level_set(np.where((page == k) & (away > 1e-9), away, -away) - 0.51) for k in (2, 2, 1)]
     one, two, three = (solver.discretization.adapt(c)[0] for c in curves)
     assert one is two is not solver.discretization and three.integration is solver.discretization.integration
@@ -60,7 +62,7 @@ def test_sources_on_different_pages_share_what_is_factorised():
 def test_a_curve_along_the_spine_keeps_its_left():
     mesh = book(3, 8)
     spine = mesh.path(np.arange(9))
-    adapted = sh.SignedHeatSolver(mesh).discretization.adapt([spine])[0]
+    adapted = sh.SignedHeatSolver(mesh, intrinsic=False).discretization.adapt([spine])[0]
     assert adapted.triangles.leading_sides is None
-    values = sh.SignedHeatSolver(mesh).distance(spine).values
+    values = sh.SignedHeatSolver(mesh, intrinsic=False).distance(spine).values
     np.testing.assert_allclose(np.abs(values), np.linalg.norm(mesh.vertices[:, :2], axis=1), atol=1e-9)

@@ -28,7 +28,7 @@ MESHES = {
     "frustum": (surface_of_revolution(lambda z: 1 + 0.3 * z, 2.0, 40, 14), [0.0, 0.3, 1.0], 0.9),
 }
 every_mesh = pytest.mark.parametrize("name", MESHES)
-CONSTRAINTS = {"None": sh.Free(), "ZeroSet": sh.ZeroSet(), "Multiple": sh.EachComponent()}
+CONSTRAINTS = {"None": sh.Free(), "ZeroSet": sh.ZeroSet(hard=True), "Multiple": sh.EachComponent(hard=True)}
 
 
 def nodes(mesh, curve):
@@ -72,7 +72,7 @@ def test_edges_have_the_same_numbers(name):
 def test_curves_across_faces(name, constraint, tau):
     mesh, curves = level_curves(name)
     theirs = peer(mesh, curves, constraint, tau)
-    ours = sh.SignedHeatSolver(mesh, tau).distance(curves, CONSTRAINTS[constraint]).values
+    ours = sh.SignedHeatSolver(mesh, tau, intrinsic=False).distance(curves, CONSTRAINTS[constraint]).values
     np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.ptp(theirs))
 
 
@@ -85,7 +85,7 @@ def test_curves_along_edges(name, constraint):
     curves = mesh.region_boundary(above > level) + mesh.region_boundary(above > level + 0.45)
     curves = [c for c in curves if c.n_points > 8][:2]
     theirs = peer(mesh, curves, constraint)
-    ours = sh.SignedHeatSolver(mesh).distance(curves, CONSTRAINTS[constraint])
+    ours = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curves, CONSTRAINTS[constraint])
     shift = (
         ours.source.weights @ (ours.source.interpolation @ theirs) / ours.source.weights.sum()
     )  # theirs is centred otherwise
@@ -98,7 +98,7 @@ def test_curves_along_edges(name, constraint):
 def test_soft_constraint_of_the_published_code_from_our_matrices(name):
     """It pulls all nodes to the FIRST one, whatever their spacing; our C and b, so penalised, give its numbers."""
     mesh, curves = level_curves(name)
-    surface = sh.SignedHeatSolver(mesh).discretization
+    surface = sh.SignedHeatSolver(mesh, intrinsic=False).discretization
     source = surface.lower(surface.adapt(curves[:1])[1], 1.0)
     load = surface.divergence(normalize(surface, diffuse(surface, source)))
     to_first = source.interpolation[1:] - source.interpolation[np.zeros(source.interpolation.shape[0] - 1, dtype=int)]
@@ -115,10 +115,12 @@ def test_our_soft_constraint_keeps_its_meaning_when_scaled():
     curve, scale = curves[0], 1000.0
     large = sh.TriangleMesh(scale * mesh.vertices, mesh.faces)
     turned = sh.Curve(np.roll(curve.faces, 20), np.roll(curve.barycentric, 20, axis=0), closed=True)
-    phi = sh.SignedHeatSolver(mesh).distance(curve, sh.Soft(10.0)).values
-    scaled = sh.SignedHeatSolver(large).distance(curve, sh.Soft(10.0 / scale)).values
+    phi = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, sh.Soft(10.0)).values
+    scaled = sh.SignedHeatSolver(large, intrinsic=False).distance(curve, sh.Soft(10.0 / scale)).values
     np.testing.assert_allclose(scaled, scale * phi, atol=1e-9 * scale)
-    np.testing.assert_allclose(sh.SignedHeatSolver(mesh).distance(turned, sh.Soft(10.0)).values, phi, atol=1e-10)
+    np.testing.assert_allclose(
+        sh.SignedHeatSolver(mesh, intrinsic=False).distance(turned, sh.Soft(10.0)).values, phi, atol=1e-10
+    )
     theirs = peer(mesh, [curve], "ZeroSet", soft_level_set_weight=10.0)
     theirs_scaled = peer(large, [curve], "ZeroSet", soft_level_set_weight=10.0 / scale)
     assert np.abs(theirs_scaled - scale * theirs).max() > 1e-4 * np.ptp(theirs_scaled)
@@ -127,7 +129,7 @@ def test_our_soft_constraint_keeps_its_meaning_when_scaled():
 def test_segments_inside_faces_weigh_as_much_as_those_on_edges():
     """A line partly on edges, moved off them by a hair: with three times the weight inside, as published, φ jumps."""
     mesh = square(33)
-    solver = sh.SignedHeatSolver(mesh)
+    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
     surface = solver.discretization
     x = np.linspace(-1, 1, 65)
 

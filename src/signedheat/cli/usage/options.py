@@ -101,7 +101,7 @@ def add_method_options(parser: Parser) -> None:
         type=constraint,
         default="zero-set",
         metavar="C",
-        help="free, zero-set (default), hard, each-component, or soft:WEIGHT",
+        help="free, zero-set (default), hard, each-component, soft, or soft:WEIGHT",
     )
     method.add_argument(
         "--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"
@@ -126,11 +126,12 @@ def add_repair_options(parser: Parser) -> argparse._ArgumentGroup:
     return steps
 
 
-def constraint(word: str, with_numbers: str = "soft:WEIGHT") -> str:
+def constraint(word: str, with_numbers: str = "soft, soft:WEIGHT") -> str:
     """The name of a constraint, with its number if it has one; messages also name those `with_numbers`."""
     name, _, weight = word.partition(":")
     if name == "soft":
-        positive(weight)
+        if weight:
+            positive(weight)
     elif word not in CONSTRAINTS:
         raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(CONSTRAINTS)}, {with_numbers}")
     return word

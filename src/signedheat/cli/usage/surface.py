@@ -35,7 +35,7 @@ def add_curves_and_output(parser: Parser, output: str) -> None:
         type=surface_constraint,
         default="zero-set",
         metavar="C",
-        help="free, zero-set (default), hard, each-component, soft:WEIGHT, or levels:V,V,…, one for each curve",
+        help="free, zero-set (default), hard, each-component, soft, soft:WEIGHT, or levels:V,V,…, one for each curve",
     )
     parser.add_argument(
         "--diffusion",
@@ -58,4 +58,4 @@ def surface_constraint(word: str) -> str:
         for value in values.split(","):
             finite(value)
         return word
-    return constraint(word, with_numbers="soft:WEIGHT, levels:V,V,…")
+    return constraint(word, with_numbers="soft, soft:WEIGHT, levels:V,V,…")

@@ -31,6 +31,11 @@ class GridIntegration(SolvesEach):
 
     grid: Grid
 
+    @property
+    def soft_weight(self) -> float:
+        """λ of `Soft` where none is given, in 1/length."""
+        return STIFFNESS / float(self.grid.spacing.mean())
+
     def solve(self, divergence: NDArray[np.float64], source: GridSource) -> NDArray[np.float64]:
         """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
         phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
@@ -60,7 +65,7 @@ class GridIntegration(SolvesEach):
         The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
         small, and corrected directly. Rows that contradict each other are met in the least-squares sense.
         """
-        strength = STIFFNESS / float(self.grid.spacing.mean())
+        strength = self.soft_weight
         phi = self.fit(divergence.copy(), source, levels)
         multipliers = np.zeros(len(source.weights))
         for _ in range(MULTIPLIER_STEPS):

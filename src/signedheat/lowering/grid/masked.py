@@ -23,7 +23,7 @@ from ..area_elements import sample_on_grid
 from ..direct_integration import DirectIntegration
 from ..heat_system import HeatSystem, bend_around_corners
 from .free_nodes import FreeNodes
-from .integration import deviation
+from .integration import STIFFNESS, deviation
 from .masked_source import MaskedSource
 from .source import GridSource
 
@@ -125,6 +125,12 @@ class MaskedIntegration(DirectIntegration):
     """Step 3 on free nodes; `fit` imposes levels by a smooth correction, as on grids without solid nodes."""
 
     diffusing: MaskedGridDiscretization | None = None
+
+    @property
+    def soft_weight(self) -> float:
+        """λ of `Soft` where none is given, in 1/length."""
+        assert self.diffusing is not None
+        return STIFFNESS / float(self.diffusing.grid.spacing.mean())
 
     def fit(self, divergence: NDArray[np.float64], source: MaskedSource, levels: Levels) -> NDArray[np.float64]:
         """Subtract from φ the mean of its errors at the samples, weighted by area and heat (in place of Eq. 14)."""

@@ -24,7 +24,7 @@ from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import laid_out
 from ...linear import elimination_order, factorize
 from ...operators.cotan import cotan_matrix, divergence
-from ..direct_integration import DirectIntegration
+from .integration import STRENGTH, SurfaceIntegration
 from .memory import refuse_too_many
 from .nonmanifold_frames import nonmanifold_frames
 from .source import surface_source
@@ -72,9 +72,10 @@ class SurfaceDiscretization:
             object.__setattr__(self, "spacing", 0.5 * float(self.triangles.lengths_of_edges.mean()))
 
     @cached_property
-    def integration(self) -> DirectIntegration:
+    def integration(self) -> SurfaceIntegration:
         """Step 3."""
-        return DirectIntegration(self.stiffness, factorize=partial(factorize, order=self.vertex_order))
+        ordered = partial(factorize, order=self.vertex_order)
+        return SurfaceIntegration(self.stiffness, factorize=ordered, strength=STRENGTH / self.spacing)
 
     @cached_property
     def stiffness(self) -> sparse.csr_matrix:

@@ -17,7 +17,6 @@ from ...geometry.components import connected_components
 from ...geometry.curve_segments import CurveSegments, interpolation_at
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.surface_points import (
-    FACE,
     VERTEX,
     LocatedPoints,
     concatenated,
@@ -48,9 +47,6 @@ class SurfaceSource(Frozen):
         Source that each sample belongs to.
     oriented : bool
         Whether any source is oriented; if none is, φ is an unsigned distance.
-    pinned : (s,) bool
-        Samples at which `fit` imposes levels: all but those inside faces, unless their component has only such. Three
-        samples inside one face, not quite on a line, would force φ to be constant on it.
     triangles : IntrinsicMesh
         The triangles that the sources are lowered to; the first vertices are those of the domain's own triangles.
     parts : list of CurveSegments
@@ -64,7 +60,6 @@ class SurfaceSource(Frozen):
     components: NDArray[np.int64]
     source_ids: NDArray[np.int64]
     oriented: bool
-    pinned: NDArray[np.bool_]
     triangles: IntrinsicMesh
     parts: Sequence[CurveSegments]
 
@@ -130,7 +125,6 @@ def surface_source(
         )
 
     components = connected(parts)
-    outside = np.concatenate([p.nodes.kinds != FACE for p in parts])
     sizes = [sum(len(p.nodes) for p in group) for group in groups]
     return SurfaceSource(
         vectors=vectors,
@@ -140,7 +134,6 @@ def surface_source(
         components=components,
         source_ids=np.repeat(np.arange(len(groups)), sizes),
         oriented=any(p.oriented for p in parts),
-        pinned=outside | ~np.isin(components, components[outside]),
         triangles=triangles,
         parts=parts,
     )
