@@ -43,7 +43,8 @@ class SpringIntegration(DirectIntegration):
         S is the diagonal matrix of the `springs`, in place of the multipliers of Eq. 14.
         """
         rows = source.interpolation
-        springs, factor = self.springs(source), self.anchored(source)
+        springs = self.springs(source)
+        factor = self._pulled_factor(rows, springs)
         pull = sparse.csr_matrix(rows.T @ sparse.diags_array(springs))
         values, fitted = self.corrected(levels.values, lambda at: factor.solve(divergence + pull @ at), source)
         if levels.groups is None:

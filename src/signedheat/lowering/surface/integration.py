@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from ...discretization import Levels, SourceTerm
 from ...errors import ConstraintError
+from ...linear import Factor
+from ..direct_integration import DirectIntegration
 from ..spring_integration import SpringIntegration
 
 STRENGTH = 100.0
@@ -26,6 +28,10 @@ class SurfaceIntegration(SpringIntegration):
     def soft_weight(self) -> float:
         """λ of `Soft` where none is given, in 1/length."""
         return SOFT / STRENGTH * self.strength
+
+    def anchored(self, source: SourceTerm) -> Factor:
+        """Factor of C with φ held at zero along the source, as stiffly at every sample."""
+        return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
         """Impose levels: exactly along edges, to some hundredths of h across faces (Eq. 14)."""
