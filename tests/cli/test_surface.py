@@ -64,7 +64,7 @@ def test_levels(files, capsys):
         (
             {"constraint": "zero"},
             2,
-            "'zero' is none of free, zero-set, hard, each-component, soft:WEIGHT, l",
+            "'zero' is none of free, zero-set, hard, each-component, soft, soft:WEIGHT, l",
         ),
     ],
 )

@@ -130,12 +130,16 @@ def error(mesh, field, radius=0.55):
 def test_bad_triangles_do_not_matter_any_more(stretch):
     mesh = stretched_square(1500, stretch)
     curve = circle_on(mesh)
-    plain = error(mesh, sh.SignedHeatSolver(mesh).distance(curve, constraint=sh.Free()))
+    plain = error(mesh, sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, constraint=sh.Free()))
     robust = sh.SignedHeatSolver(mesh, intrinsic=True).distance(curve)
     assert robust.domain is mesh and robust.values.shape == (mesh.n_vertices,)
     assert "28°" in str(robust.diagnostics.note(IntrinsicTriangles))
     assert error(mesh, robust) < 2e-3
     assert error(mesh, robust) < 0.05 * plain
+    usual = sh.SignedHeatSolver(mesh).distance(curve)
+    assert usual.diagnostics.note(IntrinsicTriangles) is not None
+    assert error(mesh, usual) < 0.1 * plain
+    assert usual.finest.domain.n_vertices > mesh.n_vertices
 
 
 @pytest.mark.parametrize("spoil", [with_needles, with_caps])

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from argparse import Namespace
 
+from ..domains.triangle_mesh import TriangleMesh
 from ..extensions.close_curves import refuse_without_sides
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
+from ..solver import SignedHeatSolver
 from ..visualization import ensure_picture_writable, save_surface
-from .computing import Summary, prefix_errors
-from .surface import advice, measured
+from .computing import Summary, constraint_of, prefix_errors
+from .progress import ProgressBar
+from .surface import surface_and_curves
 
 
 def run(arguments: Namespace) -> Summary:
@@ -16,9 +19,12 @@ def run(arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, CURVE_FORMATS, "curves")
     if arguments.preview:
         ensure_picture_writable(arguments.preview)
-    surface, curves, field = measured(arguments)
-    with prefix_errors(arguments.curves):
+    surface, curves = surface_and_curves(arguments)
+    intrinsic = arguments.intrinsic or (isinstance(surface, TriangleMesh) and not arguments.plain) or "auto"
+    with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
         refuse_without_sides(curves)
+        solver = SignedHeatSolver(surface, arguments.diffusion, progress, intrinsic)
+        field = solver.distance(curves, constraint_of(arguments.constraint))
         found = field.contour(0.0)
     write_curves(arguments.output, found, surface)
     if arguments.preview:
@@ -32,4 +38,4 @@ def run(arguments: Namespace) -> Summary:
         "n_closed": closed,
     }
     curve = "curve" if len(found) == 1 else "curves"
-    return summary, f"{arguments.output}: {len(found)} {curve}, {closed} of them closed{advice(field)}"
+    return summary, f"{arguments.output}: {len(found)} {curve}, {closed} of them closed"

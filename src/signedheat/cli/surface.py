@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnostics import LargeAngles
+from ..constraints import EachComponent, LevelValues
+from ..diagnostics import LargeAngles, SharpenedToCurves
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
+from ..extensions.curve_distance import curve_distance
 from ..fields.vertex_field import VertexField
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
@@ -19,8 +21,8 @@ from .computing import Summary, constraint_of, prefix_errors
 from .progress import ProgressBar
 
 
-def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
-    """The surface, the curves, and the distance."""
+def surface_and_curves(arguments: Namespace) -> tuple[Any, Any]:
+    """The surface, and the curves on it."""
     surface = read_surface(arguments.mesh)
     if arguments.intrinsic and not isinstance(surface, TriangleMesh):
         raise SourceError(
@@ -28,16 +30,30 @@ def measured(arguments: Namespace) -> tuple[Any, Any, Any]:
             remedy="leave it out",
             path=arguments.mesh,
         )
-    curves = read_curves(arguments.curves, surface)
+    return surface, read_curves(arguments.curves, surface)
+
+
+def measured(surface: Any, curves: Any, arguments: Namespace) -> VertexField:
+    """The distance."""
     with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
-        solver = SignedHeatSolver(surface, arguments.diffusion, progress, arguments.intrinsic)
-        field = solver.distance(curves, constraint_of(arguments.constraint))
-    return surface, curves, field
+        constraint, intrinsic = constraint_of(arguments.constraint), arguments.intrinsic or "auto"
+        if arguments.plain or isinstance(constraint, EachComponent | LevelValues):
+            field = SignedHeatSolver(surface, arguments.diffusion, progress, intrinsic).distance(curves, constraint)
+        else:
+            field = curve_distance(
+                surface,
+                curves,
+                constraint=constraint,
+                diffusion=arguments.diffusion,
+                intrinsic=intrinsic,
+                progress=progress,
+            )
+    return field
 
 
 def advice(field: VertexField) -> str:
     """Advice on options that would make the result more accurate, or nothing."""
-    note = field.diagnostics.note(LargeAngles)
+    note = None if field.diagnostics.note(SharpenedToCurves) else field.diagnostics.note(LargeAngles)
     return f"; {note}: --intrinsic is more accurate" if note else ""
 
 
@@ -46,7 +62,8 @@ def run(arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
     if arguments.preview:
         ensure_picture_writable(arguments.preview)
-    surface, curves, field = measured(arguments)
+    surface, curves = surface_and_curves(arguments)
+    field = measured(surface, curves, arguments)
     field.save(arguments.output)
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
     summary = {
@@ -59,6 +76,9 @@ def run(arguments: Namespace) -> Summary:
         "unreached": len(field.diagnostics.unreached),
         "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
     }
+    note = field.diagnostics.note(SharpenedToCurves)
+    if note:
+        summary["completed"] = note.completed_length
     if arguments.contours:
         summary["contours"] = f"{arguments.output}.contours.obj"
         levels = np.linspace(low, high, arguments.contours + 2)[1:-1]
@@ -69,6 +89,8 @@ def run(arguments: Namespace) -> Summary:
     text = f"{arguments.output}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
     if summary["unreached"]:
         text += f", {summary['unreached']} vertices without any source"
+    if note and note.completed_length > 0:
+        text += f", {note.completed_length:.1%} of the curve completed"
     return summary, text + advice(field)
 
 

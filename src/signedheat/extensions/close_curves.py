@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ..constraints import Constraint
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
 from ..domains.kinds import SurfaceDomain
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..solver import SignedHeatSolver, as_list
 
@@ -15,6 +16,9 @@ def close_curves(
     domain: SurfaceDomain, curves: CurvesAndPoints, *, diffusion: float = 1.0, constraint: Constraint | None = None
 ) -> list[Curve]:
     """Complete broken curves: the zero set of the signed distance to them, which has no gaps.
+
+    On triangle meshes the method runs on an intrinsic triangulation along whose edges the curves run, so that curves
+    may be smaller than the triangles, and the result follows them where they are there.
 
     Parameters
     ----------
@@ -54,7 +58,8 @@ def close_curves(
     """
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
     refuse_without_sides(listed)
-    phi = SignedHeatSolver(domain, diffusion=diffusion).distance(listed, constraint)
+    conforming = isinstance(domain, TriangleMesh) or "auto"
+    phi = SignedHeatSolver(domain, diffusion, intrinsic=conforming).distance(listed, constraint)
     return phi.contour(0.0)
 
 

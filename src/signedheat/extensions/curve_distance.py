@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from ..constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..domains.curves import CurvesAndPoints
 from ..domains.kinds import AnySurface
@@ -18,6 +20,7 @@ def curve_distance(
     *,
     constraint: Free | ZeroSet | Soft | None = None,
     diffusion: float = 1.0,
+    intrinsic: bool | Literal["auto"] = "auto",
     progress: Progress | None = None,
 ) -> VertexField[AnySurface]:
     """Signed distance to curves and points on a surface, however broken, however they cross the faces.
@@ -35,6 +38,8 @@ def curve_distance(
         Imposed on φ at the curves by the method; `ZeroSet` by default.
     diffusion : float
         τ in ``t = τ h²``: larger values close gaps along rounder lines.
+    intrinsic : "auto", True or False
+        On what triangles the method runs: see `SignedHeatSolver`.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
@@ -66,6 +71,6 @@ def curve_distance(
             remedy="use SignedHeatSolver.distance",
         )
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
-    field = SignedHeatSolver(domain, diffusion, share).distance(curves, constraint)
+    field = SignedHeatSolver(domain, diffusion, share, intrinsic).distance(curves, constraint)
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
     return sharpen(field, curves, progress=rest)

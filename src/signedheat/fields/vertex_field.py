@@ -150,7 +150,8 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         field = self.finest
         known = field.values[np.isfinite(field.values)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
-        if not low <= level <= high:
+        least = 1e-12 * max(high - low, 0.0)
+        if not low - least <= level <= high + least:
             raise OutsideError(
                 f"level {level:g} is taken nowhere: φ goes from {low:g} to {high:g}",
                 remedy="choose a level between",

@@ -47,7 +47,11 @@ def add_curves_and_output(parser: Parser, output: str) -> None:
     parser.add_argument(
         "--intrinsic",
         action="store_true",
-        help="measure on better triangles of the same surface: for meshes with large angles, curves across faces",
+        help="run the method on better triangles of the same surface, along whose edges the curves run; by default on "
+        "better triangles where the mesh has large angles",
+    )
+    parser.add_argument(
+        "--plain", action="store_true", help="the method's own field, not measured to the curves themselves"
     )
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geodesics.exact import cleared
 from ..geodesics.sources import zero_line
 from ..polylines import assemble_polylines
 from .history import History, straight_lines
 from .transfer import ConformingRefinement, barycentric_of
 
 LEAST = 1e-12
-"""Values that are smaller, relative to the largest, count as zero, and zero as positive."""
+"""Values that are smaller, relative to the largest, count as zero."""
 
 
 def level_lines(
@@ -28,7 +29,7 @@ def level_lines(
         Points of one polyline each, in order, with larger values to its left.
     """
     least = LEAST * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
-    line = zero_line(history.after, np.where(np.abs(values) < least, least, values))
+    line = zero_line(history.after, cleared(history.after, values, least))
     if not len(line.faces):
         return []
     spots = barycentric_of(history.after, line.faces, line.positions)

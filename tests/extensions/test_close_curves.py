@@ -1,0 +1,48 @@
+"""Completion of curves on meshes whose triangles are larger than the curves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+
+
+def box() -> sh.TriangleMesh:
+    """A box of twelve triangles, as CAD makes it."""
+    vertices = [[x, y, z] for x in (0, 6) for y in (0, 4) for z in (0, 1)]
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return sh.TriangleMesh(vertices, [face for a, b, c, d in quads for face in ([a, b, c], [a, c, d])])
+
+
+def circle(radius: float, begin: float = 0.0, end: float = 2 * np.pi, n: int = 40) -> np.ndarray:
+    angle = np.linspace(begin, end, n, endpoint=end - begin < 6)
+    return np.stack([3.4 + radius * np.cos(angle), 1.9 + radius * np.sin(angle), np.ones(n)], axis=1)
+
+
+@pytest.mark.parametrize("radius", [0.3, 1.2])
+def test_closed_curves_smaller_than_the_triangles_come_back(radius):
+    mesh = box()
+    found = sh.close_curves(mesh, mesh.polyline(circle(radius), closed=True))
+    assert len(found) == 1 and found[0].closed
+    places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
+    assert np.abs(np.linalg.norm(places - [3.4, 1.9, 1.0], axis=1) - radius).max() < 0.01 * radius
+
+
+def test_a_gap_is_closed():
+    mesh = box()
+    found = sh.close_curves(mesh, mesh.polyline(circle(1.2, 0.4, 6.0)))
+    assert len(found) == 1 and found[0].closed
+    places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
+    assert np.abs(np.linalg.norm(places - [3.4, 1.9, 1.0], axis=1) - 1.2).max() < 0.3
+
+
+def test_the_finer_solution_is_used():
+    """Values at points and contours come from the refined triangles, until the values change."""
+    mesh = box()
+    phi = sh.SignedHeatSolver(mesh, intrinsic=True).distance(mesh.polyline(circle(0.8), closed=True))
+    assert phi.finest.domain.n_vertices > 50
+    assert phi([[3.4, 1.9, 1.0]])[0] > 0.3
+    assert len(phi.contour(0.3)) == 1
+    shifted = sh.VertexField(mesh, phi.values + 1.0, finer=phi.finer)
+    assert shifted.finest is shifted
