@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
-.PHONY: demo test fuzz lint types coverage matrix dist clean
+.PHONY: demo docs test fuzz lint types coverage matrix dist clean
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -32,6 +32,13 @@ lint: $(VENV)/.installed-test
 types: $(VENV)/.installed-test
 	$(BIN)/python tools/check_types.py
 
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(PIP) --no-build-isolation --editable .[docs]
+	touch $@
+
+docs: $(VENV)/.installed-docs  # into docs/_build/html, without a warning; runs every example of the gallery
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
 coverage: $(VENV)/.installed-test
 	$(BIN)/python -m coverage run -m pytest $(TESTS)
 	$(BIN)/python -m coverage report
@@ -48,5 +55,5 @@ dist: $(VENV)/.installed
 	$(BIN)/python -m hatchling build
 
 clean:
-	rm -rf $(VENV) .venv-matrix demo dist htmlcov .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) .venv-matrix demo dist docs/_build docs/api docs/gallery htmlcov .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find src tests benchmarks examples -name __pycache__ -prune -exec rm -rf {} +

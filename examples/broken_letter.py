@@ -1,4 +1,8 @@
-"""A letter with gaps at its corners, completed: the longer the diffusion, the rounder the joins (Fig. 18)."""
+"""Complete a broken letter
+========================
+
+A letter with gaps at its corners, completed: the longer the diffusion, the rounder the joins (Fig. 18).
+"""
 
 from pathlib import Path
 

@@ -1,6 +1,7 @@
-"""Broken curves are completed more roundly the longer their normals diffuse (Fig. 18 of the paper).
+"""Completion and diffusion time
+=============================
 
-The four corners of a square are missing, and the square lies on a flat disk of triangles.
+The longer normals diffuse, the more roundly curves are completed (Fig. 18): a square without its corners, on triangles.
 """
 
 import sys

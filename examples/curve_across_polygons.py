@@ -1,4 +1,8 @@
-"""Two dashed circles across the hexagons of a torus: distance of every corner from them, around the tube."""
+"""Curves across polygons
+======================
+
+Two dashed circles across the hexagons of a torus: distance of every corner from them, around the tube.
+"""
 
 from pathlib import Path
 

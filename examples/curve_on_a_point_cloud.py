@@ -1,4 +1,8 @@
-"""Points on a sphere without normals: distance to a circle of points, of which every third is missing."""
+"""A curve on a point cloud
+========================
+
+Points on a sphere without normals: distance to a circle of points, of which every third is missing.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,8 @@
-"""Distance on a ball of voxels: accurate with corrected normals, far too long on the staircase of voxel faces."""
+"""Distance on voxels
+==================
+
+Distance on a ball of voxels: accurate with corrected normals, far too long on the staircase of voxel faces.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,7 @@
-"""Distance inside a tank with a baffle, measured around the baffle; the tets need not conform to the source.
+"""Round the corners of a tank, on tets
+====================================
+
+Distance inside a tank with a baffle, measured around the baffle; the tets need not conform to the source.
 
 The source is a broken sphere in one corner: a third of its faces are gone.
 """

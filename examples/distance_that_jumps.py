@@ -1,4 +1,7 @@
-"""Curves that bound no region (Sec. 7.2, Figs. 12–14): distance is continuous except across a short cut.
+"""Curves that bound no region
+===========================
+
+Curves that bound no region (Sec. 7.2, Figs. 12–14): distance is continuous except across a short cut.
 
 A loop around the tube of a torus; one around its hole; and on a sphere an equator whose halves have opposite
 orientations. The sources are yellow.

@@ -1,4 +1,8 @@
-"""A floor plan: distance of every point from the north wall of a hall, through doors and around their posts."""
+"""A floor plan: distance round walls
+==================================
+
+A floor plan: distance of every point from the north wall of a hall, through doors and around their posts.
+"""
 
 from pathlib import Path
 

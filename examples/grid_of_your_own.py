@@ -1,4 +1,8 @@
-"""Distance on an image grid with thick slices, saved for an image viewer and loaded back."""
+"""A grid of your own, for an image viewer
+=======================================
+
+Distance on an image grid with thick slices, saved for an image viewer and loaded back.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,8 @@
-"""A sphere with a third of its faces gone, noisy and partly flipped: the closed surface at a distance from it."""
+"""Offset of a broken sphere
+=========================
+
+A sphere with a third of its faces gone, noisy and partly flipped: the closed surface at a distance from it.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,7 @@
-"""Sharpening (Sec. 7.3): the error of the heat method around a star, before and after, on flat triangles.
+"""Sharpening
+==========
+
+Sharpening (Sec. 7.3): the error of the heat method around a star, before and after, on flat triangles.
 
 Sharpening also removes the error of a very long diffusion, since only the zero set of the field matters.
 """

@@ -1,4 +1,8 @@
-"""Scanned points with normals: the closed surface through them, and the volume it holds."""
+"""A closed surface from scanned points
+====================================
+
+Scanned points with normals: the closed surface through them, and the volume it holds.
+"""
 
 from pathlib import Path
 

@@ -65,34 +65,34 @@ def _small_png(figure: Any) -> bytes:
 
 
 @singledispatch
-def draw(thing: Any, axes: Any) -> bool:
-    """Draw something into axes; whether there was anything to draw."""
+def draw(thing: Any, axes: Any, **options: Any) -> bool:
+    """Draw something into axes, with the options of `save_row`; whether there was anything to draw."""
     return False
 
 
 @draw.register(TriangleMesh)
 @draw.register(PolygonMesh)
 @draw.register(PointCloud)
-def _(shape: TriangleMesh | PolygonMesh | PointCloud, axes: Any) -> bool:
+def _(shape: TriangleMesh | PolygonMesh | PointCloud, axes: Any, **options: Any) -> bool:
     positions = shape.points if isinstance(shape, PointCloud) else shape.vertices
     if positions.shape[1] != 3:
         return False
-    draw_shape(shape, axes)
+    draw_shape(shape, axes, **options)
     return True
 
 
 @draw.register
-def _(shape: TetMesh, axes: Any) -> bool:
-    return draw(shape.boundary, axes)
+def _(shape: TetMesh, axes: Any, **options: Any) -> bool:
+    return draw(shape.boundary, axes, **options)
 
 
 @draw.register
-def _(shape: DigitalSurface, axes: Any) -> bool:
-    return draw(shape.squares, axes)
+def _(shape: DigitalSurface, axes: Any, **options: Any) -> bool:
+    return draw(shape.squares, axes, **options)
 
 
 @draw.register
-def _(line: Polyline, axes: Any) -> bool:
+def _(line: Polyline, axes: Any, **options: Any) -> bool:
     points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
     axes.plot(*points.T, color="#d4145a", linewidth=2.0)
     axes.set_aspect("equal")
@@ -100,42 +100,42 @@ def _(line: Polyline, axes: Any) -> bool:
 
 
 @draw.register
-def _(field: GridField, axes: Any) -> bool:
+def _(field: GridField, axes: Any, **options: Any) -> bool:
     if field.grid.dimension not in (2, 3) or np.isnan(field.values).all():
         return False
     if field.grid.dimension == 2:
-        draw_plane(field, axes)
+        draw_plane(field, axes, **options)
     else:
-        draw_slices(field, [axes], across=(_best_axis(field),))
+        draw_slices(field, [axes], **{"across": (_best_axis(field),), **options})
     return True
 
 
 @draw.register
-def _(field: BandField, axes: Any) -> bool:
-    return draw(field.coarse, axes)
+def _(field: BandField, axes: Any, **options: Any) -> bool:
+    return draw(field.coarse, axes, **options)
 
 
 @draw.register
-def _(field: TetField, axes: Any) -> bool:
+def _(field: TetField, axes: Any, **options: Any) -> bool:
     grid = Grid.around(np.delete(field.mesh.bounds, 1, axis=1), SECTION_NODES, padding=0.0)
     points = np.insert(grid.points.reshape(-1, 2), 1, field.mesh.bounds[:, 1].mean(), axis=1)
-    draw_plane(GridField(grid, field(points).reshape(grid.shape)), axes)
+    draw_plane(GridField(grid, field(points).reshape(grid.shape)), axes, **options)
     axes.set(ylabel="z")
     return True
 
 
 @draw.register
-def _(field: VertexField, axes: Any) -> bool:
+def _(field: VertexField, axes: Any, **options: Any) -> bool:
     simple = on_simple_surface(field)
     if isinstance(simple.domain, PointCloud) and simple.domain.points.shape[1] != 3:
         return False
-    draw_surface(simple, axes)
+    draw_surface(simple, axes, **options)
     return True
 
 
 @draw.register
-def _(field: PiecewiseField, axes: Any) -> bool:
-    return draw(field.split(), axes)
+def _(field: PiecewiseField, axes: Any, **options: Any) -> bool:
+    return draw(field.split(), axes, **options)
 
 
 def _best_axis(field: GridField) -> int:

@@ -1,0 +1,84 @@
+"""Settings of Sphinx: `make docs` builds the pages into docs/_build/html, without a warning."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx_gallery.scrapers import figure_rst
+
+import signedheat
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "examples"))
+
+project = "signedheat"
+author = copyright = "The signedheat developers"
+version = release = signedheat.__version__
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.viewcode",
+    "numpydoc",
+    "sphinx_gallery.gen_gallery",
+]
+root_doc = "index"
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["_build", "gallery/**/*.ipynb", "gallery/**/*.py", "gallery/**/*.zip", "gallery/**/*.md5"]
+html_theme = "furo"
+html_title = f"signedheat {release}"
+html_logo = None
+html_show_sphinx = False
+
+myst_enable_extensions = ["amsmath", "dollarmath", "colon_fence", "deflist"]
+myst_heading_anchors = 3
+autodoc_typehints = "none"  # numpydoc's sections name types in words
+autosummary_generate = True
+numpydoc_show_class_members = True
+numpydoc_show_inherited_class_members = False
+numpydoc_class_members_toctree = False
+default_role = "code"  # names in docstrings
+suppress_warnings = ["config.cache"]
+
+
+def scrape(block: object, variables: dict[str, object], settings: dict[str, object]) -> str:
+    """The picture that an example has written beside itself, or nothing."""
+    source = Path(str(variables["src_file"]))
+    picture = source.with_suffix(".png")
+    if not picture.exists():
+        return ""
+    place = Path(next(iter(variables["image_path_iterator"])))  # type: ignore[call-overload]
+    shutil.move(picture, place)
+    return str(figure_rst([str(place)], str(settings["src_dir"])))
+
+
+def escape(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Shapes such as ``(*shape)`` in docstrings are no emphasis."""
+    lines[:] = [line.replace("(*", "(\\*") for line in lines]
+
+
+def setup(app: Sphinx) -> None:
+    """Connect what is done before numpydoc reads docstrings."""
+    app.connect("autodoc-process-docstring", escape, priority=400)
+
+
+sphinx_gallery_conf = {
+    "examples_dirs": ["../examples"],
+    "gallery_dirs": ["gallery"],
+    "filename_pattern": r"\.py$",
+    "image_scrapers": [scrape],
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "show_memory": False,
+    "write_computation_times": False,
+    "min_reported_time": 1e9,
+    "plot_gallery": "True",
+    "abort_on_example_error": True,
+    "reset_modules": (),
+    "first_notebook_cell": None,
+}

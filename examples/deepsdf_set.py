@@ -1,0 +1,37 @@
+"""Points with exact distances, to learn from
+==========================================
+
+A whole application: a set in the form that DeepSDF reads, 250 points near the surface for every 10 in the box.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+import signedheat as sh
+from signedheat import samples, visualization
+
+EXPECTED = (0.0, 0.002)
+"""Largest error of a distance to the unit sphere whose faces are flat by at most 0.001."""
+
+
+def main(folder: Path) -> float:
+    """Write the set and a picture; return the largest error of a distance."""
+    ball = samples.sphere(5)
+    found = sh.sample(sh.solid_distance(ball, resolution=48), 4000)
+    found.save(folder / "ball.npz", "deepsdf")
+
+    grid = sh.Grid((-1.2, -1.2), 0.02, (121, 121))
+    exact = sh.GridField(grid, np.linalg.norm(grid.points, axis=-1) - 1)
+    thin = found.points[np.abs(found.points[:, 1]) < 0.1][:, [0, 2]]
+    visualization.save_row(
+        folder / "deepsdf_set.png",
+        ("the shape", ball),
+        ("samples in a slice", exact, {"shape": sh.PointCloud(thin)}),
+        ("all samples", sh.PointCloud(found.points)),
+    )
+    return float(np.abs(np.linalg.norm(found.points, axis=1) - 1 - found.distances).max())
+
+
+if __name__ == "__main__":
+    print(f"{main(Path('.')):.4f}, expected {EXPECTED[0]:.4f}")

@@ -1,0 +1,47 @@
+"""Open sheets bound nothing
+=========================
+
+A table of thin boards without thickness: around a sheet that bounds nothing, distance is positive on both sides, and
+the offset is a closed surface around each board.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+import signedheat as sh
+from signedheat import samples, visualization
+
+EXPECTED = (1.0, 0.0)
+"""Share of the nodes with positive distance."""
+
+
+def board(corner: tuple[float, ...], u: tuple[float, ...], v: tuple[float, ...], n: int = 12) -> sh.TriangleMesh:
+    """A rectangle of triangles."""
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+    points = np.array(corner) + (i[..., None] * np.array(u) + j[..., None] * np.array(v)) / n
+    a = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.concatenate([np.stack([a, a + n + 1, a + n + 2], axis=1), np.stack([a, a + n + 2, a + 1], axis=1)])
+    return sh.TriangleMesh(points.reshape(-1, 3), faces)
+
+
+def main(folder: Path) -> float:
+    """Write a picture; return the share of the nodes that are outside."""
+    table = samples.union(
+        board((0, 0, 1), (2, 0, 0), (0, 1.2, 0)),
+        board((0.2, 0.1, 0), (0, 1, 0), (0, 0, 1)),
+        board((1.8, 0.1, 0), (0, 1, 0), (0, 0, 1)),
+    )
+    phi = sh.solid_distance(table, resolution=72, padding=0.4)
+
+    visualization.save_row(
+        folder / "open_sheets.png",
+        ("in: boards without thickness", table, {"view": (20, -60)}),
+        ("distance: outside on both sides", phi, {"shape": table, "across": (1,), "levels": [0.12]}),
+        ("out: 0.12 around", phi.offset(0.12), {"view": (20, -60)}),
+    )
+    return float((phi.values > 0).mean())
+
+
+if __name__ == "__main__":
+    print(f"{main(Path('.')):.4f}, expected {EXPECTED[0]:.4f}")

@@ -1,0 +1,34 @@
+"""Bodies that overlap
+===================
+
+Modellers put bodies into one another. What is inside others is left out, and the rest is one solid.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+import signedheat as sh
+from signedheat import samples, visualization
+
+EXPECTED = (-np.sqrt(0.75), 0.02)
+"""Distance from the middle between two unit balls 1 apart to the circle where they meet."""
+
+
+def main(folder: Path) -> float:
+    """Write a picture; return the distance in the middle."""
+    shape = samples.union(samples.sphere(4, center=(-0.5, 0, 0)), samples.sphere(4, center=(0.5, 0, 0)))
+    grid = sh.Grid.around(shape.bounds, 64)
+    given, united = sh.sharpen(sh.signed_distance(shape, grid)), sh.solid_distance(shape, grid)
+
+    visualization.save_row(
+        folder / "overlapping_bodies.png",
+        ("two balls, one mesh", shape),
+        ("as they were given", given, {"shape": shape, "across": (1,)}),
+        ("solid_distance", united, {"shape": shape, "across": (1,)}),
+    )
+    return float(united([0.0, 0.0, 0.0]))
+
+
+if __name__ == "__main__":
+    print(f"{main(Path('.')):.4f}, expected {EXPECTED[0]:.4f}")

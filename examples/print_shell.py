@@ -1,0 +1,43 @@
+"""Print an open sheet: a shell with a drain hole
+==============================================
+
+A whole application: a bowl that is only a surface gets a wall that a printer can print, and a hole so that resin
+drains.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+import signedheat as sh
+from signedheat import samples, visualization
+
+EXPECTED = (2 * np.pi * 0.12 - np.pi * 0.2**2 * 0.12, 0.06)
+"""Volume: half of the sphere times the wall, less the hole."""
+
+
+def main(folder: Path) -> float:
+    """Write the solid and a picture; return the volume of the solid."""
+    ball = samples.sphere(4)
+    bowl = sh.TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces][..., 2].max(axis=1) <= 0])
+    wall = sh.thicken(bowl, 0.06, resolution=96)
+
+    grid = sh.Grid.around(wall.bounds, resolution=96, padding=0.15)
+    solid = sh.solid_distance(wall, grid)
+    x, y, _ = np.moveaxis(grid.points, -1, 0)
+    drill = sh.GridField(grid, np.hypot(x, y) - 0.2)
+    drained = sh.sharpen(solid - drill)
+    part = drained.contour()
+    part.save(folder / "bowl.stl")
+
+    visualization.save_row(
+        folder / "print_shell.png",
+        ("in: an open sheet", bowl, {"view": (35, -58)}),
+        ("its wall, with a drain hole", drained, {"shape": bowl, "across": (1,)}),
+        ("out: closed, 0.12 thick, from below", part, {"view": (-40, -58)}),
+    )
+    return float(part.to_trimesh().volume)
+
+
+if __name__ == "__main__":
+    print(f"{main(Path('.')):.4f}, expected {EXPECTED[0]:.4f}")

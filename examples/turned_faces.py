@@ -1,0 +1,34 @@
+"""Turned faces
+============
+
+Half of the faces of a shape look inwards, at random. Winding numbers cancel; orientation is found and mended first.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+import signedheat as sh
+from signedheat import samples, visualization
+
+EXPECTED = (0.0, 0.005)
+"""Largest error of the distance to the unit sphere, whose faces are flat by at most 0.001."""
+
+
+def main(folder: Path) -> float:
+    """Write a picture; return the largest error."""
+    shape = samples.with_flipped_faces(samples.sphere(5), 0.5)
+    grid = sh.Grid.around(shape.bounds, 64)
+    plain, mended = sh.sharpen(sh.signed_distance(shape, grid)), sh.solid_distance(shape, grid)
+
+    visualization.save_row(
+        folder / "turned_faces.png",
+        ("half of the faces turned (red)", shape),
+        ("as they were given", plain, {"shape": shape, "across": (1,)}),
+        ("solid_distance", mended, {"shape": shape, "across": (1,)}),
+    )
+    return float(np.abs(np.linalg.norm(grid.points, axis=-1) - 1 - mended.values).max())
+
+
+if __name__ == "__main__":
+    print(f"{main(Path('.')):.4f}, expected {EXPECTED[0]:.4f}")

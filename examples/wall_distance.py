@@ -1,0 +1,44 @@
+"""Distance to walls, round obstacles
+==================================
+
+A whole application: what a flow solver wants to know in a channel with blocks: how far is it to the next wall, and how
+far from the inlet along the way that a fluid would take?
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+import signedheat as sh
+from signedheat import visualization
+
+EXPECTED = (0.5, 0.01)
+"""Largest distance from a wall in the free channel of width 1."""
+
+
+def main(folder: Path) -> float:
+    """Write a picture; return the largest distance from the walls before the first block."""
+    grid = sh.Grid((0.0, 0.0), 0.0125, (241, 97))
+    x, y = np.moveaxis(grid.points, -1, 0)
+    blocks = (np.abs(x - 1.3) < 0.1) & (y < 0.7) | (np.abs(x - 2.1) < 0.15) & (y > 0.5)
+    solid = blocks | (y < 0.1) | (y > 1.1)
+
+    walls = sh.Polyline.from_mask(solid, spacing=grid.spacing)
+    to_walls = ~sh.sharpen(sh.signed_distance([line.reversed() for line in walls], grid))
+    inlet = sh.Polyline([[0.05, 1.1], [0.05, 0.1]])
+    from_inlet = sh.signed_distance(inlet, sh.Grid(grid.origin, grid.spacing, grid.shape, mask=solid), diffusion=1.0)
+
+    figure = visualization.new_figure(12.0, 5.2)
+    free = sh.GridField(grid, np.where(solid, np.nan, np.abs(to_walls.values)))
+    for k, (title, field) in enumerate(
+        [("to the nearest wall", free), ("from the inlet, round the blocks", from_inlet)]
+    ):
+        axes = figure.add_subplot(2, 1, k + 1)
+        visualization.draw_plane(field, axes, inlet if k else None)
+        axes.set_title(title)
+    figure.savefig(folder / "wall_distance.png")
+    return float(np.nanmax(free.values[x < 0.6]))
+
+
+if __name__ == "__main__":
+    print(f"{main(Path('.')):.4f}, expected {EXPECTED[0]:.4f}")
