@@ -12,17 +12,17 @@ import signedheat as sh
 from signedheat import visualization
 
 PLAN = """
-#########################
-#.......................#
-#.......................#
-#.......................#
-####.######.#########.###
-#.......#...........#...#
-#.......#...........#...#
-#.......#...........#...#
-#.......#...........#...#
-#.......#...........#...#
-#########################
+XXXXXXXXXXXXXXXXXXXXXXXXX
+X.......................X
+X.......................X
+X.......................X
+XXXX.XXXXXX.XXXXXXXXX.XXX
+X.......X...........X...X
+X.......X...........X...X
+X.......X...........X...X
+X.......X...........X...X
+X.......X...........X...X
+XXXXXXXXXXXXXXXXXXXXXXXXX
 """
 METRE = 8
 """Nodes along a letter of the plan, which stands for a square of one metre."""
@@ -35,7 +35,7 @@ EXPECTED = (NORTH - 6.0 + np.hypot(1.5, 4.5), 0.1)
 def main(folder: Path) -> float:
     """Write the field and a picture; return the distance of a place in the middle room, in metres."""
     rows = np.array([list(row) for row in PLAN.split()])
-    walls = np.kron(rows[::-1].T == "#", np.ones((METRE, METRE), dtype=bool))
+    walls = np.kron(rows[::-1].T == "X", np.ones((METRE, METRE), dtype=bool))
     grid = sh.Grid(origin=(0.5 / METRE, 0.5 / METRE), spacing=1 / METRE, shape=walls.shape, mask=walls)
     north = sh.Polyline([[24.0, NORTH], [1.0, NORTH]])  # westward, so that the rooms lie to its left
 
