@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from shapes.surface_cases import sphere
+from shapes.degenerate_meshes import with_caps, with_needles
+from shapes.surface_cases import sphere, square
 from signedheat import samples
 
 BALL = samples.sphere(1)
+BOW_TIE = [[0, 1, 2], [0, 3, 4]]
 NONSENSE = [
     None,
     "three",
@@ -147,3 +149,31 @@ def test_weights_of_soft_constraints_have_limits_on_both_ends():
         np.testing.assert_allclose(solver.distance(ring, sh.Soft(weak)).values, free, atol=1e-8)
     for strong in (1e12, 1e300):
         np.testing.assert_allclose(solver.distance(ring, sh.Soft(strong)).values, held, atol=1e-5)
+
+
+@pytest.mark.parametrize("flatness", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 0.0])
+@pytest.mark.parametrize("refine", [False, True])
+def test_intrinsic_triangulations_keep_the_area_or_refuse(flatness, refine):
+    """One cap or needle in every face changes less than 1e-6; a shape that is squashed altogether may be refused."""
+    for mesh in (with_needles(square(5, 0.2), flatness), with_caps(square(5, 0.2), flatness)):
+        made = sh.intrinsic_delaunay(mesh, refine=refine)
+        assert made.triangles.face_areas.sum() == pytest.approx(mesh.face_areas.sum(), rel=1e-6)
+    try:
+        squashed = sh.TriangleMesh(square(5, 0.2).vertices * [1.0, flatness, 1.0], square(5).faces)
+        made = sh.intrinsic_delaunay(squashed, refine=refine, max_vertices=500)
+    except sh.GeometryError as error:
+        assert flatness < 1e-6 and error.element == "faces"
+    else:
+        assert made.triangles.face_areas.sum() == pytest.approx(squashed.face_areas.sum(), rel=1e-4)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
+def test_the_convex_method_stays_bounded_where_the_field_is_constant(scale):
+    """Sources on all sides cancel: φ is rounding alone, and tells no scale."""
+    mesh = sh.TriangleMesh(scale * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0.3]]), BOW_TIE)
+    for constraint in (None, sh.Free()):
+        field = sh.SignedHeatSolver(mesh).distance(mesh.points_at([0, 1, 2, 3, 4]), constraint)
+        assert np.abs(field.values).max() < scale
+        tiny = sh.VertexField(mesh, np.array([0, 1, -1, 2, -2]) * 1e-95 * scale, source=field.source)
+        for made in (field, tiny):
+            assert np.abs(sh.sharpen(made, sh.Convex()).values).max() < 10 * scale

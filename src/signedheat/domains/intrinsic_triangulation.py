@@ -38,6 +38,9 @@ from .validation import finite_rows, frozen
 if TYPE_CHECKING:
     import pyvista
 
+AREA_ERROR = 1e-4
+"""Largest relative change of the area of a mesh. It is 1e-7 at most where some faces are degenerate."""
+
 LARGEST_ANGLE = 30.0
 """Degrees; for larger minimum angles refinement need not terminate."""
 
@@ -262,7 +265,8 @@ def intrinsic_delaunay(
     Raises
     ------
     GeometryError
-        If the domain is not a triangle mesh, has no area, or `angle` or `max_vertices` is out of range.
+        If the domain is not a triangle mesh, has no area or faces so thin that lengths of edges do not tell it to four
+        digits, or `angle` or `max_vertices` is out of range.
     SourceError
         If a curve to be kept does not lie on the mesh.
 
@@ -301,9 +305,21 @@ def intrinsic_delaunay(
             marked = np.append(marked, False)[origin]
     n = int(gluing.counts[3])
     triangles = lay_out(gluing)
+    refuse_other_area(mesh, triangles)
     history = History(refinement.triangles, triangles, gluing.steps[:n].copy(), gluing.weights[:n].copy())
     goal = angle if refine else 0.0
     return IntrinsicTriangulation(mesh, triangles, marked, goal, complete, close, base, refinement, history)
+
+
+def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
+    """Refuse what lengths of edges cannot tell: triangles thinner than about the square root of rounding."""
+    before, after = float(mesh.face_areas.sum()), float(triangles.face_areas.sum())
+    if not abs(after - before) <= AREA_ERROR * before:
+        raise GeometryError(
+            f"the faces are too thin to be triangulated anew: their area would be {after:.6g}, and it is {before:.6g}",
+            remedy="remove faces that are all but flat, or scale the shape where it is squashed",
+            element="faces",
+        )
 
 
 def triangle_mesh(domain: object) -> TriangleMesh:

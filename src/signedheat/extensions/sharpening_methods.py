@@ -152,7 +152,8 @@ class Convex:
         with threadpool_limits(1, "blas"):  # threads cost a triangular solve of this size more than they gain
             factor = integration.anchored(source)
             phi = np.nan_to_num(values)
-            pull = elements.masses * np.sign(phi) / (np.ptp(phi) or 1.0)
+            reach = max(float(np.ptp(phi)), typical_size(sizes, elements.slopes(phi).shape[1]))
+            pull = elements.masses * np.sign(phi) / reach
             relaxed = slopes = elements.slopes(phi)
             dual = np.zeros_like(slopes)
             limited = at_most_one(slopes)
@@ -175,3 +176,8 @@ def at_most_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Projection of rows on the unit ball: rows longer than one are scaled to length one."""
     result: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
     return result
+
+
+def typical_size(sizes: NDArray[np.float64], dimension: int) -> float:
+    """A length from areas or volumes: a field that varies by less is constant, and tells no scale."""
+    return float(sizes.mean() ** (1 / dimension))
