@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .discretization import Integration, Levels, SourceTerm
+from .domains.validation import LARGEST, finite_number, numbers
 from .errors import ConstraintError
 from .reprs import ShortRepr
 
@@ -106,7 +107,8 @@ class LevelValues(ShortRepr):
     Raises
     ------
     ConstraintError
-        If a value is not finite; when solving, if their number is neither that of the sources nor of the components.
+        If a value is not finite, or beyond 1e40; when solving, if their number is neither that of the sources nor
+        of the components.
 
     Examples
     --------
@@ -118,10 +120,10 @@ class LevelValues(ShortRepr):
     hard: bool = False
 
     def __post_init__(self) -> None:
-        values = tuple(float(v) for v in np.atleast_1d(np.asarray(self.values, dtype=np.float64)))
-        if not np.isfinite(values).all():
-            raise ConstraintError(f"level values must be finite, not {list(values)}", element="values")
-        object.__setattr__(self, "values", values)
+        values = np.atleast_1d(numbers(self.values, "values", ConstraintError))
+        if values.ndim != 1 or not (np.abs(values) <= LARGEST).all():
+            raise ConstraintError(f"level values must be numbers up to {LARGEST:g}, not {values}", element="values")
+        object.__setattr__(self, "values", tuple(values.tolist()))
 
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
@@ -165,13 +167,15 @@ class Soft:
     weight: float | None = None
 
     def __post_init__(self) -> None:
-        if self.weight is not None and not (np.isfinite(self.weight) and self.weight > 0):
-            raise ConstraintError(
-                f"the weight of a soft constraint must be positive and finite, not {self.weight}", element="weight"
-            )
+        if self.weight is None:
+            return
+        weight = finite_number(self.weight, "weight", error=ConstraintError)
+        if weight <= 0:
+            raise ConstraintError(f"the weight of a soft constraint must be positive, not {weight:g}", element="weight")
+        object.__setattr__(self, "weight", weight)
 
     def integrate(
         self, integration: Integration, divergence: NDArray[np.float64], source: SourceTerm
     ) -> NDArray[np.float64]:
-        weight = integration.soft_weight if self.weight is None else float(self.weight)
+        weight = integration.soft_weight if self.weight is None else self.weight
         return integration.penalize(divergence, source, weight)

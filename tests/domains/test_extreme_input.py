@@ -10,6 +10,7 @@ import pytest
 import signedheat as sh
 from shapes.degenerate_meshes import with_caps, with_needles
 from shapes.surface_cases import sphere, square
+from shapes.tet_cases import boxes
 from signedheat import samples
 
 BALL = samples.sphere(1)
@@ -94,6 +95,13 @@ def test_sizes_within_give_the_same_distances(scale):
         lambda x: BALL.polyline(x),
         lambda x: BALL.level_set(x),
         lambda x: BALL.region_boundary(x),
+        lambda x: sh.LevelValues(x),
+        lambda x: sh.Soft(-1.0 if x is None else x),
+        lambda x: sh.tetrahedralize(BALL, resolution=x),
+        lambda x: sh.GridField(x, np.zeros((3, 3))),
+        lambda x: sh.GridField(sh.Grid((0, 0), 1.0, (3, 3)), x),
+        lambda x: sh.GridField(sh.Grid((0, 0), 1.0, (3, 3)), np.zeros((3, 3)))(x),
+        lambda x: sh.Polyline([[0, 0], [1, 1]], closed=x),
     ],
 )
 def test_what_holds_no_numbers_is_refused(make, thing):
@@ -177,3 +185,27 @@ def test_the_convex_method_stays_bounded_where_the_field_is_constant(scale):
         tiny = sh.VertexField(mesh, np.array([0, 1, -1, 2, -2]) * 1e-95 * scale, source=field.source)
         for made in (field, tiny):
             assert np.abs(sh.sharpen(made, sh.Convex()).values).max() < 10 * scale
+
+
+@pytest.mark.parametrize("origin", [1e16, -1e16, 1e20])
+def test_grids_whose_spacing_is_lost_in_rounding_are_refused(origin):
+    with pytest.raises(sh.GeometryError) as caught:
+        sh.Grid((0, origin, 0), 1.0, (4, 4, 4))
+    assert caught.value.element == "spacing" and caught.value.remedy
+    with pytest.raises(sh.GeometryError):
+        sh.signed_distance(sh.TriangleMesh(BALL.vertices + origin, BALL.faces), resolution=16)
+
+
+def test_flat_tets_among_others_do_no_harm():
+    lattice = boxes((2, 2, 2), 1.0)
+    vertices = lattice.vertices * [1.0, 1.0, 1e-17] + [0.0, 0.0, 0.0]
+    vertices[0, 2] = 0.5
+    flat = sh.TetMesh(vertices, lattice.tets)
+    source = sh.TriangleMesh([[0.2, 0.3, -1], [1.6, 0.4, -1], [0.9, 0.8, 1]], [[0, 1, 2]])
+    try:
+        field = sh.signed_distance(source, flat)
+        sharp = sh.sharpen(field)
+    except sh.SignedHeatError as error:
+        assert error.remedy or error.element
+    else:
+        assert np.isfinite(field.values).all() and np.isfinite(sharp.values).all()

@@ -28,6 +28,8 @@ from .validation import (
 
 ROOM = 0.2
 """Share of its longest side by which a shape is padded on every side."""
+LEAST_STEP = 1e-13
+"""Of spacings, relative to coordinates: less would leave nodes few digits apart."""
 if TYPE_CHECKING:
     import pyvista
     from typing_extensions import TypeVar
@@ -108,7 +110,14 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
                 f"a grid needs at least 2 nodes along every axis, not {counts.tolist()}", element="shape"
             )
         steps = positive_steps(spacing, "spacing", len(corner))
-        refuse_extreme(corner, corner + steps * (counts.astype(np.float64) - 1), "nodes")
+        last = corner + steps * (counts.astype(np.float64) - 1)
+        refuse_extreme(np.minimum(corner, last), last, "nodes")
+        if (steps < LEAST_STEP * np.maximum(np.abs(corner), np.abs(last))).any():
+            raise GeometryError(
+                f"the spacing {steps.tolist()} is lost in the rounding of coordinates from {corner.tolist()} on",
+                remedy="move the shape to the origin, or choose a larger spacing",
+                element="spacing",
+            )
         object.__setattr__(self, "origin", frozen(corner))
         object.__setattr__(self, "spacing", steps)
         object.__setattr__(self, "shape", tuple(int(n) for n in counts))

@@ -48,7 +48,7 @@ class Polyline(Displayed, Frozen):
     closed: bool
 
     def __init__(self, points: ArrayLike, closed: bool = False) -> None:
-        positions = coordinates(points, "points", 2)
+        positions, closed = coordinates(points, "points", 2), flag(closed, "closed")
         if closed and len(positions) > 2 and (positions[0] == positions[-1]).all():
             positions = coordinates(positions[:-1], "points", 2)
         if len(positions) < 2:
@@ -58,7 +58,7 @@ class Polyline(Displayed, Frozen):
                 f"the polyline has no length: its {len(positions)} points are the same", element="points"
             )
         object.__setattr__(self, "points", positions)
-        object.__setattr__(self, "closed", flag(closed, "closed"))
+        object.__setattr__(self, "closed", closed)
 
     @classmethod
     def from_mask(cls, mask: ArrayLike, origin: ArrayLike = (0.0, 0.0), spacing: ArrayLike = 1.0) -> list[Polyline]:

@@ -47,6 +47,13 @@ def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryEr
         raise error(f"{name} must be real numbers, not {_described(array)}", element=name) from None
 
 
+def contiguous(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.float64]:
+    """`values` as a float64 array of any shape, copied only if it is none yet."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and not np.ma.isMaskedArray(values):
+        return np.ascontiguousarray(values)
+    return numbers(values, name, error)
+
+
 def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[np.int64]:
     """`values` as a new int64 array of any shape; whatever holds anything but integers is refused."""
     array = array_of(values, name, error)

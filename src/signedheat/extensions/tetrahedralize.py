@@ -21,6 +21,7 @@ from ..domains.grid import room_around
 from ..domains.kinds import Shape, ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
+from ..domains.validation import finite_number
 from ..errors import GeometryError, MemoryLimitError
 from ..lowering.area_elements import area_elements, bounds_around
 from ..memory import refuse_beyond_memory
@@ -85,14 +86,16 @@ def tetrahedralize(
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:
         raise GeometryError(f"{own!r} has no extent in space of three dimensions to put a mesh around", element="shape")
-    padding = room_around((lower, upper)) if padding is None else padding
-    if resolution < 1 or not 0 <= padding < np.inf or not grading >= LEAST_GRADING:
+    size = finite_number(resolution, "resolution", error=GeometryError)
+    padding = room_around((lower, upper)) if padding is None else finite_number(padding, "padding", 0, GeometryError)
+    if not (isinstance(grading, float) and grading == np.inf):
+        grading = finite_number(grading, "grading", error=GeometryError)
+    if size < 1 or grading < LEAST_GRADING:
         raise GeometryError(
-            f"resolution must be at least 1, padding at least 0 and grading at least {LEAST_GRADING}, not "
-            f"{resolution}, {padding} and {grading}",
-            element="resolution, padding or grading",
+            f"resolution must be at least 1 and grading at least {LEAST_GRADING}, not {size:g} and {grading:g}",
+            element="resolution or grading",
         )
-    spacing = longest / resolution
+    spacing = longest / size
     lower, sides = lower - padding, upper - lower + 2 * padding
     depth = int(np.clip(np.floor(np.log2(np.maximum(sides.max() / spacing / 4, 1))), 0, 16))
     if np.isinf(grading):
@@ -102,10 +105,10 @@ def tetrahedralize(
     area = 0.0 if isinstance(own, PointCloud) else float(area_elements(own).weights.sum())
     volume_cells = float(counts.astype(np.float64).prod())
     surface_cells = 2 * grading * area / spacing**2 if depth else 0.0
-    _refuse_too_many(12 * max(volume_cells, surface_cells), resolution, 2 if surface_cells > volume_cells else 3)
+    _refuse_too_many(12 * max(volume_cells, surface_cells), size, 2 if surface_cells > volume_cells else 3)
     origin = lower - (counts * coarse - sides) / 2
     samples = scipy.spatial.cKDTree(sample_points(own, spacing))
-    corners, sizes = _octree(samples, origin, spacing, counts, depth, grading)
+    corners, sizes = _octree(samples, origin, spacing, counts, depth, grading, size)
     points, tets = _join_leaves(corners, sizes, counts * 2 ** (depth + 1))
     return TetMesh(origin + points * (spacing / 2), tets)
 
@@ -139,7 +142,13 @@ def _refuse_too_many(tets: float, resolution: float, power: int) -> None:
 
 
 def _octree(
-    samples: Any, origin: NDArray[np.float64], spacing: float, counts: NDArray[np.int64], depth: int, grading: float
+    samples: Any,
+    origin: NDArray[np.float64],
+    spacing: float,
+    counts: NDArray[np.int64],
+    depth: int,
+    grading: float,
+    resolution: float,
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Lower corners and sizes of the leaves, in half cells of the finest level.
 
@@ -157,7 +166,7 @@ def _octree(
         sizes.append(np.full(len(corners[-1]), size))
         size //= 2
         cells = (cells[split][:, None] + octants * size).reshape(-1, 3)
-        _refuse_too_many(12 * len(cells))
+        _refuse_too_many(12.0 * len(cells), resolution, 2)
     corners.append(cells)
     sizes.append(np.full(len(cells), size))
     return np.concatenate(corners), np.concatenate(sizes)

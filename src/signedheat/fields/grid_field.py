@@ -16,7 +16,8 @@ from ..domains.display import Displayed, to_pyvista
 from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import GeometryError, OutsideError, SourceError
+from ..domains.validation import contiguous
+from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.marching import closed_surface, level_lines
 from ..operators.grid.exact_surface import ExactSurface
@@ -73,7 +74,9 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     surface: ExactSurface | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        values = np.ascontiguousarray(self.values, dtype=np.float64)
+        if not isinstance(self.grid, Grid):
+            raise UnsupportedTypeError(f"{self.grid!r:.80} is not a Grid", element="grid")
+        values = contiguous(self.values, "values")
         if values.shape != self.grid.shape:
             raise GeometryError(
                 f"values have shape {values.shape}, but the grid has {self.grid.shape} nodes", element="values"
@@ -303,10 +306,10 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return self.values.take([0, -1], axis=axis)
 
     def _checked(self, points: ArrayLike) -> NDArray[np.float64]:
-        points = np.ascontiguousarray(points, dtype=np.float64)
-        if points.shape[-1:] != (self.grid.dimension,) or not np.isfinite(points).all():
+        places = contiguous(points, "points")
+        if places.shape[-1:] != (self.grid.dimension,) or not np.isfinite(places).all():
             raise GeometryError(f"points must be finite, with {self.grid.dimension} coordinates each", element="points")
-        return points
+        return places
 
     def _into_box(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.clip(points, self.grid.origin, self.grid.upper)

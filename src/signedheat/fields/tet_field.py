@@ -15,7 +15,8 @@ from ..discretization import SourceTerm
 from ..domains.display import Displayed, to_pyvista
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import GeometryError, OutsideError
+from ..domains.validation import contiguous
+from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.box_tree import BoxTree
 from ..geometry.marching_tets import closed_level_set
@@ -67,7 +68,9 @@ class TetField(Displayed, Combinable, Frozen):
     source: SourceTerm | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        values = np.ascontiguousarray(self.values, dtype=np.float64)
+        if not isinstance(self.mesh, TetMesh):
+            raise UnsupportedTypeError(f"{self.mesh!r:.80} is not a TetMesh", element="mesh")
+        values = contiguous(self.values, "values")
         if values.shape != (self.mesh.n_vertices,):
             raise GeometryError(
                 f"values have shape {values.shape}, but the mesh has {self.mesh.n_vertices} vertices", element="values"
@@ -245,7 +248,7 @@ class TetField(Displayed, Combinable, Frozen):
 
 
 def _checked(points: ArrayLike) -> NDArray[np.float64]:
-    array = np.asarray(points, dtype=np.float64)
+    array = contiguous(points, "points")
     if array.ndim not in (1, 2) or array.shape[-1] != 3 or not np.isfinite(array).all():
         raise GeometryError("points must be finite, with 3 coordinates each", element="points")
     return array

@@ -165,8 +165,9 @@ def barycentric(mesh: Tets, tets: NDArray[np.int64], points: NDArray[np.float64]
     """(k, 4) barycentric coordinates of points in given tets, clamped to be nonnegative, each row with sum one."""
     from_corner = points[:, None] - mesh.vertices[mesh.tets[tets][:, [1, 0, 0, 0]]]  # on the face opposite each corner
     inward = -np.einsum("pki,pki->pk", mesh.geometry.area_vectors[tets], from_corner)
-    weights = np.maximum(inward / (3 * mesh.geometry.volumes[tets])[:, None], 0)
-    return weights / weights.sum(axis=1, keepdims=True)
+    inward = np.maximum(inward / np.maximum(np.abs(inward).max(axis=1, keepdims=True), np.finfo(float).tiny), 0)
+    total = inward.sum(axis=1, keepdims=True)
+    return np.divide(inward, total, out=np.full_like(inward, 0.25), where=total > 0)  # flat tets: their middle
 
 
 @compiled

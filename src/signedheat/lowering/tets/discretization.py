@@ -171,7 +171,10 @@ class TetDiscretization(DiffusesEach):
     @cached_property
     def _is_convex(self) -> bool:
         """Whether the mesh fills its convex hull."""
-        hull = scipy.spatial.ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
+        try:
+            hull = scipy.spatial.ConvexHull(self.mesh.vertices[np.unique(self.mesh.boundary.faces)])
+        except scipy.spatial.QhullError:  # flat but for rounding
+            return False
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
     def divergence(self, directions: NDArray[np.float64]) -> NDArray[np.float64]:
