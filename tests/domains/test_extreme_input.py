@@ -38,6 +38,7 @@ NONSENSE = [
 def no_warnings():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.simplefilter("ignore", UserWarning)  # words to the user; NumPy's are none
         yield
 
 
