@@ -292,3 +292,57 @@ def test_concurrent_writers_of_one_file(tmp_path):
     for writer in writers:
         writer.join()
     assert [p.name for p in tmp_path.iterdir()] == ["ball.ply"]
+
+
+ODD_CURVES = {
+    "offset.txt": "v 0\nv 1\n#offset x\nl 0 1\n",
+    "two.obj": "v 0 0\nl 1 1\n",
+    "large.json": '{"index_base": 1e400, "groups": []}',
+    "ragged.json": '{"polylines": [{"points": [[0, 0, 1], [0, 1]]}]}',
+    "deep.json": "[" * 100_000,
+    "list.json": "[]",
+    "weights.json": '{"groups": [{"kind": "signed_curve", "nodes": [{"v": [0], "w": [1e999]}], "segments": [[0, 5]]}]}',
+    "ids.txt": "signed_curve\nv 99999999999999999999999\nv 1\n",
+    "none.csv": "\x00\x01",
+}
+
+
+@pytest.mark.parametrize("name", ODD_CURVES)
+def test_odd_curves(tmp_path, name):
+    (tmp_path / name).write_text(ODD_CURVES[name])
+    with pytest.raises(sh.SignedHeatError) as caught:
+        sh.read_curves(tmp_path / name, BALL)
+    assert caught.value.path == str(tmp_path / name)
+
+
+def vti(header_type="UInt32", body=""):
+    return f'<VTKFile type="ImageData" byte_order="LittleEndian" header_type="{header_type}">{body}</VTKFile>'
+
+
+ODD_FIELDS = {
+    "type.vti": vti("UInt7"),
+    "empty.vti": vti(),
+    "extent.vti": vti(
+        body='<ImageData WholeExtent="0 -5 0 1 0 1"><Piece Extent="0 -5 0 1 0 1"><PointData/></Piece></ImageData>'
+    ),
+    "header.npy": "\x93NUMPY\x01\x00\x76\x00{'descr': '<f8', 'fortran_order': False, 'shape': (3,",
+    "objects.npz": None,
+    "zip.npz": "PK\x05\x06" + "\x00" * 18,
+    "cut.npz": None,
+    "head.nrrd": "NRRD0004\ntype: double\ndimension: 3\nsizes: 2 2\nendian: little\nencoding: raw\n\n",
+}
+
+
+@pytest.mark.parametrize("name", ODD_FIELDS)
+def test_odd_fields(tmp_path, name):
+    content = ODD_FIELDS[name]
+    if name == "objects.npz":
+        np.savez(tmp_path / name, values=np.array([{}], dtype=object), origin=[0], spacing=[1])
+    elif name == "cut.npz":
+        np.savez(tmp_path / name, values=np.zeros((3, 3)), origin=[0, 0], spacing=[1, 1])
+        (tmp_path / name).write_bytes((tmp_path / name).read_bytes()[:-30])
+    else:
+        (tmp_path / name).write_bytes(content.encode("latin-1"))
+    with pytest.raises(sh.FileFormatError) as caught:
+        sh.load_field(tmp_path / name)
+    assert caught.value.path == str(tmp_path / name)
