@@ -66,7 +66,7 @@ def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
         )
     ensure_fits(announced, path)
     values = np.empty(shape, dtype, order="F" if is_fortran else "C")
-    flat = memoryview(values.ravel(order="K").view(np.uint8)) if announced else memoryview(b"")
+    flat = values.ravel(order="K").view(np.uint8).data if announced else memoryview(b"")
     at = 0
     while at < announced:
         part = file.read(min(announced - at, 1 << 24))

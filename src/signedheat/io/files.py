@@ -183,7 +183,7 @@ def ensure_fits(size: int, path: PathLike) -> None:
         )
 
 
-def unpacked(data: bytes, machine: Any, size: int) -> bytes:
+def unpacked(data: bytes | memoryview, machine: Any, size: int) -> bytes:
     """At most `size` bytes of what packed data become.
 
     Examples

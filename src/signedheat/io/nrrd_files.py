@@ -68,7 +68,7 @@ def read_image(path: PathLike) -> tuple[NDArray[Any], dict[str, Any]]:
             path=path,
         )
     dtype = np.dtype(code).newbyteorder(">" if header.get("endian") == "big" else "<")
-    for _ in range(header.get("line skip", header.get("lineskip", 0))):
+    for _ in range(header.get("line skip") or header.get("lineskip") or 0):
         rest = rest.partition(b"\n")[2]
         if not rest:
             break

@@ -153,7 +153,9 @@ def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:
 def read_vtp(path: PathLike) -> SurfaceShape:
     """The polygons of all pieces, or the points if there is no polygon."""
     root, arrays = parse(path, "PolyData")
-    points, corners, counts, normals, areas, n_points = [], [], [], [], [], 0
+    points, corners, counts, n_points = [], [], [], 0
+    normals: list[NDArray[Any]] = []
+    areas: list[NDArray[Any]] = []
     for piece in root.iterfind("PolyData/Piece"):
         table = {(group.tag, element.get("Name")): element for group in piece for element in group.iter("DataArray")}
         if arrays.count(piece, "NumberOfStrips"):
