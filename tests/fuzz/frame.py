@@ -45,6 +45,7 @@ import warnings
 import zlib
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -172,6 +173,10 @@ def run_case(chosen: Family, seed: int, number: int) -> Outcome:
 
 
 def _peak() -> int:
+    """The most memory that this process has held; what its parent held, which `getrusage` counts, is left out."""
+    with suppress(OSError, ValueError, IndexError):
+        text = Path("/proc/self/status").read_text()
+        return 1024 * int(text.partition("VmHWM:")[2].split()[0])
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
