@@ -41,7 +41,7 @@ def _crash(_: float) -> str:
 
 
 def _grow(number: float) -> str:
-    return "grown" if np.full(1 << 26, number).any() else "empty"
+    return "grown" if np.full(1 << 23, number).any() else "empty"
 
 
 family("frame right", build, lambda number: "fine")
@@ -51,4 +51,4 @@ family("frame exception", build, lambda number: {}[str(number)])
 family("frame warning", build, _warn)
 family("frame hang", build, _hang)
 family("frame crash", build, _crash)
-family("frame memory", build, _grow, memory=1 << 28)
+family("frame memory", build, _grow, memory=1 << 25)

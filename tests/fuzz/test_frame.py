@@ -20,7 +20,7 @@ EXPECTED = {
 
 @pytest.fixture(scope="module")
 def tally():
-    return run([f"frame {name}" for name in EXPECTED], cases=2, limit=2.0)
+    return run([f"frame {name}" for name in EXPECTED], cases=2, limit=4.0)
 
 
 @pytest.mark.parametrize("name", EXPECTED)
