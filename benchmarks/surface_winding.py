@@ -2,8 +2,8 @@
 
 Written from the mathematics of Feng, Gillespie & Crane, *Winding Numbers on Discrete Surfaces*. u is harmonic away from
 the curves and jumps by one across them; at free ends, where no function can jump, it is continuous. On surfaces with
-handles the harmonic part γ of du belongs to curves that bound nothing: it is integrated to a function v that jumps where that is cheap, on the
-curves themselves if possible, and w = u − v.
+handles the harmonic part γ of du belongs to curves that bound nothing: it is integrated to a function v that jumps
+where that is cheap, on the curves themselves if possible, and w = u − v.
 """
 
 from __future__ import annotations
