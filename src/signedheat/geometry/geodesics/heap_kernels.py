@@ -34,13 +34,13 @@ class Queue(NamedTuple):
 
 
 @compiled(nogil=True)
-def before(keys, a, b):
+def before(keys: NDArray[np.float64], a: int, b: int) -> bool:
     """Whether item a leaves the queue before item b; equal keys go by number, so results are the same each time."""
-    return keys[a] < keys[b] or (keys[a] == keys[b] and a < b)
+    return bool(keys[a] < keys[b] or (keys[a] == keys[b] and a < b))
 
 
 @compiled(nogil=True)
-def push(queue, item, key):
+def push(queue: Queue, item: int, key: float) -> None:
     """Put an item into the queue, or move it forward if its key has become smaller."""
     items, places, keys, size = queue
     place = places[item]
@@ -60,7 +60,7 @@ def push(queue, item, key):
 
 
 @compiled(nogil=True)
-def pop(queue):
+def pop(queue: Queue) -> int:
     """Take out the item with the smallest key."""
     items, places, keys, size = queue
     first = items[0]
@@ -79,4 +79,4 @@ def pop(queue):
             places[items[place]] = place
             place = below
         items[place], places[last] = last, place
-    return first
+    return int(first)

@@ -87,7 +87,7 @@ USED, FREE, MADE, WANTED = range(4)
 
 
 @compiled(nogil=True)
-def has_room(counts, size, n):
+def has_room(counts: NDArray[np.int64], size: int, n: int) -> bool:
     """Whether n more windows fit into an array of so many rows; otherwise notes how many were wanted."""
     if counts[USED] + n <= size:
         return True
@@ -96,7 +96,7 @@ def has_room(counts, size, n):
 
 
 @compiled(nogil=True)
-def take_row(counts, following):
+def take_row(counts: NDArray[np.int64], following: NDArray[np.int64]) -> int:
     """A row for a window; there must be room."""
     row = counts[FREE]
     if row >= 0:
@@ -104,11 +104,11 @@ def take_row(counts, following):
     else:
         row = counts[USED]
         counts[USED] += 1
-    return row
+    return int(row)
 
 
 @compiled(nogil=True)
-def free_row(counts, following, row):
+def free_row(counts: NDArray[np.int64], following: NDArray[np.int64], row: int) -> None:
     """Give a row back."""
     following[row] = counts[FREE]
     counts[FREE] = row

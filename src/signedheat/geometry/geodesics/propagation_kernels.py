@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiled import compiled
-from .heap_kernels import pop, push
-from .initial_windows import MADE, free_row, has_room, initial_windows, propagate_across, take_row
+from .heap_kernels import Queue, pop, push
+from .initial_windows import MADE, Faces, Search, free_row, has_room, initial_windows, propagate_across, take_row
+from .sources import GeodesicSources
 from .windows import (
     BEAM,
     FOCUS,
@@ -33,7 +35,9 @@ ROUND = 1e-10
 
 
 @compiled(nogil=True)
-def _reach(distance, pseudosources, queue, first, v, length):
+def _reach(
+    distance: NDArray[np.float64], pseudosources: NDArray[np.bool_], queue: Queue, first: int, v: int, length: float
+) -> None:
     """Record a path of this length to a vertex; if paths can bend around it (a pseudosource), queue it."""
     if length < distance[v] * (1.0 - 1e-14):
         distance[v] = length
@@ -42,7 +46,9 @@ def _reach(distance, pseudosources, queue, first, v, length):
 
 
 @compiled(nogil=True)
-def _collect(search, halfedge, at_tail, at_head, length, slack, tolerance):
+def _collect(
+    search: Search, halfedge: int, at_tail: float, at_head: float, length: float, slack: float, tolerance: float
+) -> tuple[NDArray[np.float64], int]:
     """The windows queued for a halfedge, in order along it, trimmed against each other and merged where possible.
 
     Only what is nearer than the windows that crossed the halfedge before is left, and joins them: without this, waves
@@ -84,7 +90,9 @@ def _collect(search, halfedge, at_tail, at_head, length, slack, tolerance):
 
 
 @compiled(nogil=True)
-def _left(windows, following, row, w, length):
+def _left(
+    windows: NDArray[np.float64], following: NDArray[np.int64], row: int, w: NDArray[np.float64], length: float
+) -> bool:
     """Trim a window against those of a list; whether anything is left."""
     while row >= 0:
         trim_by(windows[row], w, ROUND * length)
@@ -95,7 +103,7 @@ def _left(windows, following, row, w, length):
 
 
 @compiled(nogil=True)
-def _settle(search, halfedge, chosen, count, length):
+def _settle(search: Search, halfedge: int, chosen: NDArray[np.float64], count: int) -> None:
     """Add windows to those that have crossed a halfedge, instead of the ones that they outdo."""
     _, _, _, _, settled, windows, following, counts = search
     row, before = settled[halfedge], -1
@@ -120,7 +128,7 @@ def _settle(search, halfedge, chosen, count, length):
 
 
 @compiled(nogil=True)
-def start_search(faces, sources, search, slack):
+def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: float) -> None:
     """Distances at the sources, and the first windows, as far as there is room."""
     initial_windows(faces, sources, search, slack)
     for v in range(len(search.distance)):
@@ -129,7 +137,7 @@ def start_search(faces, sources, search, slack):
 
 
 @compiled(nogil=True)
-def _most_windows(faces, queued, following, item):
+def _most_windows(faces: Faces, queued: NDArray[np.int64], following: NDArray[np.int64], item: int) -> int:
     """The most windows that one item of the queue can make."""
     most, n_halfedges = 0, len(queued)
     if item >= n_halfedges:
@@ -150,7 +158,7 @@ def _most_windows(faces, queued, following, item):
 
 
 @compiled(nogil=True)
-def continue_search(faces, search, slack, tolerance, limit):
+def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, limit: int) -> None:
     """Propagate in order of distance until nothing is queued, room is wanted, or `limit` windows have been made."""
     distance, pseudosources, queue, queued, _, windows, following, counts = search
     n_halfedges = len(queued)
@@ -177,7 +185,7 @@ def continue_search(faces, search, slack, tolerance, limit):
         length = faces.lengths[edge]
         tail, head = faces.edge_vertices[edge]
         here, n_here = _collect(search, halfedge, distance[tail], distance[head], length, slack * length, tolerance)
-        _settle(search, halfedge, here, n_here, length)
+        _settle(search, halfedge, here, n_here)
         a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
         ahead = faces.forward[face, side]
         origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)

@@ -9,6 +9,7 @@ whose distance would be σ; kind `BEAM`: straight waves along the direction (p, 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiled import compiled
 
@@ -78,7 +79,7 @@ def trim(a, b):
 
 
 @compiled(nogil=True)
-def trim_by(old, w, slack):
+def trim_by(old: NDArray[np.float64], w: NDArray[np.float64], slack: float) -> None:
     """Trim a window to where it is nearer, by more than `slack`, than an older one; from the middle nothing is cut."""
     low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
     if not high > low:
@@ -109,7 +110,7 @@ def trim_by(old, w, slack):
 
 
 @compiled(nogil=True)
-def outdoes(w, old):
+def outdoes(w: NDArray[np.float64], old: NDArray[np.float64]) -> bool:
     """Whether a window covers another one and is nearer at its ends and in its middle."""
     if w[S0] > old[S0] or w[S1] < old[S1]:
         return False
@@ -159,7 +160,7 @@ def merge(a, b, length, tolerance):
 
 
 @compiled(nogil=True)
-def straighten(w):
+def straighten(w: NDArray[np.float64]) -> None:
     """Make a wave straight, nowhere nearer at the edge, which would pass its focus in the face ahead."""
     x, y = ray(w, 0.5 * (w[S0] + w[S1]))
     norm = np.sqrt(x * x + y * y)
