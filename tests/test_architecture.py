@@ -14,7 +14,7 @@ from import_graph import circles, import_graph, upward_imports
 PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
-    set("cache compiled diagnostics errors frozen memory packages parallel progress reprs slots".split()),
+    set("cache compiled diagnostics errors frozen kernel_cache memory packages parallel progress reprs slots".split()),
     {"geometry"},
     {"linear"},
     {"operators"},

@@ -2,22 +2,42 @@
 
 from __future__ import annotations
 
+import logging
+import os
+import sys
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
 from pathlib import Path
 from threading import RLock
 from typing import Any, overload
 
+from .errors import SignedHeatError
+from .kernel_cache import KernelCache, digest_of
 from .packages import lazy_module
 
 numba = lazy_module("numba", "compiled kernels")
 extending = lazy_module("numba.extending", "compiled kernels")
 types = lazy_module("numba.core.types", "compiled kernels")
 
+logger = logging.getLogger("signedheat")
 _LOCK = RLock()
+MOST_THREADS = 1024
 
-prange = range
-"""A range whose iterations may run in parallel, in kernels compiled with ``parallel=True``."""
+
+class Announcement:
+    """Tells on a terminal, once in a process, that something is being compiled, which takes a while at first use."""
+
+    def __init__(self) -> None:
+        self.is_wanted = True
+
+    def __call__(self, name: str) -> None:
+        logger.info("compiling %s", name)
+        if self.is_wanted and sys.stderr is not None and sys.stderr.isatty():
+            self.is_wanted = False
+            sys.stderr.write("\r\x1b[2Ksignedheat: compiling what this needs, once (signedheat warmup compiles all)\n")
+
+
+announce = Announcement()
 
 
 class Kernel:
@@ -44,11 +64,16 @@ class Kernel:
     def dispatcher(self) -> Callable[..., Any]:
         """The compiled function; the function itself if ``NUMBA_DISABLE_JIT`` is set."""
         with _LOCK:
-            compiler = _compiler()
-            if "prange" in self.function.__globals__:
-                self.function.__globals__["prange"] = _parallel_range()
-            kept = Path(self.function.__code__.co_filename).is_file()  # what was typed in has no place on disk
-            return compiler(cache=kept, **self.options)(self.function)  # type: ignore[no-any-return]
+            made = _compiler()(**self.options)(self.function)
+            kept = Path(self.function.__code__.co_filename).is_file()  # what was typed in is not kept on disk
+            if kept and hasattr(made, "_cache"):
+                name = f"{self.function.__module__}.{self.function.__qualname__}".replace("<locals>", "")
+                made._cache = KernelCache(name, digest_of(self.function, self.options, _parts), announce)
+            return made  # type: ignore[no-any-return]
+
+
+def _parts(value: Any) -> tuple[Callable[..., Any], dict[str, Any]] | None:
+    return (value.function, value.options) if isinstance(value, Kernel) else None
 
 
 @overload
@@ -63,11 +88,20 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def _compiler() -> Any:
-    """``numba.njit``, after registering `Kernel` with Numba so that compiled code can call kernels."""
+    """``numba.njit``, after registering `Kernel` with Numba so that compiled code can call kernels.
+
+    Raises
+    ------
+    SignedHeatError
+        If ``NUMBA_NUM_THREADS`` is no number of threads.
+    """
+    threads = os.environ.get("NUMBA_NUM_THREADS")
+    if threads is not None and not (threads.isdecimal() and 0 < int(threads) <= MOST_THREADS):
+        raise SignedHeatError(
+            f"the environment variable NUMBA_NUM_THREADS is {threads!r}, which is no number of threads",
+            remedy="unset it, or set it to 1 or more",
+            element="NUMBA_NUM_THREADS",
+        )
     if Kernel not in extending.typeof_impl.registry:
         extending.typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.dispatcher))
     return numba.njit
-
-
-def _parallel_range() -> Any:
-    return numba.prange

@@ -55,6 +55,7 @@ def _run(argv: Sequence[str] | None) -> int:
     if arguments.check is not None:
         arguments.check(arguments)
     import_module("signedheat.public")
+    import_module("signedheat.compiled").announce.is_wanted = not (arguments.quiet or arguments.json)
     summary, text = import_module(f"{__name__}.{arguments.command}").run(arguments)
     if arguments.json:
         tell(json.dumps(summary))

@@ -118,10 +118,12 @@ def assemble(
     edges = crossed_edges(sides[None])
     n_edges = len(edges)
     edges = edges[band.leave(edges, sides[None])]
-    crossings = crossings_at(sides[None], edges, np.array([1.0, *steps]))
-    points = np.ascontiguousarray(crossings[:, 1:4])
-    completed = band.search(features, points, steps).distances > FAR * float(steps.max())
-    edges, crossings, points = edges[completed], crossings[completed], points[completed]
+    crossings, points = np.empty((0, 18)), np.empty((0, 3))
+    if len(edges):
+        crossings = crossings_at(sides[None], edges, np.array([1.0, *steps]))
+        points = np.ascontiguousarray(crossings[:, 1:4])
+        completed = band.search(features, points, steps).distances > FAR * float(steps.max())
+        edges, crossings, points = edges[completed], crossings[completed], points[completed]
     gaps = max((REACH * mean_gap(cloud.points) for cloud in clouds), default=0.0)
     trusted = confidence_at(points, evidence, gaps)
     nearby = sampled_surface(features, band, edges, crossings, steps)

@@ -24,6 +24,7 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import sampled
 from ..lowering.area_elements import AreaSamples, bounds_around, sample_on_grid
+from ..lowering.grid.discretization import refuse_beyond_memory
 from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
 from ..operators.grid.boundary_areas import distances_to_samples
@@ -44,6 +45,8 @@ from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of
 
 STEPS = 7
 """Steps that are timed."""
+BYTES_PER_NODE, BYTES_IF_CLOSED = 64, 36
+"""Measured peak memory: of shapes with holes or overlaps, and of others, all of whose parts are closed."""
 BOUNDING = 0.22
 """Mean winding number of a face's two sides from which it tells inside from outside: 0 on a sheet, ½ on a solid, ¼ on
 one half a cell thick."""
@@ -221,13 +224,15 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
-    discretization = discretize(grid)  # refuses what cannot fit
+    refuse_beyond_memory(grid, BYTES_IF_CLOSED if steps.sharpen and steps.orient else None)
     with stopwatch("orient"):
         merged, closed = _oriented(shape, notes) if steps.orient else (merge_duplicates(shape), False)
     if closed and steps.sharpen:
         field = _bounded(merged, grid, steps, notes, stopwatch)
         if field is not None:
             return field
+    refuse_beyond_memory(grid, BYTES_PER_NODE if steps.sharpen else None)
+    discretization = discretize(grid)
     with stopwatch("unite"):
         shape, samples, winding = _united(merged, grid, steps, notes)
     if samples is None:  # doubled walls alone: there is no φ
@@ -259,27 +264,25 @@ def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwa
     None if it is not so. φ is needed where its faces lie in layers, only.
     """
     shape = merged.shape
-    if isinstance(shape, PointCloud):
+    if isinstance(shape, PointCloud) or not shape.triangulation.face_areas.any():
         return None
     with stopwatch("unite"):
         vertices, faces = triangles_of(shape)
         winding = closed_winding_numbers(((vertices - grid.origin) / grid.spacing)[faces], grid.shape)
         if winding is None or (steps.unite and winding.max() > 1):
             return None
+    if merged.count:
+        notes.append(LeftOut(merged_faces=merged.count))
+    if not grid.contains(shape.bounds).all():
+        notes.append(sampled(GridSource(sample_on_grid([shape], grid, SAMPLE_SIZE), grid, steps.diffusion)))
+    cell = float(grid.spacing.max())
+    function = np.where(winding > 0, -cell, cell)
+    del winding
+
+    def phi() -> NDArray[np.float64]:
         try:
             source = GridSource(sample_on_grid([shape], grid, SAMPLE_SIZE), grid, steps.diffusion)
         except CancellingNormalsError:
-            source = None
-    time = float("nan") if source is None else source.time
-    if merged.count:
-        notes.append(LeftOut(merged_faces=merged.count))
-    if source is not None:
-        notes.append(sampled(source))
-    cell = float(grid.spacing.max())
-    function = np.where(winding > 0, -cell, cell)
-
-    def phi() -> NDArray[np.float64]:
-        if source is None:
             return function
         discretization = discretize(grid)
         directions = normalize(discretization, diffuse(discretization, source))
@@ -288,7 +291,7 @@ def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwa
     stopwatch.skip(4)
     with stopwatch("sharpen"):
         sharpened = assemble([shape], grid, function, steps.closed, phi)
-    return _solid(sharpened, grid, notes, stopwatch, time)
+    return _solid(sharpened, grid, notes, stopwatch, float("nan"))
 
 
 def _solid(sharpened: Assembled, grid: Grid, notes: list[Note], stopwatch: Stopwatch, time: float) -> GridField:

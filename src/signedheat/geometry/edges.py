@@ -67,5 +67,5 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     >>> table.face_edges.tolist()
     [[0, 1, 2], [1, 3, 4]]
     """
-    faces = np.ascontiguousarray(faces, dtype=np.int64)
+    faces = np.array(faces, dtype=np.int64, order="C")  # what must not be written is a type of its own to the compiler
     return EdgeTable(*find_edges(faces, np.bincount(faces.ravel())))

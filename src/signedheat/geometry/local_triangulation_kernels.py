@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled, prange
+from ..compiled import compiled
 
 MAX_SIDES = 64
 TOUCHING = 1e-7  # radians by which the sectors of two triangles at a corner may overlap
 
 
-@compiled(parallel=True)
+@compiled(nogil=True)
 def voronoi_fans(
     x: NDArray[np.float64], y: NDArray[np.float64], reach: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -38,7 +38,7 @@ def voronoi_fans(
     n, k = x.shape
     neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)
     counts = np.zeros(n, dtype=np.int64)
-    for i in prange(n):
+    for i in range(n):
         corner = np.empty((MAX_SIDES, 2))  # corner c is where side c starts
         beyond = np.full(MAX_SIDES, -1, dtype=np.int64)
         new_corner = np.empty((MAX_SIDES, 2))

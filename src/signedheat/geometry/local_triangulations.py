@@ -8,6 +8,7 @@ result is a mesh with at most two faces at every edge.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +16,14 @@ import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..parallel import n_threads
 from .components import connected_components
 from .edges import edge_table
 from .hole_filling import hole_fillings
 from .local_triangulation_kernels import accept_apart, signs_from_parents, voronoi_fans
 
 _CHUNK = 65536
+_ROWS = 4096  # for a thread at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +119,7 @@ def proposed_triangles(
         x, y = (np.einsum("nki,ni->nk", offsets, axes[chunk, a]) for a in range(2))
         order = np.argsort(x * x + y * y, axis=1)
         x, y = np.take_along_axis(x, order, axis=1), np.take_along_axis(y, order, axis=1)
-        sides, counts = voronoi_fans(x, y, reach[chunk])
+        sides, counts = _fans(x, y, reach[chunk])
         column = np.arange(sides.shape[1])
         following = np.where(column + 1 < counts[:, None], np.roll(sides, -1, axis=1), sides[:, :1])
         row, at = np.nonzero((column < counts[:, None]) & (sides >= 0) & (following >= 0))
@@ -208,3 +211,13 @@ def facing(points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDA
     a, b, c = points[faces].transpose(1, 0, 2)
     against = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0
     return np.where(against[:, None], faces[:, [0, 2, 1]], faces)
+
+
+def _fans(
+    x: NDArray[np.float64], y: NDArray[np.float64], reach: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """`voronoi_fans` of all rows, on all threads."""
+    rows = [slice(start, start + _ROWS) for start in range(0, len(x), _ROWS)]
+    with ThreadPoolExecutor(n_threads()) as pool:
+        parts = list(pool.map(lambda row: voronoi_fans(x[row], y[row], reach[row]), rows))
+    return np.concatenate([sides for sides, _ in parts]), np.concatenate([counts for _, counts in parts])

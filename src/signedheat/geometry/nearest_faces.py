@@ -127,9 +127,9 @@ def _search(
         face, square, feature, fx, fy, fz = -1, np.inf, 0, x, y, z
         for c in range(-1, candidates.shape[1]):
             if c >= 0:
-                other = candidates[p, c]
+                other = np.int64(candidates[p, c])
             else:
-                other = out_faces[p - 1] if p > 0 else -1
+                other = np.int64(out_faces[p - 1]) if p > 0 else -1
             if other >= 0 and other != face and (c <= 0 or other != candidates[p, c - 1]):
                 s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
                 if s < square:
@@ -199,9 +199,9 @@ def walk_to_nearest(
         if feature == 0:
             break
         if feature <= 3:
-            other = across[face, feature - 1]
+            other = np.int64(across[face, feature - 1])
         else:
-            vertex = faces[face, feature - 4]
+            vertex = np.int64(faces[face, feature - 4])
             vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
             dx, dy, dz = x - vx, y - vy, z - vz
             steepest, other = 0.0, -1  # the side along which distance shrinks fastest; if none, no place is nearer
@@ -210,7 +210,7 @@ def walk_to_nearest(
                 for turn in range(turns):
                     gain = dx * spokes[k, 3 * turn] + dy * spokes[k, 3 * turn + 1] + dz * spokes[k, 3 * turn + 2]
                     if gain > steepest:
-                        steepest, other = gain, around[k] // 3
+                        steepest, other = gain, np.int64(around[k]) // 3
         if other >= 0:
             s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
             if s < square:
@@ -271,7 +271,7 @@ def feet_of_nodes(
     for i in range(n0):
         for j in range(n1):
             for k in range(n2):
-                f = nearest[i, j, k]
+                f = np.int64(nearest[i, j, k])
                 if f >= 0:
                     _, _, x, y, z = foot_on_triangle(rows, f, i * steps[0], j * steps[1], k * steps[2])
                     feet[count, 1], feet[count, 2], feet[count, 3] = x, y, z

@@ -7,10 +7,38 @@ by the module of the same name one folder up.
 from __future__ import annotations
 
 from ... import __version__
-from . import batch, close, completion, contour, demo, info, morph, offset, sample, surface, view, volume
+from . import (
+    batch,
+    close,
+    completion,
+    contour,
+    demo,
+    info,
+    morph,
+    offset,
+    sample,
+    surface,
+    view,
+    volume,
+    warmup,
+)
 from .options import Parser
 
-COMMANDS = (volume, surface, close, offset, contour, morph, sample, batch, info, view, demo, completion)
+COMMANDS = (
+    volume,
+    surface,
+    close,
+    offset,
+    contour,
+    morph,
+    sample,
+    batch,
+    info,
+    view,
+    demo,
+    completion,
+    warmup,
+)
 
 
 def parser() -> Parser:

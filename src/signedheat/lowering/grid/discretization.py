@@ -27,30 +27,31 @@ SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the simplices into which faces are bisected."""
 BYTES_PER_NODE = 46
 """Measured peak memory of a distance computation."""
-BASE = 50_000_000
+BASE = 200_000_000
 """The part that does not depend on the number of nodes: loaded libraries and compiled kernels."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
 
 
-def memory_estimate(grid: Grid) -> int:
-    """Estimated peak memory of a distance computation on the grid, in bytes.
+def memory_estimate(grid: Grid, per_node: float | None = None) -> int:
+    """Estimated peak memory of a distance computation on the grid, in bytes; of others, if `per_node` is given.
 
     Examples
     --------
     >>> memory_estimate(Grid((0, 0, 0), 1.0, (512, 512, 512))) < 10e9
     True
     """
-    per_node = BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS[grid.dimension]
-    return per_node * grid.n_nodes + BASE
+    if per_node is None:
+        per_node = BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS[grid.dimension]
+    return int(per_node * grid.n_nodes) + BASE
 
 
-def refuse_beyond_memory(grid: Grid) -> None:
+def refuse_beyond_memory(grid: Grid, per_node: float | None = None) -> None:
     """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing."""
-    available, needed = available_memory(), memory_estimate(grid)
+    available, needed = available_memory(), memory_estimate(grid, per_node)
     if available is None or needed <= available:
         return
-    spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting_spacing(grid, available)))
+    spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting_spacing(grid, available, per_node)))
     raise MemoryLimitError(
         f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
         f"and {available / 1e9:.1f} GB are free",
@@ -58,11 +59,11 @@ def refuse_beyond_memory(grid: Grid) -> None:
     )
 
 
-def fitting_spacing(grid: Grid, available: int) -> NDArray[np.float64]:
+def fitting_spacing(grid: Grid, available: int, per_node: float | None = None) -> NDArray[np.float64]:
     """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
-    share = max((available - BASE) / (memory_estimate(grid) - BASE), 1e-12)
-    spacing = grid.spacing * share ** (-1.0 / grid.dimension)
-    per_node = (memory_estimate(grid) - BASE) / grid.n_nodes
+    whole = memory_estimate(grid, per_node) - BASE
+    spacing = grid.spacing * max((available - BASE) / whole, 1e-12) ** (-1.0 / grid.dimension)
+    per_node = whole / grid.n_nodes
     while per_node * np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1) + BASE > max(available, 2 * BASE):
         spacing *= 1.01
     return spacing

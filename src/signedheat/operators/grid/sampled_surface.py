@@ -231,21 +231,21 @@ def _distances_of_planes(
     away, side = np.zeros(4), np.empty(4)
     plane = np.full((n1, n2), np.int32(-1))  # the last face at each place, of this plane or the one before
     for i in range(first, last):
-        before = np.int32(-1)
+        before = np.int64(-1)
         for j in range(n1):
             for k in range(n2):
                 x, y, z = i * steps[0], j * steps[1], k * steps[2]
                 sample = nearest[i, j, k]
-                own = owners[sample]
+                own = np.int64(owners[sample])
                 face, square, feature, fx, fy, fz = -1, np.inf, 0, x, y, z
                 for candidate in range(4):
                     other = own
                     if candidate == 0:
-                        other = plane[j - 1, k] if j > 0 else np.int32(-1)
+                        other = np.int64(plane[j - 1, k]) if j > 0 else np.int64(-1)
                     elif candidate == 1:
                         other = before
                     elif candidate == 3:
-                        other = plane[j, k]
+                        other = np.int64(plane[j, k])
                     if other >= 0 and other != face:
                         s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
                         if s < square:
