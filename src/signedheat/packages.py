@@ -16,6 +16,7 @@ REMEDIES = {
     "PIL": "pip install pillow",
     "distributed": "pip install signedheat[cluster]",
     "mpl_toolkits": "pip install matplotlib",
+    "nibabel": "pip install signedheat[nifti]",
     "nrrd": "pip install pynrrd",
     "polyscope": "pip install polyscope",
     "pytetwild": "pip install signedheat[tetwild]",

@@ -8,12 +8,14 @@ from .diagnostics import Diagnostics
 from .domains.curves import Curve, SurfacePoints
 from .domains.digital_surface import DigitalSurface
 from .domains.foreign import as_shape
+from .domains.globe import globe_curve
 from .domains.grid import Grid
 from .domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from .domains.point_cloud import PointCloud
 from .domains.polygon_mesh import PolygonMesh
 from .domains.polyline import Polyline
 from .domains.tet_mesh import TetMesh
+from .domains.transforms import transform
 from .domains.triangle_mesh import TriangleMesh
 from .errors import (
     ConstraintError,
@@ -51,9 +53,12 @@ from .fields.piecewise_field import PiecewiseField
 from .fields.tet_field import TetField
 from .fields.vertex_field import VertexField
 from .io import (
+    LabelImage,
     load_field,
     read,
     read_curves,
+    read_globe_curves,
+    read_labels,
     read_mask,
     read_polylines,
     read_volume,
@@ -85,6 +90,7 @@ __all__ = [
     "GridField",
     "InexactWarning",
     "IntrinsicTriangulation",
+    "LabelImage",
     "LevelValues",
     "MemoryLimitError",
     "MissingPackageError",
@@ -118,6 +124,7 @@ __all__ = [
     "curve_orientation",
     "dilate",
     "erode",
+    "globe_curve",
     "intrinsic_delaunay",
     "load_field",
     "opening",
@@ -126,6 +133,8 @@ __all__ = [
     "piecewise_distance",
     "read",
     "read_curves",
+    "read_globe_curves",
+    "read_labels",
     "read_mask",
     "read_polylines",
     "read_volume",
@@ -141,6 +150,7 @@ __all__ = [
     "tetrahedralize",
     "thicken",
     "tiled_distance",
+    "transform",
     "unite",
     "write_curves",
     "write_polylines",

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal, cast
 
 from ..constraints import Constraint, ZeroSet
+from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid, room_around
 from ..errors import SignedHeatError
 from ..extensions.figures import describe, shape_figures, told
@@ -109,6 +110,8 @@ class BatchJob:
         figures: dict[str, object] = {"info": shape_figures(shape)} if self.info else {}
         if not self._measures:
             return figures
+        if isinstance(shape, DigitalSurface):
+            shape = shape.squares
         bounds = bounds_around(as_list(shape))
         reach = max((abs(distance) for distance in self.offsets), default=0.0)
         padding = room_around(bounds, reach) if self.padding is None else self.padding

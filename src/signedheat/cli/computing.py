@@ -19,13 +19,12 @@ from ..extensions.solid_distance import solid_distance
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
-from ..io import read, read_mask, read_polylines
+from ..io import read_mask
 from ..lowering.area_elements import bounds_around
 from ..progress import Progress
 from ..solver import SignedHeatSolver, as_list
 from .progress import ProgressBar
 from .streams import say
-from .usage.options import is_planar
 
 Summary: TypeAlias = tuple[dict[str, Any], str]
 """The result of a command: a dictionary for ``--json``, and text."""
@@ -43,11 +42,6 @@ def prefix_errors(path: Any) -> Iterator[None]:
         if error.path is not None:
             raise
         raise error.at(path) from error
-
-
-def read_source(path: Any) -> Any:
-    """The source: a shape in space, or a list of polylines in the plane."""
-    return read_polylines(path) if is_planar(path) else read(path)
 
 
 def grid_for(shape: Any, arguments: Namespace, reach: float = 0.0) -> Grid:

@@ -10,9 +10,10 @@ from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from ..fields.grid_field import GridField
-from ..io import SHAPE_FORMATS, ensure_writable, read, save
+from ..io import SHAPE_FORMATS, ensure_writable, save
 from ..visualization import ensure_picture_writable, save_scene, save_slices
 from .computing import Summary, compute, describe, grid_for, prefix_errors
+from .placing import read_source
 
 OPERATIONS: dict[str, Callable[..., TriangleMesh]] = {
     "dilate": dilate,
@@ -29,7 +30,7 @@ def run(arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
     if arguments.preview:
         ensure_picture_writable(arguments.preview)
-    shape = read(arguments.shape)
+    shape = read_source(arguments)
     fields: list[GridField] = []
 
     def measure(part: Any, grid: Grid) -> GridField:

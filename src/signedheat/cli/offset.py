@@ -10,9 +10,11 @@ from ..fields.grid_field import GridField
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
 from ..io.fields import CONFIDENCE
 from ..io.files import extension
+from ..io.labels import LabelImage
 from ..io.surface_fields import VALUE_FORMATS, save_with_values
 from ..visualization import ensure_picture_writable, save_slices
-from .computing import Summary, compute, describe, drawable, grid_for, hint, prefix_errors, read_source
+from .computing import Summary, compute, describe, drawable, grid_for, hint, prefix_errors
+from .placing import grid_of_image, image_of, place_of, read_source
 from .usage.options import is_planar
 
 
@@ -24,16 +26,18 @@ def run(arguments: Namespace) -> Summary:
         ensure_offset_writable(output, planar)
     if arguments.preview:
         ensure_picture_writable(arguments.preview)
-    shape = read_source(arguments.shape)
     reach = max(abs(distance) for distance in arguments.distances)
+    image = image_of(arguments)
     with prefix_errors(arguments.shape):
-        field = compute(shape, grid_for(shape, arguments, reach), arguments)
+        shape = read_source(arguments) if image is None else image.surface(arguments.label)
+        grid = grid_for(shape, arguments, reach) if image is None else grid_of_image(image, shape, arguments, reach)
+        field = compute(shape, grid, arguments)
         found = [field.offset(distance) for distance in arguments.distances]
     for what, output in zip(found, outputs, strict=True):
         if planar:
             write_polylines(output, what)
         else:
-            save_surface(field, what, output)
+            save_surface(field, what, output, image)
     if arguments.preview:
         save_slices(drawable(field), arguments.preview, shape, arguments.distances)
     written = [
@@ -42,16 +46,18 @@ def run(arguments: Namespace) -> Summary:
     ]
     kind = "{lines} lines ({closed} closed), length {length:.6g}" if planar else "closed surface, {faces} faces"
     text = "\n".join(f"{w['output']}: at {w['distance']:+g}, {kind.format(**w)}" for w in written) + hint(field)
-    return {"input": arguments.shape, "lines" if planar else "surfaces": written, "field": describe(field)}, text
+    summary = {"input": arguments.shape, "lines" if planar else "surfaces": written, "field": describe(field)}
+    return {**summary, **place_of(image)}, text
 
 
-def save_surface(field: Any, surface: Any, output: str) -> None:
-    """With the confidence at each vertex, where the field knows it and the format has room for it."""
+def save_surface(field: Any, surface: Any, output: str, image: LabelImage | None) -> None:
+    """In its place, with the confidence at each vertex where the field knows it and the format has room for it."""
+    placed = surface if image is None else image.to_world(surface)
     known = isinstance(field, GridField) and field.confidence is not None
     if known and extension(output) in VALUE_FORMATS:
-        save_with_values(surface, output, CONFIDENCE, field.confidence_at(surface.vertices))
+        save_with_values(placed, output, CONFIDENCE, field.confidence_at(surface.vertices))
     else:
-        save(surface, output)
+        save(placed, output)
 
 
 def ensure_offset_writable(output: str, planar: bool) -> None:

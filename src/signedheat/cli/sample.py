@@ -7,15 +7,16 @@ from typing import cast
 
 from ..extensions.sampling import sample
 from ..fields.grid_field import GridField
-from ..io import ensure_writable, read
+from ..io import ensure_writable
 from ..io.samples import SAMPLE_FORMATS
 from .computing import Summary, compute, describe, grid_for, prefix_errors
+from .placing import read_source
 
 
 def run(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, sample, write."""
     ensure_writable(arguments.output, SAMPLE_FORMATS, "samples")
-    shape = read(arguments.shape)
+    shape = read_source(arguments)
     with prefix_errors(arguments.shape):
         field = cast("GridField", compute(shape, grid_for(shape, arguments), arguments))
         taken = sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)

@@ -14,6 +14,7 @@ from ..errors import SourceError
 from ..extensions.curve_distance import curve_distance
 from ..fields.vertex_field import VertexField
 from ..io import ensure_writable, read, read_curves, write_curves
+from ..io.globe import read_globe_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
 from ..solver import SignedHeatSolver
 from ..visualization import ensure_picture_writable, save_surface
@@ -30,7 +31,7 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, Any]:
             remedy="leave it out",
             path=arguments.mesh,
         )
-    return surface, read_curves(arguments.curves, surface)
+    return surface, curves_of(arguments, surface)
 
 
 def measured(surface: Any, curves: Any, arguments: Namespace) -> VertexField:
@@ -49,6 +50,19 @@ def measured(surface: Any, curves: Any, arguments: Namespace) -> VertexField:
                 progress=progress,
             )
     return field
+
+
+def curves_of(arguments: Namespace, surface: Any) -> list[Any]:
+    """The curves; on a globe those in longitude and latitude."""
+    if not arguments.globe:
+        return read_curves(arguments.curves, surface)
+    if not isinstance(surface, TriangleMesh):
+        raise SourceError(
+            f"a globe is a triangle mesh, and this is a {type(surface).__name__}",
+            remedy="triangulate it",
+            path=arguments.mesh,
+        )
+    return list(read_globe_curves(arguments.curves, surface))
 
 
 def advice(field: VertexField) -> str:

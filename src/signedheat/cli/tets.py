@@ -16,6 +16,7 @@ from ..io.tets import TET_FIELD_FORMATS
 from ..packages import require
 from ..visualization import ensure_picture_writable, save_slices
 from .computing import Summary, compute, describe, prefix_errors
+from .placing import read_source
 
 RESOLUTION = 32
 PREVIEW_NODES = 64
@@ -28,7 +29,7 @@ def run(arguments: Namespace) -> Summary:
     require("meshio", "fields on tets")
     if arguments.preview:
         ensure_picture_writable(arguments.preview)
-    shape = read(arguments.shape)
+    shape = read_source(arguments)
     mesh = read(given) if given else None
     if mesh is not None and not isinstance(mesh, TetMesh):
         raise GeometryError(

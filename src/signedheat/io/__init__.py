@@ -7,6 +7,8 @@ from .bands import ensure_band_writable
 from .curves import CURVE_FORMATS, read_curves, write_curves
 from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable
+from .globe import read_globe_curves
+from .labels import LabelImage, read_labels
 from .polylines import POLYLINE_FORMATS, read_polylines, write_polylines
 from .shapes import SHAPE_FORMATS, read, save
 from .vdb import write_vdb
@@ -17,12 +19,15 @@ __all__ = [
     "FIELD_FORMATS",
     "POLYLINE_FORMATS",
     "SHAPE_FORMATS",
+    "LabelImage",
     "ensure_band_writable",
     "ensure_field_writable",
     "ensure_writable",
     "load_field",
     "read",
     "read_curves",
+    "read_globe_curves",
+    "read_labels",
     "read_mask",
     "read_polylines",
     "read_volume",

@@ -16,11 +16,13 @@ from .off import read_off, write_off
 from .ply import read_ply, write_ply
 from .stl import read_stl, write_stl
 from .tets import TET_FORMATS, read_tets, write_tets
+from .three_mf import read_3mf
 from .volumes import read_volume
 from .vtk_xml import read_vtp, write_vtp
 from .xyz import read_xyz, write_xyz
 
 READERS: dict[str, Callable[[PathLike], Shape]] = {
+    ".3mf": read_3mf,
     ".glb": read_glb,
     ".gltf": read_glb,
     ".npy": read_volume,

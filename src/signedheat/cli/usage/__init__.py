@@ -39,6 +39,16 @@ COMMANDS = (
     completion,
     warmup,
 )
+STANDARD = {
+    "volume": "npz",
+    "offset": "stl",
+    "morph": "stl",
+    "sample": "npz",
+    "contour": "stl",
+    "surface": "ply",
+    "close": "json",
+}
+"""Formats of what commands write to standard output, if nothing is said."""
 
 
 def parser() -> Parser:
@@ -52,4 +62,8 @@ def parser() -> Parser:
     commands = whole.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
     for command in COMMANDS:
         command.add_to(commands)
+    for name, ending in STANDARD.items():
+        commands.choices[name].add_argument(
+            "--format", default=ending, metavar="EXT", help=f"of standard output, with -o - ({ending})"
+        )
     return whole

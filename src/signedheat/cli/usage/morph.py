@@ -5,7 +5,15 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from .options import add_command, add_method_options, add_room_options, add_step_options, check_grid_options, finite
+from .options import (
+    add_command,
+    add_method_options,
+    add_placing_options,
+    add_room_options,
+    add_step_options,
+    check_grid_options,
+    finite,
+)
 
 DISTANCES = {
     "dilate": (1, 1),
@@ -34,6 +42,7 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument("distances", metavar="DISTANCE", type=finite, nargs="+", help="in the units of the file")
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="surface: .stl .obj .ply .off .vtp")
+    add_placing_options(parser)
     add_room_options(parser)
     add_step_options(parser)
     add_method_options(parser)

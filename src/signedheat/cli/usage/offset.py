@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from .options import add_command, add_grid_options, check_grid_options, finite
+from .options import add_command, add_grid_options, add_label_option, add_placing_options, check_grid_options, finite
 
 
 def add_to(commands: Any) -> None:
@@ -33,6 +33,8 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "-o", "--output", required=True, metavar="OUT", help="surface: .stl .obj .ply .off .vtp; lines: .svg .csv"
     )
+    add_label_option(parser)
+    add_placing_options(parser)
     add_grid_options(parser)
     parser.set_defaults(check=check_offset_options)
 

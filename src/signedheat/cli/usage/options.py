@@ -13,6 +13,10 @@ from ..streams import say, tell
 
 PLANAR = (".csv", ".svg")
 """Extensions of files with polylines in the plane."""
+IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
+"""Extensions of files that may have images of labels."""
+UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
+"""Units of length."""
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component")
 """Names of the constraints that have no number."""
 
@@ -72,6 +76,43 @@ def add_grid_options(parser: Parser) -> None:
     add_step_options(parser)
     add_method_options(parser)
     parser.add_argument("--preview", metavar="PNG", help="draw the result: in space, three slices")
+
+
+def add_placing_options(parser: Parser) -> None:
+    """Add the options that change the units and the place of a shape."""
+    place = parser.add_argument_group("place of the shape (by default that of the file, in its units)")
+    place.add_argument(
+        "--units",
+        type=units,
+        metavar="[FROM:]TO",
+        help="units of all numbers: mm, cm, m, inch, foot, micron; FROM where the file does not say its own, as .3mf "
+        "and .glb do",
+    )
+    place.add_argument(
+        "--transform",
+        nargs="+",
+        metavar="M",
+        help="16 numbers of a matrix by rows, or 12, or a file of them",
+    )
+
+
+def units(word: str) -> str:
+    """One unit, or two with a colon between."""
+    for unit in word.split(":", 1):
+        if unit not in UNITS:
+            raise argparse.ArgumentTypeError(f"'{unit}' is none of {', '.join(UNITS)}")
+    return word
+
+
+def add_label_option(parser: Parser) -> None:
+    """Add the option for images of labels."""
+    parser.add_argument(
+        "--label",
+        type=finite,
+        metavar="N",
+        help="of an image of labels (.nrrd .nii .nii.gz .vti .npy) the voxels with this one; the result lies where "
+        "the image does",
+    )
 
 
 def add_room_options(parser: Parser) -> argparse._ArgumentGroup:

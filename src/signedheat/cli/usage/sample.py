@@ -5,7 +5,15 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from typing import Any
 
-from .options import add_command, add_solid_options, check_grid_options, fraction, not_negative, whole_number
+from .options import (
+    add_command,
+    add_placing_options,
+    add_solid_options,
+    check_grid_options,
+    fraction,
+    not_negative,
+    whole_number,
+)
 
 
 def add_to(commands: Any) -> None:
@@ -24,6 +32,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument("-o", "--output", required=True, metavar="OUT", help="samples: .npz")
     parser.add_argument("-n", "--samples", type=whole_number(1), default=250_000, metavar="N", help="points (250000)")
     add_sampling_options(parser)
+    add_placing_options(parser)
     add_solid_options(parser)
     parser.set_defaults(check=check_grid_options)
 

@@ -45,6 +45,12 @@ def add_curves_and_output(parser: Parser, output: str) -> None:
         help="diffusion time in squared spacings (1); larger values close gaps more roundly",
     )
     parser.add_argument(
+        "--globe",
+        action="store_true",
+        help="the mesh is a globe, and curves are longitudes and latitudes in degrees, joined along great circles: "
+        ".csv .geojson",
+    )
+    parser.add_argument(
         "--intrinsic",
         action="store_true",
         help="run the method on better triangles of the same surface, along whose edges the curves run; by default on "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from .options import add_command, add_grid_options, check_grid_options
+from .options import add_command, add_grid_options, add_label_option, add_placing_options, check_grid_options
 
 
 def add_to(commands: Any) -> None:
@@ -31,6 +31,8 @@ def add_to(commands: Any) -> None:
         metavar="MESH",
         help="measure on tets, of a .mesh .msh .vtu .vtk .ele file or around the shape; OUT: .vtu .vtk .msh",
     )
+    add_label_option(parser)
+    add_placing_options(parser)
     add_grid_options(parser)
     parser.set_defaults(check=check)
 

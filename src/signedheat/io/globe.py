@@ -1,0 +1,89 @@
+"""Curves in longitude and latitude, from tables and GeoJSON (RFC 7946)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.curves import Curve
+from ..domains.globe import globe_curve
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import FileFormatError
+from .files import PathLike, extension, reading, text, unknown_extension
+from .point_lists import read_point_lists
+
+GLOBE_FORMATS = frozenset({".csv", ".json", ".geojson"})
+
+Line = tuple[NDArray[np.float64], bool]
+"""Longitudes and latitudes in degrees, and whether the last point is joined to the first."""
+
+
+def read_globe_curves(path: PathLike, mesh: TriangleMesh) -> list[Curve]:
+    """Read curves in longitude and latitude, along great circles of a globe.
+
+    Parameters
+    ----------
+    path : str or path
+        ``.csv`` with longitude and latitude on each line and an empty line between curves, closed where the last point
+        is the first; or GeoJSON (``.geojson``, ``.json``): lines and the rings of polygons, in whatever collection.
+        What polygons enclose is left of their rings, where φ is positive.
+    mesh : TriangleMesh
+        The globe.
+
+    Returns
+    -------
+    list of Curve
+        In the order of the file.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown format, damaged, or has no curve.
+    SourceError
+        If a point is out of range, two in succession are opposite each other, or the mesh is no globe.
+    """
+    if extension(path) not in GLOBE_FORMATS:
+        raise unknown_extension(path, GLOBE_FORMATS, "curves on a globe")
+    with reading(path):
+        if extension(path) == ".csv":
+            lines = read_point_lists(path, 2)
+        else:
+            lines = list(_lines(json.loads(text(path)), 0))
+        if not lines:
+            raise FileFormatError("there is no curve in it", remedy="export lines or polygons", path=path)
+        return [globe_curve(mesh, points, closed) for points, closed in lines]
+
+
+def _lines(thing: object, depth: int) -> Iterator[Line]:
+    """The curves of a GeoJSON object."""
+    if not isinstance(thing, dict) or depth > 64:
+        raise ValueError("this is no GeoJSON")
+    kind, places = thing.get("type"), thing.get("coordinates") or []
+    for inner in (*(thing.get("features") or ()), *(thing.get("geometries") or ())):
+        yield from _lines(inner, depth + 1)
+    if kind == "Feature" and thing.get("geometry") is not None:
+        yield from _lines(thing["geometry"], depth + 1)
+    elif kind in ("LineString", "MultiLineString"):
+        for line in [places] if kind == "LineString" else places:
+            yield _line(line)
+    elif kind in ("Polygon", "MultiPolygon"):
+        for polygon in [places] if kind == "Polygon" else places:
+            for number, ring in enumerate(polygon):
+                points, closed = _line(ring)
+                wanted = 1.0 if number == 0 else -1.0  # what is inside lies to the left, whichever way the file goes
+                yield points if _turns_left(points) == wanted else points[::-1], closed
+
+
+def _line(places: list[list[float]]) -> Line:
+    points = np.array([place[:2] for place in places], dtype=np.float64)
+    closed = len(points) > 3 and bool((points[0] == points[-1]).all())
+    return (points[:-1] if closed else points), closed
+
+
+def _turns_left(points: NDArray[np.float64]) -> float:
+    """1 if a ring runs counter-clockwise in the plane of longitude and latitude, else −1."""
+    x, y = points.T
+    return 1.0 if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0 else -1.0

@@ -1,0 +1,98 @@
+"""Curves in longitude and latitude: great circles on globes, closed forms of distance."""
+
+import json
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.cli import main
+from signedheat.domains.globe import directions, great_circles
+
+
+@pytest.fixture(scope="module")
+def globe():
+    return samples.sphere(4, radius=6371.0, center=(10.0, -20, 30))
+
+
+def places(mesh, center=(10.0, -20, 30)):
+    away = mesh.vertices - np.array(center)
+    return np.degrees(np.arctan2(away[:, 1], away[:, 0])), np.degrees(np.arcsin(away[:, 2] / 6371.0))
+
+
+def parallel(latitude, step=5):
+    return [[longitude, latitude] for longitude in range(-180, 180, step)]
+
+
+def test_great_circles_are_even_and_lie_in_a_plane():
+    start, end = directions([[20, 50], [140, 35]])
+    way = great_circles(np.array([start, end]), closed=False, step=0.1)
+    normal = np.cross(start, end)
+    assert np.abs(way @ normal).max() < 1e-12
+    angles = np.arccos(np.clip(np.einsum("ij,ij->i", way[1:], way[:-1]), -1, 1))
+    assert np.ptp(angles) < 1e-9 and angles[0] <= 0.1
+    np.testing.assert_allclose(np.linalg.norm(way, axis=1), 1)
+    # the way over the north, not along the parallel
+    assert np.degrees(np.arcsin(way[:, 2])).max() > 60
+
+
+def test_distance_to_the_equator_is_the_latitude(globe):
+    circle = sh.globe_curve(globe, parallel(0.0), closed=True)
+    phi = sh.curve_distance(globe, circle).values
+    _, latitude = places(globe)
+    # eastwards, north is left; the polyhedron is a little smaller than its sphere
+    assert np.abs(phi - np.radians(latitude) * 6371).max() < 0.01 * np.pi / 2 * 6371
+
+
+def test_a_gap_in_a_coast_is_closed(globe, tmp_path, capsys):
+    rows = [f"{x},{y}" for x, y in parallel(40.0)]
+    (tmp_path / "coast.csv").write_text("longitude,latitude\n" + "\n".join([*rows[:30], "", *rows[34:]]) + "\n")
+    globe.save(tmp_path / "globe.ply")
+    output = tmp_path / "phi.npz"
+    arguments = [str(tmp_path / "globe.ply"), str(tmp_path / "coast.csv"), "-o", str(output), "--globe"]
+    assert main(["surface", *arguments]) == 0
+    phi = sh.load_field(output).values
+    _, latitude = places(globe)
+    far = np.abs(latitude - 40) > 12
+    assert ((phi > 0) == (latitude > 40))[far].all()
+    assert main(["close", *arguments[:3], str(tmp_path / "whole.json"), "--globe"]) == 0
+    curves = sh.read_curves(tmp_path / "whole.json", globe)
+    assert len(curves) == 1 and curves[0].closed
+
+
+def test_geojson_land_is_positive_whichever_way_its_rings_run(globe, tmp_path):
+    ring = [[-40, -30], [50, -30], [50, 35], [-40, 35], [-40, -30]]
+    lake = [[0, 0], [20, 0], [20, 20], [0, 20], [0, 0]]
+    for name, polygon in (("left", [ring, lake]), ("right", [ring[::-1], lake[::-1]])):
+        feature = {"type": "Feature", "geometry": {"type": "MultiPolygon", "coordinates": [polygon]}}
+        text = json.dumps({"type": "FeatureCollection", "features": [feature, {"type": "Feature", "geometry": None}]})
+        (tmp_path / f"{name}.geojson").write_text(text)
+        curves = sh.read_globe_curves(tmp_path / f"{name}.geojson", globe)
+        assert [curve.closed for curve in curves] == [True, True]
+        phi = sh.SignedHeatSolver(globe).distance(curves).values
+        longitude, latitude = places(globe)
+        at = [np.argmin(np.hypot(longitude - x, latitude - y)) for x, y in ((-20, -15), (10, 10), (120, 0), (0, -60))]
+        assert (phi[at] > 0).tolist() == [True, False, False, False]
+
+
+def test_what_is_no_curve_on_a_globe_is_refused(globe, tmp_path):
+    for wrong, element in (
+        ([[0, 95], [1, 0]], "point 0"),
+        ([[0, 0], [400, 0]], "point 1"),
+        ([[0, 0], [180, 0]], "point 0"),
+        ([[0, 10], [0, 10]], "1 points"),
+        ([[0, 0, 0], [1, 1, 1]], "points"),
+    ):
+        with pytest.raises(sh.SourceError) as caught:
+            sh.globe_curve(globe, wrong)
+        assert caught.value.element == element
+    with pytest.raises(sh.SourceError):
+        sh.globe_curve(samples.torus(n_around=12, n_across=6), [[0, 0], [10, 0]])
+    for name, text in (("a.geojson", "[1, 2]"), ("b.geojson", '{"type": "Point"}'), ("c.geojson", "{"), ("d.svg", "x")):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(sh.FileFormatError) as caught:
+            sh.read_globe_curves(tmp_path / name, globe)
+        assert caught.value.path == str(tmp_path / name)
+    west_is_east = sh.globe_curve(globe, [[170, 0], [180, 0], [-180, 0], [-170, 0]])
+    assert len(west_is_east.faces) > 2

@@ -1,0 +1,55 @@
+"""Affine maps of shapes: places, insides, normals and areas."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+
+MAPS = {
+    "turned": np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0],
+    "mirrored": np.diag([1.0, 1, -1]),
+    "sheared": np.array([[1.0, 0.5, 0], [0, 2, 0], [0.3, 0, -0.7]]),
+}
+
+
+def matrix(kind):
+    whole = np.eye(4)
+    whole[:3, :3], whole[:3, 3] = MAPS[kind], [1, 2, 3]
+    return whole
+
+
+def volume(mesh):
+    corners = mesh.vertices[mesh.faces] - mesh.vertices.mean(axis=0)
+    return np.einsum("ij,ij->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6
+
+
+@pytest.mark.parametrize("kind", MAPS)
+def test_volumes_grow_by_the_determinant_and_stay_positive(kind):
+    ball = samples.sphere(2)
+    polygons = sh.PolygonMesh(ball.vertices, ball.faces)
+    moved = sh.transform(ball, matrix(kind))
+    np.testing.assert_allclose(moved.vertices, ball.vertices @ MAPS[kind].T + [1, 2, 3])
+    assert volume(moved) == pytest.approx(volume(ball) * abs(np.linalg.det(MAPS[kind])))
+    assert volume(sh.transform(polygons, matrix(kind)[:3]).triangulation) == pytest.approx(volume(moved))
+    tets = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    assert volume(sh.transform(tets, matrix(kind)).boundary) > 0
+    voxel = sh.DigitalSurface(np.ones((1, 1, 1), dtype=bool))
+    assert volume(sh.transform(voxel, matrix(kind)).triangulation) == pytest.approx(abs(np.linalg.det(MAPS[kind])))
+
+
+@pytest.mark.parametrize("kind", MAPS)
+def test_normals_and_areas_of_points_are_those_of_their_planes(kind):
+    ball = samples.sphere(3)
+    centers, areas = ball.vertices[ball.faces].mean(axis=1), ball.face_area_vectors
+    sizes = np.linalg.norm(areas, axis=1)
+    moved = sh.transform(sh.PointCloud(centers, areas / sizes[:, None], sizes), matrix(kind))
+    same = sh.transform(ball, matrix(kind)).face_area_vectors
+    np.testing.assert_allclose(moved.normals * moved.areas[:, None], same, atol=1e-12)
+
+
+def test_what_is_no_map_is_refused():
+    ball = samples.sphere(0)
+    for wrong in (np.eye(3), np.diag([1, 1, 0, 1]), np.diag([1, 1, 1, 2]), np.full((3, 4), np.nan)):
+        with pytest.raises(sh.GeometryError):
+            sh.transform(ball, wrong)
