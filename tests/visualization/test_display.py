@@ -65,7 +65,7 @@ def test_notes_and_results_are_short_text_too():
     field = sh.solid_distance(samples.with_flipped_faces(BALL, 0.2), resolution=16)
     for thing in (field.diagnostics, *field.diagnostics.notes, sh.orientation(BALL), sh.LevelValues(np.arange(99) / 7)):
         assert not re.search(r"\d\.\d{9}|array\(|object at", repr(thing))
-    assert repr(sh.LevelValues([1 / 3, 2.0])) == "LevelValues(values=(0.3333, 2))"
+    assert repr(sh.LevelValues([1 / 3, 2.0])) == "LevelValues(values=(0.3333, 2), hard=False)"
 
 
 @pytest.mark.parametrize("make", THINGS.values(), ids=THINGS)
