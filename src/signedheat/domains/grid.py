@@ -203,7 +203,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """(*shape, d) node positions; not cached, since they take d times the memory of a field."""
+        """Positions of the nodes, coordinates last; not cached, since they take d times the memory of a field."""
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
