@@ -15,7 +15,7 @@ from ...compiled import compiled
 
 TINY = 1e-30
 """Values below this are treated as unknown."""
-TOLERANCE = 1e-4
+TOLERANCE = 1e-3
 """Residual of the Poisson equation, over its right side, at which it is solved."""
 MOST = 400
 """Iterations at most."""
