@@ -75,7 +75,7 @@ def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryE
 
 
 def _described(array: NDArray[Any]) -> str:
-    return f"an array of {array.dtype}" if array.ndim else f"{array[()]!r:.50}"
+    return f"an array of {array.dtype}" if array.ndim else " ".join(f"{array[()]!r:.50}".split())
 
 
 def finite_rows(
@@ -138,7 +138,8 @@ def finite_number(
     2.0
     """
     if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
-        raise error(f"{name} must be a number, not {value!r}", element=name)
+        told = _described(value) if isinstance(value, np.ndarray) else " ".join(f"{value!r:.60}".split())
+        raise error(f"{name} must be a number, not {told}", element=name)
     number = _float(value)
     if not (np.isfinite(number) and number >= least):
         wanted = "finite" if least == -np.inf else "finite and not negative" if least == 0 else f"at least {least:g}"

@@ -18,7 +18,7 @@ from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.kinds import EmbeddedSurface, SurfaceDomain
 from ..domains.projection import closest_points
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import finite_rows
+from ..domains.validation import finite_number, finite_rows
 from ..errors import OutsideError
 from ..frozen import Frozen
 from .booleans import Combinable
@@ -147,7 +147,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         OutsideError
             If φ does not take the level.
         """
-        field = self.finest
+        field, level = self.finest, finite_number(level, "level")
         known = field.values[np.isfinite(field.values)]
         low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
         least = 1e-12 * max(high - low, 0.0)

@@ -1,0 +1,21 @@
+"""A short run of the fuzzer on shapes, sources, constraints and arguments, in this process; `make fuzz` is the long one."""
+
+from __future__ import annotations
+
+import pytest
+
+from fuzz.frame import families, run_case
+
+FAMILIES = sorted(name for name in families() if name.startswith(("surface ", "space ", "arguments")))
+CASES = 12
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_short_run(name):
+    outcomes = [run_case(families()[name], 5, number) for number in range(CASES)]
+    assert [str(outcome) for outcome in outcomes if outcome.failed] == []
+    assert any(not outcome.kind.startswith("refused") for outcome in outcomes)
+
+
+def test_every_domain_and_extension_has_a_family():
+    assert len(FAMILIES) == 9

@@ -1,0 +1,99 @@
+"""A process that has made a thousand solvers, grids and fields holds the memory with which it began."""
+
+from __future__ import annotations
+
+import gc
+import json
+import subprocess
+import sys
+import weakref
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import sparse
+
+import signedheat as sh
+from signedheat import linear, samples
+from signedheat.linear import available_backends, factorize
+
+LOOP = """
+import gc, json, numpy as np, signedheat as sh
+from pathlib import Path
+from shapes.tet_cases import boxes
+from signedheat import samples
+
+ball = samples.sphere(1)
+ring = ball.level_set(ball.vertices[:, 2], 0.1)
+box, inside = boxes((2, 2, 2), 1.0), sh.TriangleMesh(0.4 * ball.vertices + 1, ball.faces)
+wall = np.zeros((8, 8, 8), dtype=bool)
+wall[0] = True
+
+def held():
+    gc.collect()
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
+
+def once(k):
+    mesh = sh.TriangleMesh(ball.vertices * (1 + k), ball.faces)
+    solver = sh.SignedHeatSolver(mesh)
+    for constraint in (None, sh.Free()):
+        field = solver.distance(ring, constraint)
+    if k % 4 == 0:
+        sh.sharpen(field)
+        sh.SignedHeatSolver(sh.Grid((-2, -2, -2), 0.5, (8, 8, 8))).distance(ball)
+    if k % 8 == 1:
+        sh.SignedHeatSolver(sh.Grid((-2, -2, -2), 0.5, (8, 8, 8), wall)).distance(ball)
+    if k % 8 == 2:
+        sh.SignedHeatSolver(box).distance(inside)
+    if k % 8 == 3:
+        sh.SignedHeatSolver(sh.intrinsic_delaunay(mesh)).distance(ring)
+
+def run(first, last):
+    for k in range(first, last):
+        once(k)
+    return held()
+
+print(json.dumps([run(0, 150), run(150, 650)]))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc")
+def test_a_thousand_solvers_grids_and_fields_leave_nothing():
+    """500 solvers with two fields each, 250 grids and other domains, after 150 that fill what is kept on purpose."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOOP], capture_output=True, text=True, check=True, cwd=Path(__file__).parents[1]
+    )
+    before, after = json.loads(done.stdout)
+    assert after - before < 8_000_000  # 16 kB a solver; one of its factors takes more
+
+
+@pytest.mark.parametrize("backend", available_backends())
+def test_factors_are_freed_with_what_holds_them(backend):
+    factor = factorize(sparse.identity(50, format="csr") * 2.0, backend=backend)
+    gone = weakref.ref(factor)
+    finalizer = getattr(factor, "_finalizer", None)
+    del factor
+    gc.collect()
+    assert gone() is None and (finalizer is None or not finalizer.alive)
+
+
+def test_factors_are_freed_with_their_solver(monkeypatch):
+    made = []
+
+    def watched(*arguments, **options):
+        factor = linear.factorize(*arguments, **options)
+        made.append(weakref.ref(factor))
+        return factor
+
+    for module in ("direct_integration", "surface.discretization", "surface.vector_heat"):
+        monkeypatch.setattr(f"signedheat.lowering.{module}.factorize", watched)
+    ball = samples.sphere(1)
+    solver = sh.SignedHeatSolver(ball)
+    for source in (ball.level_set(ball.vertices[:, 2], 0.1), ball.points_at(0)):
+        for constraint in (None, sh.Free(), sh.Soft(1.0)):
+            assert np.isfinite(solver.distance(source, constraint).values).all()
+    assert 3 <= sum(reference() is not None for reference in made) < len(made)  # the last of each kind is kept
+    del solver
+    gc.collect()
+    assert [reference for reference in made if reference() is not None] == []
