@@ -23,7 +23,7 @@ test: $(VENV)/.installed-test
 	$(BIN)/python -m pytest
 
 fuzz: $(VENV)/.installed-test  # CASES="1000 --seed 3" runs these
-	cd tests && ../$(BIN)/python -m fuzz --cases $(or $(CASES),10000)
+	cd tests && PYTHONPATH=.. ../$(BIN)/python -m fuzz --cases $(or $(CASES),10000)
 	$(BIN)/python -m pytest -m slow
 
 lint: $(VENV)/.installed-test

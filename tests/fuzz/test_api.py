@@ -1,4 +1,4 @@
-"""A short run of the fuzzer on shapes, sources, constraints and arguments, in this process; `make fuzz` is the long one."""
+"""A short run of the fuzzer on shapes, sources, constraints and arguments, here; `make fuzz` is the long one."""
 
 from __future__ import annotations
 

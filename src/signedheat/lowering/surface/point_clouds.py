@@ -12,6 +12,9 @@ from ...domains.point_cloud import PointCloud
 from .discretization import SurfaceDiscretization
 from .memory import refuse_too_many
 
+NEIGHBORS = 40_000_000
+"""Bytes of the libraries that find neighbours. Measured."""
+
 
 @discretize.register
 def _(domain: PointCloud) -> SurfaceDiscretization:
@@ -19,7 +22,7 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
 
     h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
     """
-    refuse_too_many(2 * domain.n_points, domain.n_points, "points")
+    refuse_too_many(2 * domain.n_points, domain.n_points, "points", beside=NEIGHBORS)
     mesh = domain.triangulation
     used = np.zeros(domain.n_points, dtype=bool)
     used[mesh.faces] = True
