@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from typing import Literal
 
 from ..domains.triangle_mesh import TriangleMesh
 from ..extensions.close_curves import refuse_without_sides
@@ -20,7 +21,8 @@ def run(arguments: Namespace) -> Summary:
     if arguments.preview:
         ensure_picture_writable(arguments.preview)
     surface, curves = surface_and_curves(arguments)
-    intrinsic = arguments.intrinsic or (isinstance(surface, TriangleMesh) and not arguments.plain) or "auto"
+    conforming = arguments.intrinsic or (isinstance(surface, TriangleMesh) and not arguments.plain)
+    intrinsic: bool | Literal["auto"] = True if conforming else "auto"
     with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
         refuse_without_sides(curves)
         solver = SignedHeatSolver(surface, arguments.diffusion, progress, intrinsic)

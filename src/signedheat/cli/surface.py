@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from ..constraints import EachComponent, LevelValues
+from ..constraints import Free, Soft, ZeroSet
 from ..diagnostics import LargeAngles, SharpenedToCurves
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
@@ -37,8 +37,10 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, Any]:
 def measured(surface: Any, curves: Any, arguments: Namespace) -> VertexField:
     """The distance."""
     with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
-        constraint, intrinsic = constraint_of(arguments.constraint), arguments.intrinsic or "auto"
-        if arguments.plain or isinstance(constraint, EachComponent | LevelValues):
+        constraint = constraint_of(arguments.constraint)
+        intrinsic: bool | Literal["auto"] = True if arguments.intrinsic else "auto"
+        field: VertexField
+        if arguments.plain or not isinstance(constraint, Free | ZeroSet | Soft):
             field = SignedHeatSolver(surface, arguments.diffusion, progress, intrinsic).distance(curves, constraint)
         else:
             field = curve_distance(

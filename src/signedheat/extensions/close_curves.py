@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 from ..constraints import Constraint
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
@@ -58,7 +59,7 @@ def close_curves(
     """
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
     refuse_without_sides(listed)
-    conforming = isinstance(domain, TriangleMesh) or "auto"
+    conforming: bool | Literal["auto"] = isinstance(domain, TriangleMesh) or "auto"
     phi = SignedHeatSolver(domain, diffusion, intrinsic=conforming).distance(listed, constraint)
     return phi.contour(0.0)
 
