@@ -129,7 +129,7 @@ def _reaches_walls(blocks: Blocks, values: NDArray[np.float32], level: float) ->
     for axis, n in enumerate(blocks.shape):
         for node in (0, n - 1):
             rows = np.flatnonzero(blocks.places[:, axis] == node // SIDE)
-            wall: NDArray[np.float32] = values[rows].take(node % SIDE, axis=axis + 1)
+            wall: NDArray[np.float32] = np.moveaxis(values[rows], axis + 1, 0)[node % SIDE]
             signs |= {bool(sign) for sign in np.unique(wall[~np.isnan(wall)] < level)}
     return len(signs) == 2
 
