@@ -94,7 +94,7 @@ class Polyline(Displayed, Frozen):
         steps = positive_steps(spacing, "spacing", 2)
         start = coordinates(np.atleast_2d(numbers(origin, "origin")), "origin", 2)[0]
         padded = np.pad(inside, 1)
-        lines = level_lines(0.5 - padded, start - steps, steps, 0.0)
+        lines = level_lines(np.float64(0.5) - padded.astype(np.float64), start - steps, steps, 0.0)
         return [cls(points, closed) for points, closed in lines]
 
     @property
