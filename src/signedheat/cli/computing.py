@@ -73,7 +73,13 @@ def constraint_of(word: str) -> Constraint:
         return LevelValues([float(value) for value in values.split(",")])
     if name == "soft":
         return Soft(float(values)) if values else Soft()
-    return {"free": Free(), "zero-set": ZeroSet(), "hard": ZeroSet(hard=True), "each-component": EachComponent()}[word]
+    named: dict[str, Constraint] = {
+        "free": Free(),
+        "zero-set": ZeroSet(),
+        "hard": ZeroSet(hard=True),
+        "each-component": EachComponent(),
+    }
+    return named[word]
 
 
 @overload

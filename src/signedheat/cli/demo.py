@@ -9,7 +9,7 @@ from typing import Any
 from ..domains.grid import Grid
 from ..domains.inspection import inspect
 from ..errors import FileFormatError
-from ..io import ensure_writable, save, save_field
+from ..io import ensure_writable, save
 from ..io.files import PathLike, replacing
 from ..samples import broken_duck
 from ..visualization import draw_shape, draw_slices, ensure_picture_writable, new_figure
@@ -49,7 +49,7 @@ def run(arguments: Namespace) -> Summary:
     options = Namespace(**vars(arguments), **DEFAULTS)
     field = compute(shape, grid, options)
     surface = field.offset(DISTANCE)
-    save_field(field, files["distance.vti"])
+    field.save(files["distance.vti"])
     save(surface, files["offset.stl"])
     draw_story(shape, field, surface, files["picture.png"])
     broken, whole = inspect(shape), inspect(surface)

@@ -97,7 +97,11 @@ def assemble(
     first node, is False.
     """
     steps = np.array(grid.spacing)
-    middle = cache(phi) if phi is not None else lambda: sides
+
+    @cache
+    def middle() -> NDArray[np.float64]:
+        return sides if phi is None else phi()
+
     clouds = [part for part in parts if isinstance(part, PointCloud)]
     for cloud in clouds if fit != "smooth" else []:
         if cloud.normals is None:

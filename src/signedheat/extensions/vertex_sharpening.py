@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,8 @@ def _(
     if field.finest is not field:
         fine = sharpen_field(field.finest, method, progress, curves)
         assert isinstance(fine, VertexField)
-        return replace(field, values=fine.values[: len(field.values)], diagnostics=fine.diagnostics, finer=fine)
+        values = fine.values[: len(field.values)]
+        return replace(field, values=values, diagnostics=fine.diagnostics, finer=cast("VertexField[Any]", fine))
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
         raise UnsupportedTypeError(

@@ -39,7 +39,7 @@ class Parser(argparse.ArgumentParser):
 
 def add_command(commands: Any, name: str, help: str, description: str) -> Parser:
     """Add a command with the options that all commands have. The module of its name, one folder up, runs it."""
-    parser = commands.add_parser(name, help=help, description=description)
+    parser: Parser = commands.add_parser(name, help=help, description=description)
     parser.set_defaults(command=name, parser=parser, check=None)
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
