@@ -144,7 +144,7 @@ def test_info_of_shapes_and_fields(tmp_path, ball, capsys):
     summary = json.loads(succeed(capsys, "info", ball, "--json", "--resolution", "64", "512"))
     report = inspect(sh.read(ball))
     assert summary["open_edges"] == report.open_edges
-    assert summary["memory_bytes"]["512"] > 50 * summary["memory_bytes"]["64"] > 0
+    assert summary["memory_bytes"]["512"] > 30 * summary["memory_bytes"]["64"] > 0  # the base is counted
     assert "open edges" in succeed(capsys, "info", ball)
     field = str(tmp_path / "phi.vti")
     succeed(capsys, "volume", ball, "-o", field, "--resolution", "16")

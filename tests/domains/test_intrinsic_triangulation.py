@@ -342,7 +342,11 @@ def test_refinement_ends_on_anything(seed):
         vertices = rng.standard_normal((n, 3)) * 10.0 ** rng.integers(-8, 2, 3)
         vertices[rng.integers(0, n, n // 3)] = vertices[rng.integers(0, n, n // 3)]
         soup = sh.TriangleMesh(vertices, rng.integers(0, n, (m, 3)))  # some faces with a corner twice
-        better = sh.intrinsic_delaunay(soup, refine=True, max_vertices=800)
+        try:
+            better = sh.intrinsic_delaunay(soup, refine=True, max_vertices=800)
+        except sh.GeometryError as refusal:  # lengths of edges no longer tell the area of the thinnest
+            assert refusal.remedy
+            continue
         area, size = better.base.face_areas.sum(), better.base.edge_lengths.max()
         assert better.triangles.face_areas.sum() == pytest.approx(area, rel=1e-5, abs=1e-9 * size**2 * better.n_faces)
         assert np.isfinite(better.vertices).all() and (better.triangles.edge_lengths > 0).all()

@@ -377,7 +377,7 @@ def test_on_a_box_of_voxels_it_is_exact():
     x = surface.vertices[:, 0]
     phi = sh.sharpen(sh.SignedHeatSolver(surface).distance(surface.level_set(x - 3.1)))
     side = (np.abs(surface.vertices[:, 1:] - surface.vertices[:, 1:].mean(axis=0)) > [2.9, 1.4]).any(axis=1)
-    assert np.abs(phi.values - (x - 3.1))[side].max() < 1e-5
+    assert np.abs(phi.values - (x - 3.1))[side].max() < 3e-4  # windows are exact to 1e-4 of it
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.003])

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import Literal
 
-from ..domains.triangle_mesh import TriangleMesh
-from ..extensions.close_curves import refuse_without_sides
+from ..extensions.close_curves import conforming_distance, refuse_without_sides
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
 from ..solver import SignedHeatSolver
 from ..visualization import ensure_picture_writable, save_surface
@@ -21,12 +19,13 @@ def run(arguments: Namespace) -> Summary:
     if arguments.preview:
         ensure_picture_writable(arguments.preview)
     surface, curves = surface_and_curves(arguments)
-    conforming = arguments.intrinsic or (isinstance(surface, TriangleMesh) and not arguments.plain)
-    intrinsic: bool | Literal["auto"] = True if conforming else "auto"
     with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
         refuse_without_sides(curves)
-        solver = SignedHeatSolver(surface, arguments.diffusion, progress, intrinsic)
-        field = solver.distance(curves, constraint_of(arguments.constraint))
+        constraint = constraint_of(arguments.constraint)
+        if arguments.plain and not arguments.intrinsic:
+            field = SignedHeatSolver(surface, arguments.diffusion, progress).distance(curves, constraint)
+        else:
+            field = conforming_distance(surface, curves, constraint, arguments.diffusion, progress)
         found = field.contour(0.0)
     write_curves(arguments.output, found, surface)
     if arguments.preview:

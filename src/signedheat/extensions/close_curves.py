@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 from ..constraints import Constraint
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
 from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import SourceError
+from ..errors import GeometryError, SourceError
+from ..fields.vertex_field import VertexField
+from ..progress import Progress
 from ..solver import SignedHeatSolver, as_list
 
 
@@ -55,13 +56,31 @@ def close_curves(
     >>> broken = [mesh.polyline([[0, 2.5, 0], [2, 2.5, 0]]), mesh.polyline([[5, 2.5, 0], [7, 2.5, 0]])]
     >>> whole = sh.close_curves(mesh, broken)
     >>> whole
-    [Curve(15 points, open, oriented)]
+    [Curve(30 points, open, oriented)]
     """
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
     refuse_without_sides(listed)
-    conforming: bool | Literal["auto"] = isinstance(domain, TriangleMesh) or "auto"
-    phi = SignedHeatSolver(domain, diffusion, intrinsic=conforming).distance(listed, constraint)
-    return phi.contour(0.0)
+    return conforming_distance(domain, listed, constraint, diffusion).contour(0.0)
+
+
+def conforming_distance(
+    domain: SurfaceDomain,
+    curves: CurvesAndPoints,
+    constraint: Constraint | None,
+    diffusion: float,
+    progress: Progress | None = None,
+) -> VertexField:
+    """Distance on triangles that have the curves along their edges, so that none is too small to be seen.
+
+    Other domains than triangle meshes, and meshes too thin to be triangulated anew, are taken as they are.
+    """
+    if isinstance(domain, TriangleMesh):
+        try:
+            return SignedHeatSolver(domain, diffusion, progress, intrinsic=True).distance(curves, constraint)
+        except GeometryError:
+            pass
+    field: VertexField = SignedHeatSolver(domain, diffusion, progress).distance(curves, constraint)
+    return field
 
 
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:

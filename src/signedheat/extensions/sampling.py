@@ -153,7 +153,8 @@ def sample(
     >>> from signedheat import samples, solid_distance
     >>> field = solid_distance(samples.without_faces(samples.sphere(3), 0.3), resolution=32)
     >>> taken = sample(field, 2000, near=0.5, widths=[0.1, 0.01], seed=7)
-    >>> bool(np.abs(taken.distances - (np.linalg.norm(taken.points, axis=1) - 1)).max() < 0.05)
+    >>> away = np.abs(taken.distances - (np.linalg.norm(taken.points, axis=1) - 1))
+    >>> bool(np.quantile(away, 0.9) < 0.01 and away.max() < 0.1)
     True
     """
     if n < 1:

@@ -46,7 +46,7 @@ def _(
         raise UnsupportedTypeError(
             f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface", element="field"
         )
-    if isinstance(method, Curve | SurfacePoints | Sequence):
+    if isinstance(method, Curve | SurfacePoints | Sequence) and not isinstance(method, str):
         method, curves = None, method
     if curves is not None:
         method = ToCurves(list(chain.from_iterable(surface.segments(as_list(curves)))))

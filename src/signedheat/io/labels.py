@@ -72,7 +72,7 @@ class LabelImage:
         What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
     """
 
-    labels: NDArray[Any]
+    labels: NDArray[np.generic]
     axes: NDArray[np.float64]
     origin: NDArray[np.float64]
     space: str | None = None

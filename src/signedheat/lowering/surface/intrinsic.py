@@ -12,6 +12,7 @@ from ...diagnostics import IntrinsicTriangles
 from ...discretization import discretize
 from ...domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ...domains.triangle_mesh import TriangleMesh
+from ...errors import GeometryError
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from ...progress import Progress
@@ -49,9 +50,15 @@ class Retriangulated:
 
 
 def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
-    """The discretisation of a domain; triangle meshes with many large angles are refined intrinsically."""
+    """The discretisation of a domain; triangle meshes with many large angles are refined intrinsically.
+
+    Those whose faces are too thin for that stay as they are, with the note `LargeAngles`.
+    """
     if isinstance(domain, TriangleMesh) and large_angles(domain) >= SPOILED:
-        return refined(domain, progress)
+        try:
+            return refined(domain, progress)
+        except GeometryError:
+            pass
     return discretize(domain)
 
 
