@@ -32,6 +32,8 @@ NONSENSE = [
     [[10**400, 0, 0]],
     iter([1, 2]),
 ]
+KINDS = [f"{number}-{type(thing).__name__}" for number, thing in enumerate(NONSENSE)]
+"""Names without addresses, which are the same in every process."""
 
 
 @pytest.fixture(autouse=True)
@@ -69,7 +71,7 @@ def test_sizes_within_give_the_same_distances(scale):
     np.testing.assert_allclose(other.values / scale, one.values, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("thing", NONSENSE, ids=repr)
+@pytest.mark.parametrize("thing", NONSENSE, ids=KINDS)
 @pytest.mark.parametrize(
     "make",
     [
