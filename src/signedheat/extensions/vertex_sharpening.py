@@ -46,7 +46,9 @@ def _(
         raise UnsupportedTypeError(
             f"a field on a {type(field.domain).__name__} cannot be sharpened: its domain is no surface", element="field"
         )
-    if isinstance(method, Curve | SurfacePoints | Sequence) and not isinstance(method, str):
+    if isinstance(method, str):
+        raise UnsupportedTypeError(f"{method!r} is no method of sharpening", remedy="pass Geodesic() or Convex()")
+    if isinstance(method, Curve | SurfacePoints | Sequence):
         method, curves = None, method
     if curves is not None:
         method = ToCurves(list(chain.from_iterable(surface.segments(as_list(curves)))))
