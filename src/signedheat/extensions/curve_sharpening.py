@@ -25,7 +25,7 @@ from ..progress import Progress
 FAR = 1.0
 """Triangle sizes: what the zero set has farther from any curve stands in for missing curve."""
 
-HALO = 4.0
+FALSE_ZERO_WIDTH = 4.0
 """Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
 
 
@@ -153,12 +153,14 @@ def missing_parts(
     if unsided:
         near, windows = distance_to_segments(triangles, [PlacedSegments.of(triangles, unsided)], tolerance, report)
         sided = [incident_faces(triangles, part.nodes)[1] for part in parts if part.oriented]
-        values = without_halos(triangles, values, near < HALO * spacing, corners[np.concatenate(sided)].ravel())
+        values = without_false_zeros(
+            triangles, values, near < FALSE_ZERO_WIDTH * spacing, corners[np.concatenate(sided)].ravel()
+        )
         counts.append(windows)
     return zero_line(triangles, values, apart), counts
 
 
-def without_halos(
+def without_false_zeros(
     triangles: IntrinsicMesh, values: NDArray[np.float64], beside: NDArray[np.bool_], sided: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Values with NaN along those parts of the zero set that are due to unoriented sources.

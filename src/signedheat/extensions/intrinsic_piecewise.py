@@ -54,7 +54,7 @@ class IntrinsicPiecewiseField(PiecewiseField):
         crossing = node >= n
         at, on = np.flatnonzero(~crossing), np.flatnonzero(crossing)
 
-        owner = self.glued[0]
+        owner = self.split_vertices[0]
         means = np.bincount(owner, self.values.ravel()) / np.bincount(owner)
         at_corners = means[owner].reshape(-1, 3)
         corner = 3 * face[at] + (triangles.corner_vertices[face[at]] == node[at, None]).argmax(axis=1)

@@ -36,7 +36,7 @@ from ..operators.cotan import cotan_matrix
 from ..progress import Progress, Stopwatch
 from ..solver import as_list
 from .intrinsic_piecewise import IntrinsicPiecewiseField
-from .jump_solvers import JumpProblem, minimize_exactly, minimize_fast
+from .jump_solvers import JumpProblem, JumpSolution, minimize_exactly, minimize_fast
 
 SOURCE_WEIGHT = 100.0
 """Factor by which a cut along or across the source is more expensive than elsewhere."""
@@ -119,8 +119,8 @@ def piecewise_distance(
     with stopwatch("prepare"):
         diffusion = positive_number(diffusion, "diffusion")
         discretization = _lowered(domain)
-        if not holds(discretization, listed):
-            assert not isinstance(domain, IntrinsicTriangulation)  # which `holds` refuses
+        if not conforms(discretization, listed):
+            assert not isinstance(domain, IntrinsicTriangulation)  # which `conforms` refuses
             domain = intrinsic_delaunay(domain.triangulation, keep=listed)
             discretization = _lowered(domain)
     with stopwatch("diffuse"):
@@ -151,7 +151,13 @@ def piecewise_distance(
     unreached = np.flatnonzero(np.isnan(phi.values[:, 0]))
     if len(unreached):
         warn_user(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning)
-    jumps = Jumps(
+    notes = (jumps_of(phi, solution, error), *discretization.notes)
+    return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
+
+
+def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps:
+    """The note on the jumps of a field, and on the objective that it minimises."""
+    return Jumps(
         objective=solution.objective,
         bound=solution.bound,
         gap=solution.gap,
@@ -161,8 +167,6 @@ def piecewise_distance(
         cut_length=float(sum(line.length for line in phi.cut)),
         integration_error=error,
     )
-    notes = (jumps, *discretization.notes)
-    return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
 
 def _lowered(domain: SurfaceDomain) -> SurfaceDiscretization:
@@ -171,7 +175,7 @@ def _lowered(domain: SurfaceDomain) -> SurfaceDiscretization:
     return lowered
 
 
-def holds(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> bool:
+def conforms(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> bool:
     """Whether the triangles conform to all sources, so that `adapt` does not refine them."""
     adapted = discretization.adapt(sources)[0].triangles
     fits = adapted.corner_vertices is discretization.triangles.corner_vertices
@@ -301,7 +305,7 @@ def integration_error(phi: PiecewiseField, directions: NDArray[np.complex128]) -
 
 def split_triangles(phi: PiecewiseField) -> tuple[IntrinsicMesh, NDArray[np.float64], NDArray[np.float64]]:
     """The triangles with vertices doubled along the cut, and the mean value and lumped mass at each vertex."""
-    owner, vertices = phi.glued
+    owner, vertices = phi.split_vertices
     opened = replace(phi.triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=len(vertices))
     mean = np.bincount(owner, phi.values.ravel()) / np.bincount(owner)
     masses = np.asarray(np.bincount(owner, np.repeat(phi.triangles.face_areas / 3.0, 3)), dtype=np.float64)

@@ -24,7 +24,7 @@ from ..lowering.surface.source import SurfaceSource
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
 from ..solver import as_list
-from .curve_sharpening import HALO, ToCurves, told, without_halos
+from .curve_sharpening import FALSE_ZERO_WIDTH, ToCurves, told, without_false_zeros
 from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
 
@@ -101,7 +101,9 @@ def _(
         sided = np.concatenate(
             [interpolation_at(source.triangles, part.nodes).indices for part in source.parts if part.oriented]
         )
-        lines = without_halos(surface.triangles, values, near < HALO * surface.spacing, sided[sided < len(values)])
+        lines = without_false_zeros(
+            surface.triangles, values, near < FALSE_ZERO_WIDTH * surface.spacing, sided[sided < len(values)]
+        )
         distance, more = distance_to_zero_line(surface.triangles, lines, tolerance, report)
         also = told(surface.triangles, more)
         near, note = np.minimum(near, distance), GeodesicWindows(windows + more, note.cut_short or also.cut_short)

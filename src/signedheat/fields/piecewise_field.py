@@ -175,14 +175,14 @@ class PiecewiseField(Displayed, Frozen):
 
         Away from the cut, the values of all corners at a vertex are averaged. Faces keep their ids.
         """
-        owner, vertices = self.glued
+        owner, vertices = self.split_vertices
         count = np.bincount(owner)
         values = np.bincount(owner, self.values.ravel()) / count
         mesh = TriangleMesh(self.surface.vertices[vertices], owner.reshape(-1, 3))
         return VertexField(mesh, values, self.diagnostics)
 
     @cached_property
-    def glued(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def split_vertices(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(3m,) vertex of the split mesh at each corner, and the original vertex of each vertex of the split mesh."""
         whole = ~self.is_cut
         ends = np.concatenate([self.pairs.tails[whole], self.pairs.heads[whole]])
