@@ -1,0 +1,1 @@
+"""Tasks that `benchmarks/features.py` gives to this library and to others."""
