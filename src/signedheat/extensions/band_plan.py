@@ -14,7 +14,7 @@ from ..errors import GeometryError
 from ..fields.grid_field import GridField
 from ..geometry.box_tree import BoxTree
 from ..geometry.face_features import FaceFeatures
-from ..operators.grid.block_distances import FaceTree
+from ..geometry.face_tree import FaceTree
 from ..operators.grid.blocks import CUBE, SIDE
 
 TILE = SIDE * CUBE
@@ -128,6 +128,14 @@ class BandPlan:
         places = self.open_places.data[near]
         excess = np.maximum(np.maximum(low * SIDE * self.steps - places, places - high * SIDE * self.steps), 0.0)
         return bool((np.linalg.norm(excess, axis=1) <= self.open_reach + SIDE * self.cell).any())
+
+    def near_open(self, places: NDArray[np.int64], reach: float) -> NDArray[np.bool_]:
+        """Which of the blocks at (n, 3) places have nodes within a distance of open places."""
+        if self.open_places is None or not len(places):
+            return np.zeros(len(places), dtype=bool)
+        within = reach + 0.5 * float(np.linalg.norm((SIDE - 1) * self.steps))
+        centres = (places * SIDE + 0.5 * (SIDE - 1)) * self.steps
+        return np.asarray(self.open_places.query(centres, distance_upper_bound=within)[0] <= within)
 
     @property
     def reach(self) -> float:

@@ -11,11 +11,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..operators.grid.block_distances import NODES, TOGETHER, block_points
-from ..operators.grid.blocks import CUBE, SIDE, Blocks
+from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
-from .band_completion import completed_function, halo
+from .band_completion import NONE, completed_function, halo
 from .band_plan import FAR, NEAR, BandPlan
+
+TOGETHER = 512
+"""Blocks whose faces are searched at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,11 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     high = low + CUBE
     is_open = plan.is_open(low, high)
     wide = max(2 + int(plan.reach // (SIDE * float(plan.steps.min()))), halo(plan)) if is_open else 0
-    blocks = Blocks.of(plan.blocks_in(low - wide, high + wide), plan.grid.shape)
+    places = plan.blocks_in(low - wide, high + wide)
+    own = ((places >= low) & (places < high)).all(axis=1)
+    around = np.flatnonzero(~own)  # matters where surface is missing only
+    own[around] = plan.near_open(places[around], NONE * plan.coarse_cell)
+    blocks = Blocks.of(places[own], plan.grid.shape)
     sides = _sides(plan, blocks)
     own = ((blocks.places >= low) & (blocks.places < high)).all(axis=1)
     signs = np.where(sides.function[own] < 0, -1.0, 1.0)

@@ -15,15 +15,13 @@ from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, OutsideError
 from ..operators.grid.block_contours import block_contour
-from ..operators.grid.blocks import SIDE, Blocks
+from ..operators.grid.blocks import NODES, SIDE, Blocks
 from ..operators.grid.exact_surface import ExactSurface
 from .files import save_field
 from .grid_field import GridField
 
 if TYPE_CHECKING:
     import pyvista
-
-NODES = SIDE**3
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import LEAF, BoxTree
-from .point_triangle import foot_on_triangle
 
 
 def nearest_on_triangles(
@@ -63,64 +62,6 @@ def _nearest(triangles, bounds, items, points):
                         found[p] = items[k]
         weights[p, 0], weights[p, 1], weights[p, 2] = u, v, w
     return found, weights
-
-
-@compiled(nogil=True, error_model="numpy")
-def nearer_faces(
-    rows: NDArray[np.float64],
-    bounds: NDArray[np.float64],
-    items: NDArray[np.int64],
-    points: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    squares: NDArray[np.float64],
-) -> NDArray[np.bool_]:
-    """Which of some points have a face nearer than the one known, of this squared distance; that takes its place.
-
-    The better what is known, the less of the tree is looked at.
-
-    Parameters
-    ----------
-    rows : (m, 16) float
-        Triangles, as `triangle_rows` gives them.
-    bounds, items
-        Their `BoxTree`.
-    points : (k, 3) float
-    faces, squares : (k,) int and float
-        A face and the square of the distance to it; −1 and infinity where none is known. Written to.
-    """
-    stack, gaps = np.empty(128, dtype=np.int64), np.empty(128)
-    leaves = len(bounds) // 2
-    found = np.zeros(len(points), dtype=np.bool_)
-    for p in range(len(points)):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        best = squares[p]
-        limit = best * (1.0 - 1e-12)
-        depth, stack[0], gaps[0] = 1, 1, 0.0
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if gaps[depth] >= limit:
-                continue
-            if node < leaves:
-                near, far = 2 * node, 2 * node + 1
-                gap, other = _box_distance(bounds[near], x, y, z), _box_distance(bounds[far], x, y, z)
-                if gap > other:
-                    near, far, gap, other = far, near, other, gap
-                if other < limit:
-                    stack[depth], gaps[depth] = far, other
-                    depth += 1
-                if gap < limit:
-                    stack[depth], gaps[depth] = near, gap
-                    depth += 1
-                continue
-            for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
-                if items[k] >= 0:
-                    square = foot_on_triangle(rows, items[k], x, y, z)[0]
-                    if square < limit:
-                        best, faces[p], found[p] = square, items[k], True
-                        limit = best * (1.0 - 1e-12)
-        squares[p] = best
-    return found
 
 
 @compiled

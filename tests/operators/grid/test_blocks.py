@@ -2,10 +2,10 @@ import numpy as np
 
 from shapes.grid_cases import sphere
 from signedheat.geometry.face_features import FaceFeatures
+from signedheat.geometry.face_tree import FaceTree
 from signedheat.geometry.marching import closed_surface
 from signedheat.operators.grid.block_contours import block_contour
-from signedheat.operators.grid.block_distances import FaceTree, block_points
-from signedheat.operators.grid.blocks import SIDE, Blocks
+from signedheat.operators.grid.blocks import SIDE, Blocks, block_points
 
 
 def scattered(shape, share, seed=0):

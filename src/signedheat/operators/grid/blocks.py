@@ -18,6 +18,8 @@ SIDE = 8
 """Nodes along each edge of a block."""
 CUBE = 16
 """Blocks along each edge of a cube."""
+NODES = SIDE**3
+"""Nodes of a block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +108,13 @@ class Blocks:
         result = np.full(shape, np.nan, dtype=np.float32)
         _gather(*self.tables, values, np.asarray(first, dtype=np.int64), np.array(self.shape), result)
         return result
+
+
+def block_points(places: NDArray[np.int32], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n · 512, 3) positions of the nodes of blocks, in units of length from the first node of the grid."""
+    inner = np.stack(np.meshgrid(*(np.arange(SIDE),) * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    nodes = places.astype(np.int64)[:, None] * SIDE + inner
+    return nodes.reshape(-1, 3) * steps
 
 
 @compiled(nogil=True)

@@ -11,10 +11,9 @@ import scipy
 from numpy.typing import NDArray
 
 from ...frozen import Frozen
-from ...geometry.box_tree import BoxTree, morton_codes
+from ...geometry.box_tree import morton_codes
 from ...geometry.face_features import FaceFeatures
-from ...geometry.nearest import nearer_faces
-from ...geometry.nearest_faces import NearestFaces, search_from
+from ...geometry.face_tree import FaceTree
 from ...parallel import in_chunks
 from .closest_points import distances_to_crossings
 
@@ -84,9 +83,8 @@ class ExactSurface(Frozen):
     telling: NDArray[np.bool_] | None = None
 
     @cached_property
-    def _tree(self) -> BoxTree:
-        triangles = self.features.corners.reshape(-1, 3, 3)
-        return BoxTree.in_order(triangles.min(axis=1), triangles.max(axis=1), np.arange(len(triangles)))
+    def _faces(self) -> FaceTree:
+        return FaceTree.of(self.features)
 
     @cached_property
     def _crossing_tree(self) -> scipy.spatial.cKDTree:
@@ -115,7 +113,7 @@ class ExactSurface(Frozen):
         distances, feet, directions = np.full(n, np.inf), sorted_points.copy(), np.zeros((n, 3))
         sides, completed = np.zeros(n), np.zeros(n, dtype=bool)
         if len(self.features.corners):
-            found = self._nearest_faces(sorted_points)
+            found = self._faces.search(sorted_points)
             distances, feet = found.distances, found.feet
             directions = self.features.face_normals[found.faces]
             told = found.regular if self.telling is None else found.regular & self.telling[found.faces]
@@ -143,14 +141,6 @@ class ExactSurface(Frozen):
         back = np.empty(n, dtype=np.int64)
         back[order] = np.arange(n)
         return distances[back], feet[back], directions[back], sides[back], completed[back]
-
-    def _nearest_faces(self, points: NDArray[np.float64]) -> NearestFaces:
-        """From what is nearest to the point before, over the surface; the tree then knows what other part is nearer."""
-        found = search_from(self.features, points, np.zeros((len(points), 1), dtype=np.int32))
-        faces, squares = found.faces.copy(), found.distances**2
-        tree = self._tree
-        nearer = np.flatnonzero(nearer_faces(self.features.rows, tree.bounds, tree.items, points, faces, squares))
-        return found.replaced(nearer, search_from(self.features, points[nearer], faces[nearer, None]))
 
     def on_level(self, points: NDArray[np.float64], values: NodeValues, level: float) -> NDArray[np.float64]:
         """Points on edges of the grid, where values of the nodes pass a level, moved along to where distance does.
