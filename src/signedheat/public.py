@@ -5,6 +5,7 @@ from .batches.manifest import Outcome
 from .batches.run import Batch, batch
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .diagnostics import Diagnostics
+from .domains.common_subdivision import common_subdivision
 from .domains.curves import Curve, SurfacePoints
 from .domains.digital_surface import DigitalSurface
 from .domains.foreign import as_shape
@@ -32,7 +33,6 @@ from .errors import (
     UnsupportedTypeError,
 )
 from .extensions.close_curves import close_curves
-from .extensions.common_subdivision import common_subdivision
 from .extensions.curve_distance import curve_distance
 from .extensions.curve_orientation import CurveOrientation, curve_orientation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken

@@ -146,3 +146,20 @@ def test_broken_rings_on_a_cylinder_are_closed():
     broken = [ring.path(middle[:20]), ring.path(middle[26:50])]
     (whole,) = sh.close_curves(ring, broken)
     assert whole.closed and np.abs(positions(ring, whole)[:, 2]).max() < 0.02
+
+
+def test_a_refined_field_is_linear_on_its_pieces():
+    """A long strip: φ at points is the same from the pieces as from the intrinsic triangles."""
+    x = np.linspace(0, 9, 4)
+    vertices = np.concatenate([np.stack([x, 0 * x + y, 0.3 * x * y], axis=1) for y in (0.0, 1.0)])
+    a = np.arange(3)
+    mesh = sh.TriangleMesh(vertices, np.concatenate([np.c_[a, a + 1, a + 5], np.c_[a, a + 5, a + 4]]))
+    curve = mesh.polyline([[2.2, 0, 0], [2.9, 1, 0.87]])
+    phi = sh.SignedHeatSolver(mesh, intrinsic=True).distance(curve)
+    pieces = phi.subdivided()
+    assert len(pieces.values) > mesh.n_vertices
+    np.testing.assert_allclose(pieces.values[: mesh.n_vertices], phi.values, atol=1e-12)
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), 200)
+    points = np.einsum("pk,pkd->pd", weights, mesh.vertices[mesh.faces[np.arange(200) % 6]])
+    np.testing.assert_allclose(pieces(points), phi(points), atol=1e-9)
+    assert pieces.subdivided() is pieces

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from .. import samples
+from ..domains.common_subdivision import common_subdivision
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid
 from ..domains.inspection import inspect
@@ -17,7 +18,6 @@ from ..domains.intrinsic_triangulation import intrinsic_delaunay
 from ..domains.point_cloud import PointCloud
 from ..domains.polyline import Polyline
 from ..extensions.close_curves import close_curves
-from ..extensions.common_subdivision import common_subdivision
 from ..extensions.curve_distance import curve_distance
 from ..extensions.orientation import orientation
 from ..extensions.piecewise import piecewise_distance

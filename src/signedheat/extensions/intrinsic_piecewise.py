@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.common_subdivision import positions, subdivided
 from ..domains.curves import SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
@@ -15,7 +16,6 @@ from ..errors import GeometryError
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.vertex_field import VertexField
 from ..geometry.surface_points import barycentric_in
-from .common_subdivision import positions, subdivided
 
 
 class IntrinsicPiecewiseField(PiecewiseField):

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
+from ..domains.common_subdivision import common_subdivision
 from ..domains.curves import Curve, SurfacePoints
 from ..domains.display import Displayed, to_pyvista
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
@@ -194,6 +195,27 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     def restrict(self) -> VertexField[EmbeddedSurface]:
         """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself."""
         return self._embedded
+
+    def subdivided(self) -> VertexField[EmbeddedSurface]:
+        """φ on flat pieces of the surface, on each of which it is linear, to draw, save or measure in space.
+
+        Where φ was computed on an intrinsic triangulation of the mesh (`finer`), these are the polygons of their
+        `common_subdivision`, whose first vertices are those of the mesh; elsewhere the field is returned as it is.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> strip = sh.TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> phi = sh.SignedHeatSolver(strip, intrinsic=True).distance(strip.polyline([[4, 0, 0], [4, 1, 0]]))
+        >>> len(phi.subdivided().values) > len(phi.values)
+        True
+        """
+        fine = self.finest
+        if not isinstance(fine.domain, IntrinsicTriangulation):
+            return self._embedded
+        polygons, interpolate = common_subdivision(fine.domain)
+        unused = np.diff(interpolate.indptr) == 0
+        return VertexField(polygons, np.where(unused, np.nan, interpolate @ fine.values), self.diagnostics)
 
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values)) for f in (np.fmin, np.fmax))

@@ -91,6 +91,8 @@ def _(field: TetField, plotter: Any) -> None:
 @add.register(VertexField)
 @add.register(PiecewiseField)
 def _(field: VertexField | PiecewiseField, plotter: Any) -> None:
+    if isinstance(field, VertexField):
+        field = field.subdivided()
     surface, look = field.to_pyvista(), _look(field.values)
     _add_colors(plotter, surface, look, point_size=6, render_points_as_spheres=True)
     if surface.faces.size:

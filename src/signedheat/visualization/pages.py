@@ -109,7 +109,7 @@ def _(shape: PointCloud) -> dict[str, Any]:
 
 @shown.register
 def _(field: VertexField) -> dict[str, Any]:
-    simple = on_simple_surface(field)
+    simple = on_simple_surface(field.subdivided())
     domain: Any = simple.domain
     if isinstance(domain, PointCloud):
         return _mesh(_in_space(domain.points), np.empty((0, 3), dtype=np.int64), simple.values)

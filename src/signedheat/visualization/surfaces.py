@@ -60,10 +60,10 @@ def draw_surface(
     up: int = 2,
 ) -> None:
     """Draw into axes, with a colour bar. `view` is a direction from the surface to the eye."""
-    field = field.restrict()
+    own, field = field.restrict().domain.triangulation, field.subdivided()
     mesh, values = field.domain.triangulation, field.domain.on_triangulation(field.values)
     flat = [item for source in sources for item in (source if isinstance(source, Sequence) else [source])]
-    direction = toward_sources(mesh, flat, up) if view is None else view
+    direction = toward_sources(own, flat, up) if view is None else view
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
     corners = camera.pixels(mesh.vertices)[mesh.faces]
     depth, face, phi = rasterize(corners, values[mesh.faces], camera.width, camera.height)
@@ -79,7 +79,7 @@ def draw_surface(
         darken(image, phi, known, step)
     axes.imshow(image, origin="lower", interpolation="antialiased")
     for item in flat:
-        draw_source(axes, item, mesh, camera, depth)
+        draw_source(axes, item, own, camera, depth)
     axes.set_axis_off()
     add_color_bar(axes.figure, [axes], colors, isolines, step)
 

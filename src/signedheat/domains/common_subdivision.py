@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from ..domains.intrinsic_triangulation import IntrinsicTriangulation
-from ..domains.polygon_mesh import PolygonMesh
 from ..errors import GeometryError
 from ..geometry.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
+from .intrinsic_triangulation import IntrinsicTriangulation
+from .polygon_mesh import PolygonMesh
 
 
 def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMesh, csr_matrix]:
