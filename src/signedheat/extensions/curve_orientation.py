@@ -16,7 +16,6 @@ from ..errors import UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.curve_segments import interpolation_at
 from ..geometry.synchronization import synchronize_signs
-from ..linear import factorize
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..reprs import ShortRepr
 
@@ -40,7 +39,7 @@ class CurveOrientation(Frozen, ShortRepr):
         Which of them were turned.
     agreement : (k,) float
         How well each is completed by others: 1 if pieces begin where it ends and end where it begins, about 0 if it
-        lies by itself, as spurious pieces often do; 1 for closed curves, unoriented ones and points.
+        lies by itself, as spurious pieces often do; 1 for what has no ends of its own.
     """
 
     curves: list[CurveOrPoints]
@@ -61,7 +60,8 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain) ->
     from its pairwise terms (`synchronize_signs`), to which every piece adds a weak vote for its own direction. Only
     ends count, so that curves that run beside each other hardly disturb, unless their gaps lie side by side.
 
-    Curves that are complete, unoriented curves and points stay as they are. Pieces of different curves that are far
+    Curves that are closed, those from boundary to boundary of the surface, unoriented curves and points stay as they
+    are. Pieces of different curves that are far
     from each other have the direction that most of their length was given with.
 
     Takes one factorisation, and one solve for each piece.
@@ -95,59 +95,102 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain) ->
             f"curves are oriented on surfaces, not on a {type(domain).__name__}", element="domain"
         )
     listed = list(curves)
+    votes = Votes.of(surface, listed)
     turned, agreement = np.zeros(len(listed), dtype=bool), np.ones(len(listed))
-    pieces = [k for k, curve in enumerate(listed) if isinstance(curve, Curve) and curve.oriented and not curve.closed]
-    if len(pieces) > 1:
-        charges, lengths = _charges(surface, [listed[k] for k in pieces])
-        votes, own = _votes(surface, charges)
-        signs = _signs(votes, lengths)
-        turned[pieces] = signs < 0
-        agreed = votes.multiply(signs[:, None]).multiply(signs[None])
-        agreement[pieces] = np.clip(np.asarray(agreed.sum(axis=1)).ravel() / np.maximum(own, 1e-300), 0.0, 1.0)
-    made = [_turned(curve) if turn else curve for curve, turn in zip(listed, turned, strict=True)]
-    return CurveOrientation(made, turned, agreement)
+    if len(votes.pieces) > 1:
+        signs, agreement[votes.pieces] = votes.counted()
+        turned[votes.pieces] = signs < 0
+    return CurveOrientation(with_turned(listed, turned), turned, agreement)
+
+
+def with_turned(curves: Sequence[CurveOrPoints], turned: NDArray[np.bool_]) -> list[CurveOrPoints]:
+    """The curves, some with their positive side negative."""
+    return [_turned(curve) if turn else curve for curve, turn in zip(curves, turned, strict=True)]
 
 
 def _turned(curve: CurveOrPoints) -> CurveOrPoints:
-    """A curve with its positive side negative."""
     assert isinstance(curve, Curve)
     if curve.normals is None:
         return curve.reversed()
     return Curve(curve.faces, curve.barycentric, curve.closed, curve.oriented, -curve.normals)
 
 
+@dataclass(frozen=True, eq=False)
+class Votes:
+    """What the pieces of curves tell about each other's directions.
+
+    Attributes
+    ----------
+    pieces : (k,) int
+        Which of the curves are pieces: oriented, open, and not from boundary to boundary of the surface.
+    inner : (k,) bool
+        Whether both ends of a piece lie away from the boundary.
+    pairs : (k, k) sparse
+        Minus ``⟨q_i, C⁻¹ q_j⟩``, the strongest in each row: positive if the directions of both agree.
+    own : (k,) float
+        ``⟨q_i, C⁻¹ q_i⟩``.
+    lengths : (k,) float
+        Of the pieces.
+    """
+
+    pieces: NDArray[np.int64]
+    inner: NDArray[np.bool_]
+    pairs: sparse.csr_matrix
+    own: NDArray[np.float64]
+    lengths: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Votes:
+        """Ask all pieces: one solve with the factor of C for each."""
+        is_open = [k for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented and not c.closed]
+        none = np.empty(0)
+        if len(is_open) < 2:
+            return cls(none.astype(np.int64), none.astype(bool), sparse.csr_matrix((0, 0)), none, none)
+        charges, lengths, outer = _charges(surface, [curves[k] for k in is_open])
+        asked = np.flatnonzero(outer < 2)
+        pairs, own = _pairs(surface, sparse.csr_matrix(charges[asked]))
+        return cls(np.array(is_open)[asked], outer[asked] == 0, pairs, own, lengths[asked])
+
+    def counted(self, among: NDArray[np.int64] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(j,) directions ±1 relative to those given, and (j,) agreement, of some of the pieces with each other."""
+        chosen = np.arange(len(self.pieces)) if among is None else among
+        pairs = sparse.csr_matrix(self.pairs[chosen][:, chosen])
+        signs = _signs(pairs, self.lengths[chosen])
+        agreed = np.asarray(pairs.multiply(signs[:, None]).multiply(signs[None]).sum(axis=1)).ravel()
+        return signs, np.clip(agreed / np.maximum(self.own[chosen], 1e-300), 0.0, 1.0)
+
+
 def _charges(
     surface: SurfaceDiscretization, pieces: Sequence[CurveOrPoints]
-) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
-    """(k, n) q: +1 where each piece ends, −1 where it begins, with its positive side to its left; and (k,) lengths."""
-    rows, lengths = [], []
+) -> tuple[sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
+    """(k, n) q: +1 where each piece ends, −1 where it begins, with its positive side to its left; (k,) lengths; and
+    (k,) how many of its ends lie on the boundary of the surface.
+    """
+    rows, lengths, outer = [], [], []
+    at_boundary = np.zeros(surface.triangles.n_vertices, dtype=bool)
+    edges = surface.triangles.edges
+    at_boundary[edges.vertices[edges.face_counts == 1]] = True
     for piece in pieces:
         assert isinstance(piece, Curve)
         ((part,),) = surface.segments([[piece]])
-        at = interpolation_at(surface.triangles, part.nodes[np.array([part.ends[0, 0], part.ends[-1, 1]])])
+        tips = part.nodes[np.array([part.ends[0, 0], part.ends[-1, 1]])]
+        at = interpolation_at(surface.triangles, tips)
         right = False
         if piece.normals is not None:
             ((plain,),) = surface.segments([[Curve(piece.faces, piece.barycentric)]])
             right = (np.conj(plain.vectors) * part.vectors).real.sum() < 0
         rows.append(at[0] - at[1] if right else at[1] - at[0])
         lengths.append(part.lengths.sum())
-    return sparse.csr_matrix(sparse.vstack(rows)), np.array(lengths)
+        outer.append(sum(bool(at_boundary[at[k].indices].all()) for k in (0, 1)))
+    return sparse.csr_matrix(sparse.vstack(rows)), np.array(lengths), np.array(outer)
 
 
-def _votes(surface: SurfaceDiscretization, charges: sparse.csr_matrix) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
+def _pairs(surface: SurfaceDiscretization, charges: sparse.csr_matrix) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
     """(k, k) minus ``⟨q_i, C⁻¹ q_j⟩``, the strongest in each row; and (k,) ``⟨q_i, C⁻¹ q_i⟩``.
 
-    C is shifted by M / A, which changes nothing near a piece, and makes it definite.
+    The charges of a piece add up to zero, so that the constant up to which C⁻¹ is defined does not matter.
     """
-    triangles, k = surface.triangles, charges.shape[0]
-    masses = np.bincount(
-        triangles.corner_vertices.ravel(), np.repeat(triangles.face_areas / 3, 3), triangles.n_vertices
-    )
-    area = float(masses.sum())
-    factor = factorize(
-        sparse.csr_matrix(surface.stiffness + sparse.diags_array(np.maximum(masses / area, 1e-12))),
-        order=surface.vertex_order,
-    )
+    k, factor = charges.shape[0], surface.integration.factor
     own, rows, columns, values = np.empty(k), [], [], []
     for begin in range(0, k, BLOCK):
         block = np.arange(begin, min(begin + BLOCK, k))
@@ -159,6 +202,8 @@ def _votes(surface: SurfaceDiscretization, charges: sparse.csr_matrix) -> tuple[
         rows.append(np.repeat(block, order.shape[1]))
         columns.append(order.ravel())
         values.append(-np.take_along_axis(energy, order, axis=1).ravel())
+    if not rows:
+        return sparse.csr_matrix((0, 0)), own
     found = sparse.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(k, k))
     return found, own
 
