@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..constraints import Constraint
+from ..constraints import Constraint, EachComponent, LevelValues
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
 from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
@@ -12,15 +12,23 @@ from ..errors import GeometryError, SourceError
 from ..fields.vertex_field import VertexField
 from ..progress import Progress
 from ..solver import SignedHeatSolver, as_list
+from .curve_pieces import distance_to_pieces
 
 
 def close_curves(
-    domain: SurfaceDomain, curves: CurvesAndPoints, *, diffusion: float = 1.0, constraint: Constraint | None = None
+    domain: SurfaceDomain,
+    curves: CurvesAndPoints,
+    *,
+    diffusion: float = 1.0,
+    constraint: Constraint | None = None,
+    as_oriented: bool = False,
+    every_piece: bool = False,
 ) -> list[Curve]:
     """Complete broken curves: the zero set of the signed distance to them, which has no gaps.
 
     On triangle meshes the method runs on an intrinsic triangulation along whose edges the curves run, so that curves
-    may be smaller than the triangles, and the result follows them where they are there.
+    may be smaller than the triangles, and the result follows them where they are there. Pieces are first turned until
+    they agree, and those left out that belong to no other, as by `curve_distance`.
 
     Parameters
     ----------
@@ -31,7 +39,12 @@ def close_curves(
     diffusion : float
         τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18).
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-        Imposed on φ at the curves; with `ZeroSet`, the default, the result passes through them.
+        Imposed on φ at the curves; with `ZeroSet`, the default, the result passes through them. With `EachComponent`
+        and `LevelValues` curves are taken as given.
+    as_oriented : bool
+        Turn no curve, and leave none out.
+    every_piece : bool
+        Leave no curve out.
 
     Returns
     -------
@@ -60,7 +73,7 @@ def close_curves(
     """
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
     refuse_without_sides(listed)
-    return conforming_distance(domain, listed, constraint, diffusion).contour(0.0)
+    return conforming_distance(domain, listed, constraint, diffusion, None, as_oriented, every_piece).contour(0.0)
 
 
 def conforming_distance(
@@ -69,18 +82,26 @@ def conforming_distance(
     constraint: Constraint | None,
     diffusion: float,
     progress: Progress | None = None,
+    as_oriented: bool = False,
+    every_piece: bool = False,
 ) -> VertexField:
     """Distance on triangles that have the curves along their edges, so that none is too small to be seen.
 
     Other domains than triangle meshes, and meshes too thin to be triangulated anew, are taken as they are.
     """
+    own_levels = isinstance(constraint, EachComponent | LevelValues)
+
+    def measured(solver: SignedHeatSolver[SurfaceDomain]) -> VertexField:
+        if as_oriented or own_levels:
+            return solver.distance(curves, constraint)
+        return distance_to_pieces(solver, curves, constraint, every_piece)[0]
+
     if isinstance(domain, TriangleMesh):
         try:
-            return SignedHeatSolver(domain, diffusion, progress, intrinsic=True).distance(curves, constraint)
+            return measured(SignedHeatSolver(domain, diffusion, progress, intrinsic=True))
         except GeometryError:
             pass
-    field: VertexField = SignedHeatSolver(domain, diffusion, progress).distance(curves, constraint)
-    return field
+    return measured(SignedHeatSolver(domain, diffusion, progress))
 
 
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:

@@ -11,6 +11,7 @@ from ..errors import ConstraintError
 from ..fields.vertex_field import VertexField
 from ..progress import Progress
 from ..solver import SignedHeatSolver
+from .curve_pieces import distance_to_pieces
 from .sharpening import sharpen
 
 
@@ -21,12 +22,16 @@ def curve_distance(
     constraint: Free | ZeroSet | Soft | None = None,
     diffusion: float = 1.0,
     intrinsic: bool | Literal["auto"] = "auto",
+    as_oriented: bool = False,
+    every_piece: bool = False,
     progress: Progress | None = None,
 ) -> VertexField[AnySurface]:
     """Signed distance to curves and points on a surface, however broken, however they cross the faces.
 
-    The signed heat method (`SignedHeatSolver`) tells the sides and completes what is missing; then distance is measured
-    along the surface, exactly, to the curves themselves and to what completes them (`sharpen`).
+    Pieces of broken curves are turned until they agree (`orient`), and those are left out that neither continue others
+    nor lie on what completes these. The signed heat method (`SignedHeatSolver`) tells the sides and completes what is
+    missing; then distance is measured along the surface, exactly, to the curves themselves and to what completes them
+    (`sharpen`).
 
     Parameters
     ----------
@@ -40,13 +45,18 @@ def curve_distance(
         τ in ``t = τ h²``: larger values close gaps along rounder lines.
     intrinsic : "auto", True or False
         On what triangles the method runs: see `SignedHeatSolver`.
+    as_oriented : bool
+        Turn no curve, and leave none out.
+    every_piece : bool
+        Leave no curve out.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
     Returns
     -------
     VertexField
-        φ, with a note `diagnostics.SharpenedToCurves` in its diagnostics: how much was completed.
+        φ, with a note `diagnostics.SharpenedToCurves` in its diagnostics: how much was completed. If curves were turned
+        or left out, a note `CurvesTaken` says which; for those left out there is an `InexactWarning`.
 
     Raises
     ------
@@ -71,6 +81,10 @@ def curve_distance(
             remedy="use SignedHeatSolver.distance",
         )
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
-    field = SignedHeatSolver(domain, diffusion, share, intrinsic).distance(curves, constraint)
+    solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
+    if as_oriented:
+        field, taken = solver.distance(curves, constraint), curves
+    else:
+        field, taken = distance_to_pieces(solver, curves, constraint, every_piece)
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
-    return sharpen(field, curves, progress=rest)
+    return sharpen(field, taken, progress=rest)

@@ -1,0 +1,105 @@
+"""Pieces of broken curves: turned where they disagree, left out where they belong to nothing."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.surfaces import disk
+from signedheat.extensions.curve_pieces import CurvesTaken
+from signedheat.samples import sphere
+
+
+def circle(mesh: sh.TriangleMesh, radius: float, begin: float, end: float) -> sh.Curve:
+    """An arc round the origin of the plane, in turns."""
+    angle = 2 * np.pi * np.linspace(begin, end, 12)
+    return mesh.polyline(radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+
+
+@pytest.fixture(scope="module")
+def mesh() -> sh.TriangleMesh:
+    return disk(24)
+
+
+@pytest.fixture(scope="module")
+def pieces(mesh) -> list[sh.Curve]:
+    """A circle of radius 0.6 in six pieces, with gaps of a fifth of their length."""
+    return [circle(mesh, 0.6, k / 6, k / 6 + 5 / 36) for k in range(6)]
+
+
+def taken(field: sh.VertexField) -> tuple[list[int], list[int]]:
+    note = field.diagnostics.note(CurvesTaken)
+    return ([], []) if note is None else (note.turned.tolist(), note.left_out.tolist())
+
+
+def test_turned_pieces_make_no_difference(mesh, pieces):
+    right = sh.curve_distance(mesh, pieces)
+    given = [*pieces[:2], pieces[2].reversed(), *pieces[3:]]
+    phi = sh.curve_distance(mesh, given)
+    assert taken(right) == ([], [])
+    assert taken(phi) == ([2], [])
+    assert str(phi.diagnostics.note(CurvesTaken)) == "curves turned: 1, the first of them number 2"
+    assert np.abs(phi.values - right.values).max() < 1e-9
+    exact = 0.6 - np.linalg.norm(mesh.vertices, axis=1)
+    assert np.abs(phi.values - exact).max() < 0.05
+    assert np.abs(sh.curve_distance(mesh, given, as_oriented=True).values - exact).max() > 0.2
+
+
+def test_a_spurious_piece_is_left_out_with_a_warning(mesh, pieces):
+    spurious = mesh.polyline([[-0.1, 0.05, 0], [0.2, 0.1, 0]])
+    right = sh.curve_distance(mesh, pieces)
+    with pytest.warns(sh.InexactWarning, match="number 3"):
+        phi = sh.curve_distance(mesh, [*pieces[:3], spurious, *pieces[3:]])
+    assert taken(phi) == ([], [3])
+    assert np.abs(phi.values - right.values).max() < 1e-9
+    for option in ("every_piece", "as_oriented"):
+        all_of_them = sh.curve_distance(mesh, [spurious, *pieces], **{option: True})
+        assert taken(all_of_them)[1] == []
+        assert np.abs(all_of_them.values).min() < 0.02
+        assert np.abs(all_of_them.values[np.linalg.norm(mesh.vertices, axis=1) < 0.05]).max() < 0.2
+
+
+def test_closing_leaves_it_out_too(mesh, pieces):
+    spurious = mesh.polyline([[-0.1, 0.05, 0], [0.2, 0.1, 0]])
+    with pytest.warns(sh.InexactWarning):
+        (whole,) = sh.close_curves(mesh, [pieces[0].reversed(), spurious, *pieces[1:]])
+    at = np.einsum("nk,nkd->nd", whole.barycentric, mesh.vertices[mesh.faces[whole.faces]])
+    assert whole.closed
+    assert np.abs(np.linalg.norm(at, axis=1) - 0.6).max() < 0.05
+
+
+def test_what_is_part_of_nothing_larger_stays(mesh):
+    """Two strokes apart, and a stroke beside a closed curve: nothing tells that one of them is wrong."""
+    strokes = [mesh.polyline([[x, -0.2, 0], [x, 0.2, 0]]) for x in (-0.6, 0.5)]
+    ring = mesh.polyline([[0.3, 0, 0], [0, 0.3, 0], [-0.3, 0, 0], [0, -0.3, 0]], closed=True)
+    for curves in (strokes, [ring, strokes[0]]):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            phi = sh.curve_distance(mesh, curves)
+        assert taken(phi)[1] == []
+        for curve in curves:
+            assert np.abs(phi(curve)).max() < 0.06
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_piece_is_left_out_where_half_of_the_curve_is_gone(seed):
+    mesh, rng = sphere(4), np.random.default_rng(seed)
+    curve = mesh.level_set(mesh.vertices @ [0.1, 0.2, 1.0] + 0.1 * np.sin(4 * mesh.vertices[:, 0]), 0.3)[0]
+    ends = np.cumsum(rng.uniform(0.5, 1.5, 20))
+    ends = (ends / ends[-1] * (curve.n_points - 1)).astype(int)
+    pieces = [
+        sh.Curve(curve.faces[a : b + 1], curve.barycentric[a : b + 1])
+        for a, b in zip(ends[:-1:2], ends[1::2], strict=True)
+    ]
+    assert taken(sh.curve_distance(mesh, pieces)) == ([], [])
+
+
+def test_lines_from_rim_to_rim_are_complete(mesh):
+    """Parallel lines that face the same way contradict each other between them; they are taken as they are."""
+    lines = [mesh.level_set(mesh.vertices[:, 0] - x)[0] for x in (-0.31, 0.32)]
+    found = sh.curve_orientation(lines, mesh)
+    assert not found.turned.any()
+    assert (found.agreement == 1).all()
