@@ -4,7 +4,7 @@ Closed curves on five generated meshes, one with a handle, are cut into about tw
 of the length gone in random intervals; pieces moved across themselves by a normal deviate of one mean edge length;
 10 or 30 % of the pieces turned; four spurious pieces. Truth is exact distance to the whole curve. Ways:
 
-* one call: `sh.curve_distance` of what `sh.orient` makes of the pieces
+* one call: `sh.curve_distance`
 * heat: `SignedHeatSolver.distance` of the pieces as they are; zero set: that, sharpened to its own zero set
 * potpourri3d: as heat
 * nearest: exact distance to the pieces, with the side of the nearest segment
@@ -21,6 +21,7 @@ from __future__ import annotations
 import argparse
 import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 import potpourri3d as pp3d
@@ -48,11 +49,18 @@ DAMAGES = {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--meshes", nargs="+", help="names of some of them; by default all")
+    parser.add_argument("--errors", help="where errors are kept (.npz); those that it holds are counted too")
     parser.add_argument("--picture", help="where to draw one case of each mesh")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore", sh.InexactWarning)
     begin, shown, errors = time.perf_counter(), {}, {}
+    kept = Path(arguments.errors) if arguments.errors else None
+    if kept and kept.exists():
+        errors = {tuple(key.split("|")): found.tolist() for key, found in np.load(kept).items()}
     for name, (mesh, heights) in meshes().items():
+        if arguments.meshes and name not in arguments.meshes:
+            continue
         curve = max(mesh.level_set(heights, 0.0), key=lambda c: c.n_points)
         region = np.sign(heights) if name != "torus" else np.sign(sh.curve_distance(mesh, curve).values)
         truth = region * unsigned(mesh, [curve])
@@ -66,6 +74,8 @@ def main() -> None:
                 if damage == "moved" and seed == 0:
                     shown[name] = mesh, pieces, solver.distance(pieces).values, truth
         print(f"{name}: {time.perf_counter() - begin:.0f} s", flush=True)
+        if kept:
+            np.savez(kept, **{"|".join(key): found for key, found in errors.items()})
     ways = list(dict.fromkeys(way for _, way in errors))
     print(f"{'median / worst, %':>18}" + "".join(f"{way:>18}" for way in ways))
     for damage in DAMAGES:
@@ -89,7 +99,7 @@ def answers(mesh, solver, peer, pieces) -> dict[str, np.ndarray]:
     except (RuntimeError, ValueError):
         theirs = np.full(mesh.n_vertices, np.nan)
     return {
-        "one call": sh.curve_distance(mesh, sh.orient(pieces, mesh)).values,
+        "one call": sh.curve_distance(mesh, pieces).values,
         "heat": heat.values,
         "zero set": sh.sharpen(heat).values,
         "potpourri3d": theirs,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -113,3 +114,34 @@ def test_fields_on_surfaces_can_be_contoured_viewed_and_told_about(files, capsys
     assert json.loads(capsys.readouterr().out)["kind"] == "VertexField"
     assert main(["view", field, "-o", str(files / "view.png")]) == 0
     assert (files / "view.png").stat().st_size > 20_000
+
+
+def test_turned_pieces_are_told_and_left_with_as_oriented(tmp_path, capsys):
+    mesh = sphere(3)
+    ring = mesh.level_set(mesh.vertices[:, 2], 0.2)[0]
+    cuts = np.linspace(0, ring.n_points, 5).astype(int)
+    runs = [np.arange(a, b - 3) for a, b in pairwise(cuts)]
+    pieces = [sh.Curve(ring.faces[run], ring.barycentric[run]) for run in runs]
+    mesh.save(tmp_path / "ball.ply")
+    sh.write_curves(tmp_path / "pieces.json", [pieces[0], pieces[1].reversed(), *pieces[2:]], mesh)
+    arguments = ["surface", str(tmp_path / "ball.ply"), str(tmp_path / "pieces.json"), "-o", str(tmp_path / "phi.ply")]
+    assert main([*arguments, "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert (summary["turned"], summary["left_out"]) == ([1], [])
+    assert main(arguments) == 0
+    assert "curves turned: 1, the first of them number 1" in capsys.readouterr().out
+    assert main([*arguments, "--as-oriented", "--json"]) == 0
+    assert "turned" not in json.loads(capsys.readouterr().out)
+
+
+def test_a_refined_field_is_written_on_its_pieces(tmp_path):
+    square(3).save(tmp_path / "square.ply")
+    mesh = sh.read(tmp_path / "square.ply")
+    sh.write_curves(tmp_path / "line.json", mesh.polyline([[0.3, 0.2, 0], [0.4, 0.6, 0]]), mesh)
+    arguments = ["surface", str(tmp_path / "square.ply"), str(tmp_path / "line.json"), "--intrinsic"]
+    for name, options in (("own", []), ("pieces", ["--subdivide", "--preview", str(tmp_path / "p.png"), "--up", "y"])):
+        assert main([*arguments, "-o", str(tmp_path / f"{name}.npz"), *options]) == 0
+    own, pieces = (np.load(tmp_path / f"{name}.npz") for name in ("own", "pieces"))
+    assert len(own["values"]) == mesh.n_vertices < len(pieces["values"])
+    assert (pieces["vertices"][: mesh.n_vertices] == own["vertices"]).all()
+    assert np.allclose(pieces["values"][: mesh.n_vertices], own["values"], atol=1e-12)

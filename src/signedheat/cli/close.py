@@ -10,7 +10,7 @@ from ..solver import SignedHeatSolver
 from ..visualization import ensure_picture_writable, save_surface
 from .computing import Summary, constraint_of, prefix_errors
 from .progress import ProgressBar
-from .surface import surface_and_curves
+from .surface import numbered, pieces_told, surface_and_curves
 
 
 def run(arguments: Namespace) -> Summary:
@@ -25,11 +25,19 @@ def run(arguments: Namespace) -> Summary:
         if arguments.plain and not arguments.intrinsic:
             field = SignedHeatSolver(surface, arguments.diffusion, progress).distance(curves, constraint)
         else:
-            field = conforming_distance(surface, curves, constraint, arguments.diffusion, progress)
+            field = conforming_distance(
+                surface,
+                curves,
+                constraint,
+                arguments.diffusion,
+                progress,
+                arguments.as_oriented,
+                arguments.every_piece,
+            )
         found = field.contour(0.0)
     write_curves(arguments.output, found, surface)
     if arguments.preview:
-        save_surface(field, arguments.preview, found)
+        save_surface(field, arguments.preview, found, up="xyz".index(arguments.up))
     closed = sum(curve.closed for curve in found)
     summary = {
         "mesh": arguments.mesh,
@@ -39,4 +47,5 @@ def run(arguments: Namespace) -> Summary:
         "n_closed": closed,
     }
     curve = "curve" if len(found) == 1 else "curves"
-    return summary, f"{arguments.output}: {len(found)} {curve}, {closed} of them closed"
+    text = f"{arguments.output}: {len(found)} {curve}, {closed} of them closed"
+    return summary | numbered(field), text + pieces_told(field)

@@ -12,6 +12,7 @@ from ..diagnostics import LargeAngles, SharpenedToCurves
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..extensions.curve_distance import curve_distance
+from ..extensions.curve_pieces import CurvesTaken
 from ..fields.vertex_field import VertexField
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.globe import read_globe_curves
@@ -49,6 +50,8 @@ def measured(surface: Any, curves: Any, arguments: Namespace) -> VertexField:
                 constraint=constraint,
                 diffusion=arguments.diffusion,
                 intrinsic=intrinsic,
+                as_oriented=arguments.as_oriented,
+                every_piece=arguments.every_piece,
                 progress=progress,
             )
     return field
@@ -73,6 +76,18 @@ def advice(field: VertexField) -> str:
     return f"; {note}: --intrinsic is more accurate" if note else ""
 
 
+def numbered(field: VertexField) -> dict[str, Any]:
+    """Numbers of the curves that were turned, and of those that were left out, for the summary."""
+    note = field.diagnostics.note(CurvesTaken)
+    return {"turned": note.turned.tolist(), "left_out": note.left_out.tolist()} if note else {}
+
+
+def pieces_told(field: VertexField) -> str:
+    """The same in words, or nothing."""
+    note = field.diagnostics.note(CurvesTaken)
+    return f"; {note}" if note else ""
+
+
 def run(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute, write."""
     ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
@@ -80,7 +95,7 @@ def run(arguments: Namespace) -> Summary:
         ensure_picture_writable(arguments.preview)
     surface, curves = surface_and_curves(arguments)
     field = measured(surface, curves, arguments)
-    field.save(arguments.output)
+    (field.subdivided() if arguments.subdivide else field).save(arguments.output)
     low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
     summary = {
         "mesh": arguments.mesh,
@@ -101,13 +116,13 @@ def run(arguments: Namespace) -> Summary:
         lines = [curve for level in levels for curve in field.contour(float(level))]
         write_curves(summary["contours"], lines, surface)
     if arguments.preview:
-        save_surface(field, arguments.preview, curves, arguments.contours or 20)
+        save_surface(field, arguments.preview, curves, arguments.contours or 20, "xyz".index(arguments.up))
     text = f"{arguments.output}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
     if summary["unreached"]:
         text += f", {summary['unreached']} vertices without any source"
     if note and note.completed_length > 0:
         text += f", {note.completed_length:.1%} of the curve completed"
-    return summary, text + advice(field)
+    return summary | numbered(field), text + pieces_told(field) + advice(field)
 
 
 def read_surface(path: str) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .options import add_command
+from .options import add_command, add_up_option
 from .surface import add_curves_and_output
 
 
@@ -19,3 +19,4 @@ def add_to(commands: Any) -> None:
     )
     add_curves_and_output(parser, "completed curves: .txt .obj .json")
     parser.add_argument("--preview", metavar="PNG", help="draw the distance, with the completed curves")
+    add_up_option(parser)

@@ -104,6 +104,11 @@ def units(word: str) -> str:
     return word
 
 
+def add_up_option(parser: Parser) -> None:
+    """Add the option for pictures in space."""
+    parser.add_argument("--up", choices="xyz", default="z", help="axis that points upwards in the picture (z)")
+
+
 def add_label_option(parser: Parser) -> None:
     """Add the option for images of labels."""
     parser.add_argument(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .options import Parser, add_command, constraint, finite, positive, whole_number
+from .options import Parser, add_command, add_up_option, constraint, finite, positive, whole_number
 
 
 def add_to(commands: Any) -> None:
@@ -20,7 +20,14 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--contours", type=whole_number(1), metavar="N", help="write N isolines beside the output, as OUT.contours.obj"
     )
+    parser.add_argument(
+        "--subdivide",
+        action="store_true",
+        help="write the flat pieces of the surface on which the field is linear, where it was computed on better "
+        "triangles than those of the mesh, whose vertices come first",
+    )
     parser.add_argument("--preview", metavar="PNG", help="draw the result")
+    add_up_option(parser)
 
 
 def add_curves_and_output(parser: Parser, output: str) -> None:
@@ -57,7 +64,13 @@ def add_curves_and_output(parser: Parser, output: str) -> None:
         "better triangles where the mesh has large angles",
     )
     parser.add_argument(
-        "--plain", action="store_true", help="the method's own field, not measured to the curves themselves"
+        "--plain",
+        action="store_true",
+        help="the method's own field, of the curves as they are given, not measured to the curves themselves",
+    )
+    parser.add_argument("--as-oriented", action="store_true", help="turn no curve, and leave none out")
+    parser.add_argument(
+        "--every-piece", action="store_true", help="leave out no piece, also if it belongs to none of the others"
     )
 
 

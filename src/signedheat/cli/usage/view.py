@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .options import add_command
+from .options import add_command, add_up_option
 
 
 def add_to(commands: Any) -> None:
@@ -18,7 +18,7 @@ def add_to(commands: Any) -> None:
         "outsides yellow, insides red.",
     )
     parser.add_argument("file", metavar="FILE", help="a shape or a field")
-    parser.add_argument("--up", choices="xyz", default="z", help="axis that points upwards (default: z)")
+    add_up_option(parser)
     parser.add_argument(
         "-o", "--output", metavar="FILE", help="page: .html; picture: .png .pdf .svg .jpg (a window, or FILE.html here)"
     )
