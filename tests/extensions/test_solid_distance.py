@@ -5,7 +5,16 @@ import pytest
 
 from refusals import refused
 from shapes.bodies import box, sheet, turned
-from signedheat import Grid, PolygonMesh, SourceError, TriangleMesh, samples, signed_distance, solid_distance
+from signedheat import (
+    Grid,
+    PointCloud,
+    PolygonMesh,
+    SourceError,
+    TriangleMesh,
+    samples,
+    signed_distance,
+    solid_distance,
+)
 from signedheat.diagnostics import BoundsNothing, CompletedArea, LeftOut, ReachesBox, ShapeOriented
 
 
@@ -191,3 +200,49 @@ def test_the_same_bits_again():
     holed = samples.without_patches(samples.torus(n_around=48, n_across=24), 4, 0.3)
     one, other = (solid_distance(holed, resolution=40) for _ in range(2))
     assert np.array_equal(one.values, other.values)
+
+
+def bracket():
+    """An L of 24 faces, far larger than a cell."""
+    outline = [(0, 0), (3, 0), (3, 0.4), (0.4, 0.4), (0.4, 2), (0, 2), (0.2, 0.2)]  # and a place that sees all of it
+    vertices = np.array([(x, y, z) for z in (0.0, 1.0) for x, y in outline])
+    faces = []
+    for a, b in ((k, (k + 1) % 6) for k in range(6)):
+        faces += [[a, b, 7 + b], [a, 7 + b, 7 + a], [6, b, a], [13, 7 + a, 7 + b]]
+    return TriangleMesh(vertices, faces)
+
+
+@pytest.mark.parametrize("missing", [[1, 19, 20, 21], [3, 4, 5, 6], [0, 5, 14, 22]])
+def test_small_holes_are_not_filled_to_the_walls_of_the_box(missing):
+    """What φ < 0 fills through a missing face of an L may run on to the box, where winding numbers are small."""
+    whole = bracket()
+    grid = Grid.around(whole.bounds, 48)
+    truth = solid_distance(whole, grid).values
+    broken = solid_distance(only(whole, np.delete(np.arange(24), missing)), grid).values
+    assert not (broken[truth > 0.25] < 0).any()
+
+
+def test_points_on_a_plate_thinner_than_a_cell_invent_no_solid():
+    """Heat from both sides cancels: winding numbers tell that it is outside everywhere, and the points how far."""
+    half, rng = np.array([1.0, 0.65, 0.01]), np.random.default_rng(0)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    flat = rng.uniform(-half, half, size=(4000, 3))
+    flat[:, 2] = np.where(np.arange(4000) % 2, 1, -1) * half[2]
+    normals = np.stack([np.zeros(4000), np.zeros(4000), np.sign(flat[:, 2])], axis=1)
+    field = solid_distance(PointCloud(flat @ turn.T, normals @ turn.T), resolution=48)
+    truth = distance_to_boxes(field.grid.points @ turn, [(-half, half)])
+    cell = field.grid.spacing[0]
+    assert not (field.values[truth > 2 * cell] < 0).any()
+    assert np.abs(np.abs(field.values) - np.abs(truth)).max() < 4 * cell  # at the rim, where φ still tells sides
+
+
+def test_half_of_the_points_of_a_ball_make_no_second_ball():
+    """Where points are missing φ < 0 runs on to the box, and winding numbers keep it from there."""
+    normals = np.random.default_rng(1).normal(size=(1500, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals[:, 2] = -np.abs(normals[:, 2])
+    grid = Grid.around([[-1.0] * 3, [1.0] * 3], 40)
+    field = solid_distance(PointCloud(normals, normals), grid)
+    away = np.linalg.norm(grid.points, axis=-1) - 1.0
+    assert not (field.values[away > 0.3] < 0).any()
+    assert (field.values[(away < -0.2) & (grid.points[..., 2] < 0)] < 0).all()

@@ -19,7 +19,7 @@ from ..errors import SourceError
 from ..geometry.face_features import FaceFeatures
 from ..operators.grid.closest_points import crossed_edges, crossings_at
 from ..operators.grid.exact_surface import ExactSurface
-from ..operators.grid.fitted_points import REACH, fitted_to_points, mean_gap
+from ..operators.grid.fitted_points import REACH, fitted_to_points, mean_gap, points_as_crossings
 from ..operators.grid.layering import layered_faces
 from ..operators.grid.sampled_surface import FaceBand, sampled_surface, signed_distances
 
@@ -87,7 +87,7 @@ def assemble(
 ) -> Assembled:
     """Signed distance to shapes, and to the zero set of `sides` where they are missing.
 
-    1. The zero set is fitted to the points of clouds (`fitted_to_points`).
+    1. The zero set is fitted to the points of clouds (`fitted_to_points`); points far from it stand for themselves.
     2. Faces that lie in layers are left out (`layered_faces`), as all are where the fit is to be smooth.
     3. Crossings of the zero set farther than `FAR` cells from the others stand in for what is missing.
     4. All nodes find the nearest of both (`sampled_surface`), and the sides from faces nearby or from `sides`.
@@ -119,17 +119,13 @@ def assemble(
             sides = np.where(_around_faces(left_out, band), middle(), sides)
         features = FaceFeatures.of(features.vertices, features.faces[~left_out].astype(np.int64))
         band = FaceBand.of(features, grid.shape, steps)
-    edges = crossed_edges(sides[None])
-    n_edges = len(edges)
-    edges = edges[band.leave(edges, sides[None])]
-    crossings, points = np.empty((0, 18)), np.empty((0, 3))
-    if len(edges):
-        crossings = crossings_at(sides[None], edges, np.array([1.0, *steps]))
-        points = np.ascontiguousarray(crossings[:, 1:4])
-        completed = band.search(features, points, steps).distances > FAR * float(steps.max())
-        edges, crossings, points = edges[completed], crossings[completed], points[completed]
+    edges, crossings, completed = _missing(sides, features, band, steps)
     gaps = max((REACH * mean_gap(cloud.points) for cloud in clouds), default=0.0)
-    trusted = confidence_at(points, evidence, gaps)
+    for cloud in clouds if fit != "smooth" else []:
+        kept = _unreached(cloud.points - grid.origin, cloud.normals, crossings, gaps + FAR * float(steps.max()))
+        nodes, rows = points_as_crossings(*kept, steps, grid.shape)
+        edges, crossings = np.concatenate([edges, nodes]), np.concatenate([crossings, rows])
+    trusted = confidence_at(crossings[:, 1:4], evidence, gaps)
     nearby = sampled_surface(features, band, edges, crossings, steps)
     telling = telling_faces = None
     if tells is not None:
@@ -141,7 +137,33 @@ def assemble(
     values, confidence = signed_distances(nearby, sides < 0, trusted, telling)
     surface = ExactSurface(features, crossings, np.array(grid.origin), steps, telling_faces)
     share = float(left_out.mean()) if n_faces else 0.0
-    return Assembled(values, confidence, surface, share, len(edges) / n_edges if n_edges else 0.0)
+    return Assembled(values, confidence, surface, share, completed)
+
+
+def _missing(
+    sides: NDArray[np.float64], features: FaceFeatures, band: FaceBand, steps: NDArray[np.float64]
+) -> tuple[NDArray[np.int32], NDArray[np.float64], float]:
+    """Crossed edges of the zero set of `sides` farther than `FAR` cells from faces; crossings there; their share."""
+    edges = crossed_edges(sides[None])
+    n_edges = len(edges)
+    edges = edges[band.leave(edges, sides[None])]
+    if not len(edges):
+        return edges, np.empty((0, 18)), 0.0
+    crossings = crossings_at(sides[None], edges, np.array([1.0, *steps]))
+    points = np.ascontiguousarray(crossings[:, 1:4])
+    missing = band.search(features, points, steps).distances > FAR * float(steps.max())
+    return edges[missing], crossings[missing], float(missing.sum() / n_edges)
+
+
+def _unreached(
+    points: NDArray[np.float64], normals: NDArray[np.float64] | None, crossings: NDArray[np.float64], far: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points, and their normals, that the zero set keeps away from: of sheets, and of walls thinner than a cell."""
+    assert normals is not None
+    alone = np.ones(len(points), dtype=bool)
+    if len(crossings):
+        alone = scipy.spatial.cKDTree(crossings[:, 1:4]).query(points, workers=-1)[0] > far
+    return points[alone], normals[alone]
 
 
 def _around_faces(chosen: NDArray[np.bool_], band: FaceBand) -> NDArray[np.bool_]:

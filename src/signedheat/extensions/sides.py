@@ -32,6 +32,8 @@ REACH = 1.25
 """Cells before and behind a face at which its sides are looked up."""
 MISSING_SIDE = 0.2
 """Completed area, over that of the faces, from which a whole side is missing."""
+OPENING = 0.01
+"""The same of the flattest way to close it, across the opening: a small hole, too, may be filled to no end."""
 BOUNDING = 0.12
 """Mean winding number of both sides from which a face counts as bounding something: ½ on a solid, 0 on a sheet."""
 FILM = 0.7
@@ -259,18 +261,16 @@ def _fill_missing_sides(
         holes, bodies, present, scene.phi, scene.winding, scene.distance, scene.steps, FAR * scene.cell, LEVELS
     )
     budget = present * scene.trust
-    large = (owners > 0) & (areas[:, 0] > MISSING_SIDE * present[owners])
+    ends = np.minimum(at_walls, len(LEVELS) - 1)  # what fills the box has no end; leave room for offsets
+    large = (owners > 0) & (areas[np.arange(len(ends)), ends] > MISSING_SIDE * present[owners])
+    large &= areas.min(axis=1) > OPENING * present[owners]
     boxes = scipy.ndimage.find_objects(holes)
     for body in np.unique(owners[large]):
         own = np.flatnonzero(large & (owners == body))
         affordable = np.flatnonzero(areas[own].sum(axis=0) <= budget[body])
         if not len(affordable):
             continue
-        touching, close = at_walls[own].max(axis=0)
-        first = int(affordable[0])
-        if touching <= first < close:  # leave room for offsets
-            first = min(int(close), len(LEVELS) - 1)
-        level = LEVELS[first]
+        level = LEVELS[max(int(affordable[0]), int(ends[own].max()))]
         for hole in own:
             box = tuple(slice(max(0, part.start - 2), part.stop + 2) for part in boxes[hole - 1])
             near = scipy.ndimage.binary_dilation(holes[box] == hole, np.ones((3, 3, 3)), iterations=2)

@@ -29,6 +29,7 @@ from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
 from ..operators.grid.boundary_areas import distances_to_samples
 from ..operators.grid.face_values import values_at
+from ..operators.grid.fitted_points import mean_gap
 from ..operators.grid.line_winding import closed_winding_numbers
 from ..progress import Progress, Stopwatch, within
 from ..solver import SignedHeatSolver, checked
@@ -47,6 +48,8 @@ STEPS = 7
 """Steps that are timed."""
 BYTES_PER_NODE, BYTES_IF_CLOSED = 64, 36
 """Measured peak memory: of shapes with holes or overlaps, and of others, all of whose parts are closed."""
+GAPS = 1.5
+"""Mean gaps between points, besides `FAR` cells, within which φ tells the sides of a cloud."""
 BOUNDING = 0.22
 """Mean winding number of a face's two sides from which it tells inside from outside: 0 on a sheet, ½ on a solid, ¼ on
 one half a cell thick."""
@@ -315,7 +318,7 @@ def _sharpened(
 ) -> Assembled:
     """Distance to the shape; faces beside which nothing is solid do not tell sides. The fit is for closed shapes."""
     if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
-        return assemble([shape], grid, phi, "auto")
+        return assemble([shape], grid, _guarded(phi, sides, shape, grid), "auto")
     if phi is not None and closed:
         return assemble([shape], grid, sides.function, fit, _known(phi))
     refused = _widened(sides.refused)
@@ -330,6 +333,18 @@ def _sharpened(
         phi = np.where(refused, sides.function, phi)
     fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
     return assemble([shape], grid, sides.function, fit, None if phi is None else _known(phi), tells)
+
+
+def _guarded(phi: NDArray[np.float64], sides: Sides, cloud: PointCloud, grid: Grid) -> NDArray[np.float64]:
+    """φ of points, without the solids that it invents: farther from points than the gaps between them, sides tell."""
+    doubtful = (phi < 0) != sides.inside
+    if not doubtful.any():
+        return phi
+    nodes = np.argwhere(doubtful)
+    reach = GAPS * mean_gap(cloud.points) + FAR * float(grid.spacing.max())
+    away, _ = scipy.spatial.cKDTree(cloud.points).query(grid.origin + nodes * grid.spacing, workers=-1)
+    doubtful[tuple(nodes[away <= reach].T)] = False
+    return np.where(_widened(doubtful), sides.function, phi)
 
 
 def _known(phi: NDArray[np.float64]) -> Callable[[], NDArray[np.float64]]:

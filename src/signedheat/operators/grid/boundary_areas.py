@@ -82,8 +82,8 @@ def completion_areas(
         By hole and level.
     owners : (h + 1,) int
         Body that each hole belongs to, 0 for none.
-    walls : (h + 1, 2) int
-        Levels below which what fills a hole touches the walls of the box, and comes close to them (`MARGIN`).
+    walls : (h + 1,) int
+        Number of levels at which what fills a hole comes close to the walls of the box (`MARGIN`), or touches them.
     """
     n_holes = int(holes.max(initial=0)) + 1
     changes, owners, walls = _completion_areas(
@@ -192,7 +192,7 @@ def _completion_areas(
     n0, n1, n2 = holes.shape
     changes = np.zeros((n_holes, len(levels) + 1))
     owners = np.zeros(n_holes, dtype=np.int64)
-    walls = np.zeros((n_holes, 2), dtype=np.int64)
+    walls = np.zeros(n_holes, dtype=np.int64)
     longest = max(n0, n1, n2)
     for i in range(n0):
         for j in range(n1):
@@ -205,10 +205,8 @@ def _completion_areas(
                 for n, at in ((n0, i), (n1, j), (n2, k)):
                     if n > 1:
                         room = min(room, at, n - 1 - at)
-                if room == 0:
-                    walls[hole, 0] = max(walls[hole, 0], here)
                 if room <= MARGIN * longest:
-                    walls[hole, 1] = max(walls[hole, 1], here)
+                    walls[hole] = max(walls[hole], here)
                 if i == 0 or j == 0 or k == 0 or i == n0 - 1 or j == n1 - 1 or k == n2 - 1:
                     wall = _wall_area(holes.shape, i, j, k, steps)
                     changes[hole, 0] += wall
