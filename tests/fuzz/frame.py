@@ -152,6 +152,9 @@ def run_case(chosen: Family, seed: int, number: int) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="fuzz-") as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", UserWarning)
+        warnings.filterwarnings(
+            "ignore", "Setting the shape on a NumPy", DeprecationWarning, "skimage"
+        )  # as pytest does
         try:
             subject = chosen.build(random, Path(folder))
         except BaseException:

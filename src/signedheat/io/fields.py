@@ -17,11 +17,11 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
-from ..packages import lazy_module, require
+from ..packages import require
 from .arrays import read_npy, read_npz
 from .bands import is_band_field, load_band_field, save_band_field
 from .files import PathLike, contents, ensure_writable, extension, reading, replacing, unknown_extension
-from .nrrd_files import read_image
+from .nrrd_files import read_image, write_image
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
 from .tets import TET_FIELD_FORMATS, load_tet_field, save_tet_field
 from .vdb import write_vdb
@@ -29,7 +29,6 @@ from .vdb_reader import read_vdb_image
 from .vtk_xml import read_vti_with, write_vti
 
 _NEEDED = {".nrrd": ("nrrd", "NRRD files")}
-nrrd = lazy_module(*_NEEDED[".nrrd"])
 
 CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
@@ -224,17 +223,8 @@ def _read_vti(path: PathLike) -> Parts:
 
 
 def _write_nrrd(field: GridField, path: Path) -> None:
-    dimension = field.grid.dimension
-    header = {
-        "space dimension": dimension,
-        "space directions": np.diag(field.grid.spacing),
-        "space origin": field.grid.origin,
-        "kinds": ["domain"] * dimension,
-        "encoding": "raw",
-        "content": NAME,
-        "convention": CONVENTION,
-    }
-    nrrd.write(str(path), field.values, header, index_order="F")
+    axes = np.diag(field.grid.spacing)
+    write_image(path, field.values, axes, field.grid.origin, content=NAME, convention=CONVENTION)
 
 
 def _read_nrrd(path: PathLike) -> Parts:

@@ -33,10 +33,9 @@ from .files import (
     unknown_extension,
     unpacked,
 )
-from .nrrd_files import read_image
+from .nrrd_files import read_image, write_image
 from .vtk_xml import read_vti
 
-nrrd = lazy_module("nrrd", "NRRD files")
 NIBABEL = ("nibabel", "NIfTI files")
 nibabel = lazy_module(*NIBABEL)
 
@@ -155,7 +154,7 @@ class LabelImage:
                 temporary.write_bytes(self._nifti(field, axes, first, path))
         elif format_of(path) == ".nrrd":
             with replacing(path) as temporary:
-                _write_nrrd(field, axes, first, self.space, temporary)
+                write_image(temporary, field.values, axes, first, self.space, content=NAME, convention=CONVENTION)
         else:
             save_field(GridField(Grid(first, field.grid.spacing, field.grid.shape), field.values), path)
 
@@ -286,21 +285,6 @@ def _read_nifti(path: PathLike) -> Parts:
         values = values[..., 0]
     affine = np.asarray(image.affine, dtype=np.float64)
     return values, affine[:3, :3], affine[:3, 3], "right-anterior-superior"
-
-
-def _write_nrrd(
-    field: GridField, axes: NDArray[np.float64], first: NDArray[np.float64], space: str | None, path: Path
-) -> None:
-    header = {
-        **({"space": space} if space is not None else {"space dimension": 3}),
-        "space directions": axes.T,
-        "space origin": first,
-        "kinds": ["domain"] * 3,
-        "encoding": "raw",
-        "content": NAME,
-        "convention": CONVENTION,
-    }
-    nrrd.write(str(path), field.values, header, index_order="F")
 
 
 def _listed(labels: NDArray[Any]) -> str:

@@ -76,6 +76,28 @@ def read_image(path: PathLike) -> tuple[NDArray[Any], dict[str, Any]]:
     return values.reshape(sizes, order="F"), header
 
 
+def write_image(
+    path: PathLike,
+    values: NDArray[Any],
+    axes: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    space: str | None = None,
+    **keys: str,
+) -> None:
+    """Write values, indexed [x, y, z]; the columns of `axes` are the steps along x, y, z. `keys` go into the header."""
+    header = {
+        **({"space dimension": values.ndim} if space is None else {"space": space}),
+        "space directions": axes.T,
+        "space origin": origin,
+        "kinds": ["domain"] * values.ndim,
+        "encoding": "raw",
+        **keys,
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd 1.1 dates its files by a function that will go
+        nrrd.write(str(path), values, header, index_order="F")
+
+
 def _values(data: bytes, header: dict[str, Any], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
     """The values in a row; they are `count`."""
     encoding, size = str(header["encoding"]).lower(), count * dtype.itemsize
