@@ -4,13 +4,12 @@
 The longer normals diffuse, the more roundly curves are completed (Fig. 18): a square without its corners, on triangles.
 """
 
-import sys
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 import signedheat as sh
+from signedheat import visualization
 
 EXPECTED = 0.705, 0.02  # how far the roundest completion goes from the centre; the corners are at 0.849
 
@@ -36,17 +35,15 @@ def main(folder: Path) -> float:
     mesh = disk(60)
     sides = [np.array([[0.6, -0.3, 0], [0.6, 0.3, 0]]) @ rotation(quarter).T for quarter in range(4)]
     broken = [mesh.polyline(side) for side in sides]
-    figure, axes = plt.subplots(1, 4, figsize=(13, 3.5), layout="constrained")
-    for panel, diffusion in zip(axes, (1, 10, 100, 1000), strict=True):
-        phi = sh.SignedHeatSolver(mesh, diffusion).distance(broken)
-        x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
-        panel.tricontourf(x, y, mesh.faces, phi.values, 25, cmap="RdBu")
-        panel.tricontour(x, y, mesh.faces, phi.values, [0.0], colors="black")
-        for side in sides:
-            panel.plot(side[:, 0], side[:, 1], color="gold", linewidth=3)
-        panel.set(title=f"diffusion = {diffusion}", aspect="equal", xticks=[], yticks=[])
-    figure.savefig(folder / "completion_and_diffusion.png")
-    plt.close(figure)
+    fields = [sh.SignedHeatSolver(mesh, diffusion).distance(broken) for diffusion in (1, 10, 100, 1000)]
+    visualization.save_row(
+        folder / "completion_and_diffusion.png",
+        *(
+            (f"diffusion = {diffusion}", phi, {"sources": broken, "view": np.array([0.0, 0.0, 1.0])})
+            for diffusion, phi in zip((1, 10, 100, 1000), fields, strict=True)
+        ),
+    )
+    phi = fields[-1]
     (whole, *_) = sorted(phi.contour(0.0), key=lambda curve: -curve.n_points)
     points = np.einsum("ik,ikj->ij", whole.barycentric, mesh.vertices[mesh.faces[whole.faces]])
     return float(np.linalg.norm(points, axis=1).max())
@@ -57,4 +54,4 @@ def rotation(quarter: int) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    print(main(Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
+    print(main(Path(".")))

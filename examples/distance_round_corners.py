@@ -6,14 +6,13 @@ Distance inside a tank with a baffle, measured around the baffle; the tets need 
 The source is a broken sphere in one corner: a third of its faces are gone.
 """
 
-import sys
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 import trimesh
 
 import signedheat as sh
+from signedheat import visualization
 
 EXPECTED = 3.297, 0.08  # from the sphere over the edge of the baffle to the far corner: the exact length
 CENTER, RADIUS = np.array([0.5, 0.5, 0.5]), 0.3
@@ -36,19 +35,17 @@ def main(folder: Path) -> float:
     ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
     keep = np.random.default_rng(0).random(len(ball.faces)) > 1 / 3
     phi = sh.signed_distance(sh.TriangleMesh(ball.vertices + CENTER, ball.faces[keep]), tank(14))
-    x, y = np.meshgrid(np.linspace(0, 3, 301), np.linspace(0, 2, 201))
-    middle = np.stack([x, y, 0.5 + 0 * x], axis=-1)
-    values = np.where((np.abs(x - 1.5) < 0.1) & (y < 1.5), np.nan, phi(middle.reshape(-1, 3)).reshape(x.shape))
-    figure, axes = plt.subplots(figsize=(8, 5), layout="constrained")
-    axes.set_facecolor("dimgray")
-    axes.contourf(x, y, values, 40, cmap="YlOrBr")
-    axes.contour(x, y, values, np.arange(-0.2, 4, 0.2), colors="black", linewidths=0.5)
-    axes.contour(x, y, values, [0.0], colors="navy", linewidths=2)
-    axes.set(title="Distance round a baffle, from a sphere without a third of its faces", aspect="equal")
+    plane = sh.Grid((0.0, 0.0), 0.01, (301, 201))
+    x, y = np.moveaxis(plane.points, -1, 0)
+    middle = np.stack([x, y, 0.5 + 0 * x], axis=-1).reshape(-1, 3)
+    values = np.where((np.abs(x - 1.5) < 0.1) & (y < 1.5), np.nan, phi(middle).reshape(x.shape))
+    figure = visualization.new_figure(9.0, 5.0)
+    axes = figure.add_subplot()
+    visualization.draw_plane(sh.GridField(plane, values), axes)
+    axes.set_title("round a baffle, from a sphere without a third of its faces")
     figure.savefig(folder / "distance_round_corners.png")
-    plt.close(figure)
     return float(phi([[3.0, 0.0, 0.5]])[0])
 
 
 if __name__ == "__main__":
-    print(main(Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
+    print(main(Path(".")))

@@ -8,11 +8,11 @@ Sharpening also removes the error of a very long diffusion, since only the zero 
 
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.path import Path as Outline
 
 import signedheat as sh
+from signedheat import visualization
 
 EXPECTED = 0.0, 0.05  # per cent of the range: root mean square of the sharpened error
 
@@ -39,17 +39,14 @@ def star_distance(points: np.ndarray) -> np.ndarray:
 def main(folder: Path) -> float:
     mesh = square(100)
     exact = star_distance(mesh.vertices[:, :2])
-    figure, axes = plt.subplots(1, 3, figsize=(13, 4), layout="constrained")
     plain = sh.SignedHeatSolver(mesh, diffusion=100).distance(mesh.level_set(exact, 0.0))
     cases = {"heat, t = 100 h²": plain, "convex": sh.sharpen(plain, method=sh.Convex()), "geodesic": sh.sharpen(plain)}
-    for panel, (title, phi) in zip(axes, cases.items(), strict=True):
+    view, panels = {"view": np.array([0.0, 0.0, 1.0])}, []
+    for title, phi in cases.items():
         error = 100 * np.sqrt(np.mean((phi.values - exact) ** 2)) / np.ptp(exact)
         print(f"{title}: {error:.3f} % of the range")
-        panel.tricontourf(*mesh.vertices.T[:2], mesh.faces, phi.values, 24, cmap="RdBu_r", vmin=-0.9, vmax=0.9)
-        panel.tricontour(*mesh.vertices.T[:2], mesh.faces, phi.values, 24, colors="black", linewidths=0.4)
-        panel.set(title=f"{title}: {error:.3f} %", aspect="equal", xticks=[], yticks=[])
-    figure.savefig(folder / "sharpened_distance.png")
-    plt.close(figure)
+        panels.append((f"{title}: error {error:.3f} %", phi, view))
+    visualization.save_row(folder / "sharpened_distance.png", *panels)
     return float(error)
 
 
