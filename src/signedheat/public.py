@@ -38,6 +38,7 @@ from .extensions.curve_orientation import CurveOrientation, curve_orientation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.orient import orient
 from .extensions.orientation import Orientation, orientation
+from .extensions.phi_band import phi_in_band as _phi_in_band  # noqa: F401  provides bands of `signed_distance`
 from .extensions.piecewise import piecewise_distance
 from .extensions.sampling import Samples, sample
 from .extensions.sharpening import sharpen

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
-from typing import Generic, Literal, TypeVar, overload
+from typing import Any, Generic, Literal, TypeVar, overload
 
 from .constraints import Constraint, ZeroSet
 from .diagnostics import Diagnostics
@@ -20,6 +20,7 @@ from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, Space
 from .domains.tet_mesh import TetMesh
 from .domains.validation import positive_number
 from .errors import SourceError, UnsupportedTypeError
+from .fields.band_field import BandField
 from .fields.grid_field import GridField
 from .fields.tet_field import TetField
 from .fields.to_field import Field, to_field
@@ -29,6 +30,10 @@ from .lowering.area_elements import grid_around
 from .lowering.surface.intrinsic import Retriangulated, lowered_by_angles
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .progress import Progress, Stopwatch
+from .slots import Slot
+
+band_of_phi: Slot[[Any, Grid, float, float, Progress | None], BandField] = Slot("band_of_phi")
+"""`signed_distance` in a band."""
 
 _BATCH = 16  # sources diffused at a time
 
@@ -250,6 +255,18 @@ def signed_distance(
 ) -> GridField[Literal[2]]: ...
 @overload
 def signed_distance(
+    source: Shapes,
+    domain: Grid[Literal[3]] | None = None,
+    *,
+    resolution: int = 128,
+    padding: float | None = None,
+    band: float,
+    constraint: None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> BandField: ...
+@overload
+def signed_distance(
     source: SpaceSources,
     domain: Grid[Dimension],
     *,
@@ -292,10 +309,11 @@ def signed_distance(
     *,
     resolution: int = 128,
     padding: float | None = None,
+    band: float | None = None,
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     progress: Progress | None = None,
-) -> Field:
+) -> Field | BandField:
     """Signed distance to a shape, however broken, in one call.
 
     Parameters
@@ -309,6 +327,9 @@ def signed_distance(
         Number of nodes along the longest side of that grid.
     padding : float, optional
         Least distance between the shape and the boundary of that grid; by default a fifth of its longest side.
+    band : float, optional
+        Compute nodes of the grid only where |φ| is at most this, or a face is as near, and a coarse grid elsewhere.
+        φ then vanishes at the shape in the mean of each connected part of the band; there is no other constraint.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
         Imposed on φ at the source; `ZeroSet` by default.
     diffusion : float
@@ -318,7 +339,7 @@ def signed_distance(
 
     Returns
     -------
-    GridField, TetField or VertexField
+    GridField, TetField or VertexField; BandField with a `band`
         φ > 0 on the side that the normals point to: negative inside a shape whose normals point outwards.
 
     Raises
@@ -344,4 +365,8 @@ def signed_distance(
     if domain is None:
         source = as_list(source)
         domain = grid_around(source, resolution, padding)
+    if band is not None:
+        if not isinstance(domain, Grid) or constraint is not None:
+            raise UnsupportedTypeError("a band lies on a grid, and takes no constraint", remedy="leave out the band")
+        return band_of_phi(source, domain, band, diffusion, progress)
     return SignedHeatSolver(domain, diffusion, progress)._distance(source, constraint)

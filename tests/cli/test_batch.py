@@ -58,3 +58,18 @@ def test_a_list_on_standard_input(tmp_path, folder, capsys, monkeypatch):
 def test_bad_usage(tmp_path, folder, capsys, options):
     assert main(["batch", str(folder), "-o", str(tmp_path / "out"), *options]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_bands_of_many_shapes(tmp_path, folder, capsys):
+    (folder / "bad.stl").unlink()
+    out, options = tmp_path / "out", ["--resolution", "40", "--band", "0.3", "--workers", "1"]
+    assert (
+        main(["batch", str(folder), "-o", str(out), "--volume", "vdb", "--offset", "0.1", "--sample", "50", *options])
+        == 0
+    )
+    names = {"ball.vdb", "ball.npz", "ball_+0.1.stl", "manifest.jsonl"}
+    assert {path.name for path in out.iterdir()} == names
+    lines = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
+    assert lines[0]["figures"]["field"]["band"] == 0.3
+    for wrong in (["--volume", "vti"], ["--offset", "0.4"], ["--info", "--plain"]):
+        assert main(["batch", str(folder), "-o", str(out), *wrong, *options]) == 2

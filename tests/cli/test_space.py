@@ -329,3 +329,23 @@ def test_bands_are_written_and_contoured(tmp_path, ball, capsys):
     assert np.abs(one.vertices - other.vertices).mean() < 0.001  # the file does not know the shape
     fail(capsys, "offset", ball, "0.3", "-o", surface, *options, code=2)
     fail(capsys, "volume", ball, "-o", output, *options, "--plain", code=2)
+
+
+def test_tiles_go_on_where_they_were_and_give_what_the_band_gives(tmp_path, ball, capsys):
+    pytest.importorskip("zarr")
+    store, output, other = str(tmp_path / "tiles"), str(tmp_path / "a.npz"), str(tmp_path / "b.npz")
+    grid = ["--origin", "-8.9", "-1.3", "-1.3", "--spacing", "0.07", "--shape", "146", "38", "38"]  # a seam in the ball
+    options = [*grid, "--band", "0.15"]
+    notes = []
+    for _ in range(2):
+        told = succeed(capsys, "volume", ball, "-o", output, *options, "--tiles", store, "--json", "--quiet")
+        notes.append(json.loads(told)["notes"]["tiles_computed"])
+    assert notes[0]["reused"] == 0 and notes[1]["reused"] == notes[1]["tiles"] == notes[0]["tiles"] > 1
+    succeed(capsys, "volume", ball, "-o", other, *options, "--quiet")
+    tiled, single = sh.load_field(output), sh.load_field(other)
+    np.testing.assert_array_equal(tiled.values, single.values)
+    np.testing.assert_array_equal(tiled.blocks.places, single.blocks.places)
+    assert "another" in fail(capsys, "volume", ball, "-o", output, *options[:-1], "0.16", "--tiles", store)
+    fail(capsys, "volume", ball, "-o", output, "--tiles", store, code=2)
+    fail(capsys, "volume", ball, "-o", output, *options, "--workers", "2", code=2)
+    fail(capsys, "volume", ball, "-o", output, *options, "--tiles", store, "--workers", "2", "--scheduler", "x", code=2)

@@ -121,3 +121,50 @@ def test_files_keep_a_band_to_the_last_bit(tmp_path):
     (tmp_path / "band.npz").write_bytes(data[: len(data) // 2])
     with pytest.raises(sh.FileFormatError):
         sh.load_field(tmp_path / "band.npz")
+
+
+@pytest.fixture(scope="module")
+def holed_band():
+    mesh = sh.samples.without_faces(sh.samples.sphere(3), 0.15, seed=1)
+    return sh.solid_distance(mesh, resolution=72, band=0.2)
+
+
+def test_the_nearest_places_of_a_band_are_exact_and_know_what_was_completed(holed_band):
+    points = np.random.default_rng(0).uniform(-1.3, 1.3, (3000, 3))
+    found = holed_band.closest_points(points)
+    truth = np.linalg.norm(points, axis=1) - 1
+    assert np.abs(found.distances - truth).max() < 0.04
+    np.testing.assert_allclose(np.linalg.norm(points - found.points, axis=1), np.abs(found.distances), atol=1e-12)
+    reached = found.points + found.gradients * found.distances[:, None]
+    np.testing.assert_allclose(reached, points, atol=2e-3)
+    there = ~found.completed  # on faces, whose corners lie on the sphere
+    assert (np.abs(np.linalg.norm(found.points[there], axis=1) - 1) < 0.02).all()
+    assert 0.001 < found.completed.mean() < 0.3
+
+
+def test_confidence_is_that_of_the_nodes_and_goes_on_beyond_the_band(holed_band):
+    band, cell = holed_band, float(holed_band.grid.spacing[0])
+    inner = band.blocks.places.astype(int) * 8 + 3
+    at_nodes = band.confidence_at(band.grid.origin + inner * cell)
+    np.testing.assert_allclose(at_nodes, band.confidence[:, 3, 3, 3], atol=1e-3)
+    surface = band.contour(0.1)
+    confidence = band.confidence_at(surface.vertices)
+    near = band.closest_points(surface.vertices)
+    assert (confidence[near.completed].mean() < confidence[~near.completed].mean()) and confidence.max() == 1
+    np.testing.assert_allclose(band.confidence_at([[0.0, 0, 0]]), band.coarse.confidence_at([[0.0, 0, 0]]))
+    assert 0 < band.surface_confidence < 1
+
+
+def test_samples_of_a_band_have_exact_distances(holed_band):
+    taken = sh.sample(holed_band, 4000, near=0.75, widths=[0.02, 0.1], seed=3)
+    truth = np.linalg.norm(taken.points, axis=1) - 1
+    assert taken.near.sum() == 3000
+    assert np.quantile(np.abs(taken.distances - truth), 0.9) < 0.02
+    assert np.abs(truth[:1500]).std() < np.abs(truth[1500:3000]).std()
+
+
+def test_many_points_get_the_values_of_few(holed_band):
+    points = np.random.default_rng(2).uniform(-1.3, 1.3, (70_000, 3))
+    some = np.r_[0:50, 65_500:65_600]
+    np.testing.assert_array_equal(holed_band(points)[some], holed_band(points[some]))
+    np.testing.assert_array_equal(holed_band.gradient(points)[some], holed_band.gradient(points[some]))

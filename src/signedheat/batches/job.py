@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 from ..constraints import Constraint, ZeroSet
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid, room_around
+from ..domains.kinds import ShapeLike
 from ..errors import SignedHeatError
 from ..extensions.figures import describe, shape_figures, told
 from ..extensions.sampling import WIDTHS, Layout, sample
 from ..extensions.solid_distance import solid_distance
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
-from ..io.fields import save_field
+from ..io.bands import BAND_FORMATS
 from ..io.shapes import read, save
 from ..lowering.area_elements import bounds_around
 from ..solver import as_list
@@ -66,13 +68,15 @@ class BatchJob:
         Report counts and defects of the shape, as ``signedheat info`` does, in the manifest.
     resolution, spacing, padding
         The grid around each shape, as for `solid_distance`; by default with room for the offsets.
+    band : float, optional
+        Half width of a band, outside of which the grid is coarse, as for `solid_distance`.
     constraint, diffusion, as_oriented, keep_overlaps, plain
         As for `solid_distance`.
 
     Raises
     ------
     SignedHeatError
-        If there is nothing to make, or samples are wanted of a plain field.
+        If there is nothing to make, samples are wanted of a plain field, or offsets beyond the band.
     """
 
     volume: str | None = None
@@ -83,6 +87,7 @@ class BatchJob:
     resolution: int = 128
     spacing: float | tuple[float, ...] | None = None
     padding: float | None = None
+    band: float | None = None
     constraint: Constraint = field(default_factory=ZeroSet)
     diffusion: float = 1.0
     as_oriented: bool = False
@@ -98,6 +103,22 @@ class BatchJob:
             raise SignedHeatError(
                 "samples have distances to the shape itself, which a plain field does not know",
                 remedy="leave out plain",
+            )
+
+        if self.band is not None:
+            self._check_band(self.band)
+
+    def _check_band(self, band: float) -> None:
+        if self.plain:
+            raise SignedHeatError("a band is measured to the shape itself", remedy="leave out plain")
+        if self.volume not in (None, *sorted(BAND_FORMATS)):
+            raise SignedHeatError(
+                f"a band cannot be written as {self.volume}", remedy=f"use {' or '.join(sorted(BAND_FORMATS))}"
+            )
+        reach = max((abs(distance) for distance in self.offsets), default=0.0)
+        if reach > band:
+            raise SignedHeatError(
+                f"the band reaches to {band:g}, and the offsets to {reach:g}", remedy=f"use a band of {reach:g}"
             )
 
     @property
@@ -116,25 +137,28 @@ class BatchJob:
         reach = max((abs(distance) for distance in self.offsets), default=0.0)
         padding = room_around(bounds, reach) if self.padding is None else self.padding
         grid = Grid.around(bounds, self.resolution, padding, self.spacing)
-        phi = solid_distance(
-            shape,
-            grid,
-            constraint=self.constraint,
-            diffusion=self.diffusion,
-            as_oriented=self.as_oriented,
-            keep_overlaps=self.keep_overlaps,
-            plain=self.plain,
-        )
+        phi = self._distance(shape, grid)
         return {**figures, "told": told(phi), "field": describe(phi), **self._written(phi, stem)}
 
-    def _written(self, phi: GridField, stem: Path) -> dict[str, object]:
+    def _distance(self, shape: ShapeLike, grid: Grid) -> GridField | BandField:
+        options: dict[str, Any] = {
+            "constraint": self.constraint,
+            "diffusion": self.diffusion,
+            "as_oriented": self.as_oriented,
+            "keep_overlaps": self.keep_overlaps,
+        }
+        if self.band is not None:
+            return solid_distance(shape, grid, band=self.band, **options)
+        return solid_distance(shape, grid, plain=self.plain, **options)
+
+    def _written(self, phi: GridField | BandField, stem: Path) -> dict[str, object]:
         """Write what is wanted of a field, and tell its figures."""
         figures: dict[str, object] = {}
         if self.volume is not None:
-            save_field(phi, f"{stem}{self.volume}")
+            phi.save(f"{stem}{self.volume}")
         surfaces = []
         for distance in self.offsets:
-            surface = cast("GridField[Literal[3]]", phi).offset(distance)
+            surface = cast("GridField[Literal[3]] | BandField", phi).offset(distance)
             save(surface, f"{stem}_{distance:+g}{self.surfaces}")
             surfaces.append({"distance": distance, "vertices": surface.n_vertices, "faces": surface.n_faces})
         if surfaces:

@@ -4,4 +4,5 @@ import sys
 
 from . import main
 
-sys.exit(main())
+if __name__ == "__main__":  # not in the processes of a pool, which import it again
+    sys.exit(main())

@@ -90,6 +90,7 @@ def job_of(arguments: Namespace) -> BatchJob:
         resolution=arguments.resolution or RESOLUTION,
         spacing=spacing[0] if spacing is not None and len(spacing) == 1 else spacing,
         padding=arguments.padding,
+        band=arguments.band,
         constraint=constraint_of(arguments.constraint),
         diffusion=arguments.diffusion,
         as_oriented=arguments.as_oriented,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from argparse import Namespace
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any, TypeAlias, overload
 
@@ -16,6 +18,7 @@ from ..errors import SignedHeatError
 from ..extensions.figures import describe as describe
 from ..extensions.figures import told
 from ..extensions.solid_distance import solid_distance
+from ..extensions.tiles import tiled_distance
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
@@ -91,16 +94,7 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
     field: GridField | TetField | BandField
     with ProgressBar(arguments.quiet or arguments.json) as progress:
         if isinstance(domain, Grid) and arguments.band is not None:
-            field = solid_distance(
-                shape,
-                domain,
-                band=arguments.band,
-                constraint=constraint_of(arguments.constraint),
-                diffusion=arguments.diffusion,
-                as_oriented=arguments.as_oriented,
-                keep_overlaps=arguments.keep_overlaps,
-                progress=progress,
-            )
+            field = in_band(shape, domain, arguments, progress)
         elif isinstance(domain, TetMesh) or domain.dimension == 3:
             field = solid_distance(
                 shape,
@@ -118,6 +112,26 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
         for line in told(field):
             say(f"signedheat: {line}")
     return field
+
+
+def in_band(shape: Any, grid: Grid, arguments: Namespace, progress: Progress) -> BandField:
+    """Distance in a band: all of it in memory, or tile by tile."""
+    options: dict[str, Any] = {
+        "band": arguments.band,
+        "constraint": constraint_of(arguments.constraint),
+        "diffusion": arguments.diffusion,
+        "as_oriented": arguments.as_oriented,
+        "keep_overlaps": arguments.keep_overlaps,
+        "progress": progress,
+    }
+    folder = getattr(arguments, "tiles", None)
+    if folder is None:
+        field: BandField = solid_distance(shape, grid, **options)
+        return field
+    if arguments.workers is None:
+        return tiled_distance(shape, folder, grid, scheduler=arguments.scheduler, **options)
+    with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
+        return tiled_distance(shape, folder, grid, scheduler=pool, **options)
 
 
 def planar_distance(lines: Any, grid: Grid, arguments: Namespace, progress: Progress) -> GridField:

@@ -6,6 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
 from ..io.fields import CONFIDENCE
@@ -53,7 +54,7 @@ def run(arguments: Namespace) -> Summary:
 def save_surface(field: Any, surface: Any, output: str, image: LabelImage | None) -> None:
     """In its place, with the confidence at each vertex where the field knows it and the format has room for it."""
     placed = surface if image is None else image.to_world(surface)
-    known = isinstance(field, GridField) and field.confidence is not None
+    known = isinstance(field, GridField | BandField) and field.confidence is not None
     if known and extension(output) in VALUE_FORMATS:
         save_with_values(placed, output, CONFIDENCE, field.confidence_at(surface.vertices))
     else:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import cast
 
 from ..extensions.sampling import sample
-from ..fields.grid_field import GridField
 from ..io import ensure_writable
 from ..io.samples import SAMPLE_FORMATS
 from .computing import Summary, compute, describe, grid_for, prefix_errors
@@ -18,7 +16,7 @@ def run(arguments: Namespace) -> Summary:
     ensure_writable(arguments.output, SAMPLE_FORMATS, "samples")
     shape = read_source(arguments)
     with prefix_errors(arguments.shape):
-        field = cast("GridField", compute(shape, grid_for(shape, arguments), arguments))
+        field = compute(shape, grid_for(shape, arguments), arguments)
         taken = sample(field, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
     (taken.normalized() if arguments.normalize else taken).save(arguments.output, arguments.layout)
     figures = taken.figures

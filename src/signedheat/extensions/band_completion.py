@@ -15,7 +15,7 @@ from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..lowering.area_elements import sample_on_grid
-from ..operators.grid.block_method import TINY, SomeNodes
+from ..operators.grid.block_method import BlockSources, SomeNodes
 from ..operators.grid.blocks import SIDE, Blocks
 from .band_plan import BandPlan
 
@@ -45,20 +45,10 @@ def completed_function(
     active = _near_ends(plan, blocks) if doubtful.any() else np.zeros(len(blocks), dtype=bool)
     if not active.any():
         return
-    places = blocks.places[active].astype(np.int64)
-    low, high = places.min(axis=0), places.max(axis=0) + 1
-    box = np.zeros((high - low) * SIDE, dtype=bool)
-    shape = (high - low).repeat(2)
-    shape[1::2] = SIDE
-    view = box.reshape(shape).transpose(0, 2, 4, 1, 3, 5)  # blocks, then nodes in them
-    view[tuple((places - low).T)] = True
-    nodes = SomeNodes.of(box)
-    fine = _fine_function(plan, nodes, low * SIDE)
+    fine = _fine_function(plan, SomeNodes.of_blocks(Blocks(blocks.places[active], blocks.shape)))
     if fine is None:
         return
-    spread = np.zeros(box.shape)
-    spread[tuple(nodes.nodes.T)] = fine
-    there = spread.reshape(shape).transpose(0, 2, 4, 1, 3, 5)[tuple((places - low).T)].reshape(len(places), -1)
+    there = fine.reshape(len(fine), -1)
     coarse, away = function[active], distances[active] / plan.coarse_cell
     share = np.clip((NONE - away) / (NONE - FULL), 0.0, 1.0)
     share *= np.clip(2.0 - np.abs(there - coarse) / (APART * plan.coarse_cell), 0.0, 1.0)
@@ -75,35 +65,25 @@ def _near_ends(plan: BandPlan, blocks: Blocks) -> NDArray[np.bool_]:
     return np.asarray(plan.end_tree.query(centres, distance_upper_bound=within)[0] <= within)
 
 
-def _fine_function(plan: BandPlan, nodes: SomeNodes, first: NDArray[np.int64]) -> NDArray[np.float64] | None:
-    """(n,) φ at nodes of a box that begins at `first`; None where there are no faces, NaN where none is near."""
-    grid = Grid(first * plan.steps, plan.steps, nodes.numbers.shape)
+def _fine_function(plan: BandPlan, nodes: SomeNodes) -> NDArray[np.float64] | None:
+    """(b, 8, 8, 8) φ at nodes of blocks; None where there are no faces, NaN where none is near."""
+    places = nodes.blocks.places.astype(np.int64)
+    first = places.min(axis=0) * SIDE
+    box = Grid(first * plan.steps, plan.steps, (places.max(axis=0) + 1) * SIDE - first)
     corners = plan.features.corners.reshape(-1, 3, 3)
-    near = ((corners.max(axis=1) >= grid.origin) & (corners.min(axis=1) <= grid.upper)).all(axis=1)
+    near = ((corners.max(axis=1) >= box.origin) & (corners.min(axis=1) <= box.upper)).all(axis=1)
     if not near.any():
         return None
     faces = np.arange(3 * int(near.sum())).reshape(-1, 3)
     try:
-        samples = sample_on_grid([TriangleMesh(corners[near].reshape(-1, 3), faces)], grid, SAMPLE_SIZE)
+        samples = sample_on_grid([TriangleMesh(corners[near].reshape(-1, 3), faces)], box, SAMPLE_SIZE)
     except SourceError:  # beside the box, or cancelled
         return None
     cells = float(plan.steps.max()) / float(plan.steps.min())
-    ratios = (float(plan.steps.mean()) / plan.steps) ** 2
     rounds = max(ROUNDS, int(np.ceil(NONE * plan.coarse_cell / plan.cell * cells)))
-    strength = np.linalg.norm(samples.vectors, axis=1)
-    weighted = np.concatenate([samples.vectors, strength[:, None]], axis=1)
-    diffused = nodes.diffuse(nodes.splat(samples.positions, weighted), ratios, rounds)
-    largest = np.abs(diffused[:, :3]).max(axis=1)
-    arrived = largest > TINY * float(strength.max())
-    directions = diffused[:, :3] / np.where(arrived, largest, 1.0)[:, None]
-    lengths = np.linalg.norm(directions, axis=1)
-    directions /= np.where(lengths > 0, lengths, 1.0)[:, None]
-    start = plan.coarse_function((first + nodes.nodes) * plan.steps)
+    sources = BlockSources(nodes, samples.positions + first, samples.vectors, plan.steps, 1.0, rounds)
+    directions, arrived = sources.directions()
+    start = plan.coarse_function(nodes.nodes * plan.steps)
     phi = nodes.integrate(directions, plan.steps, start)
-    heights = nodes.at(phi, samples.positions)
-    known = np.isfinite(heights)
-    offsets = np.zeros((int(known.sum()), 4))
-    offsets[:, 0], offsets[:, 1] = strength[known], strength[known] * heights[known]
-    spread = nodes.diffuse(nodes.splat(samples.positions[known], offsets), ratios, rounds)
-    there = spread[:, 0] > TINY * float(strength.max())
-    return np.where(arrived & there, phi - spread[:, 1] / np.where(there, spread[:, 0], 1.0), np.nan)
+    offset, there = sources.offsets(phi)
+    return nodes.in_blocks(np.where(arrived & there, phi - offset, np.nan))

@@ -129,13 +129,14 @@ class BandPlan:
         excess = np.maximum(np.maximum(low * SIDE * self.steps - places, places - high * SIDE * self.steps), 0.0)
         return bool((np.linalg.norm(excess, axis=1) <= self.open_reach + SIDE * self.cell).any())
 
-    def near_open(self, places: NDArray[np.int64], reach: float) -> NDArray[np.bool_]:
-        """Which of the blocks at (n, 3) places have nodes within a distance of open places."""
+    def near_open(self, places: NDArray[np.int64], reach: float) -> NDArray[np.int64]:
+        """Those of the blocks at (n, 3) places that have nodes within a distance of open places."""
         if self.open_places is None or not len(places):
-            return np.zeros(len(places), dtype=bool)
+            return places[:0]
         within = reach + 0.5 * float(np.linalg.norm((SIDE - 1) * self.steps))
         centres = (places * SIDE + 0.5 * (SIDE - 1)) * self.steps
-        return np.asarray(self.open_places.query(centres, distance_upper_bound=within)[0] <= within)
+        near: NDArray[np.bool_] = self.open_places.query(centres, distance_upper_bound=within)[0] <= within
+        return places[near]
 
     @property
     def reach(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points
+from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points, off_grid
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
 from .band_completion import NONE, completed_function, halo
 from .band_plan import FAR, NEAR, BandPlan
@@ -57,11 +57,10 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     high = low + CUBE
     is_open = plan.is_open(low, high)
     wide = max(2 + int(plan.reach // (SIDE * float(plan.steps.min()))), halo(plan)) if is_open else 0
-    places = plan.blocks_in(low - wide, high + wide)
-    own = ((places >= low) & (places < high)).all(axis=1)
-    around = np.flatnonzero(~own)  # matters where surface is missing only
-    own[around] = plan.near_open(places[around], NONE * plan.coarse_cell)
-    blocks = Blocks.of(places[own], plan.grid.shape)
+    held = plan.blocks_in(low - wide, high + wide)
+    beside = ~((held >= low) & (held < high)).all(axis=1)  # these matter only where surface is missing
+    needed = np.concatenate([held[~beside], plan.near_open(held[beside], NONE * plan.coarse_cell)])
+    blocks = Blocks.of(needed, plan.grid.shape)
     sides = _sides(plan, blocks)
     own = ((blocks.places >= low) & (blocks.places < high)).all(axis=1)
     signs = np.where(sides.function[own] < 0, -1.0, 1.0)
@@ -73,21 +72,12 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
         _completed(plan, places, distances, confidence, crossings)
     values = (signs * distances).astype(np.float32).reshape(-1, SIDE, SIDE, SIDE)
     confidence = confidence.reshape(values.shape)
-    _beyond(values, places, plan.grid.shape)
+    off_grid(values, Blocks(places, blocks.shape), np.nan)
     kept = np.nanmin(np.abs(values), axis=(1, 2, 3), initial=np.inf) <= plan.reach
     kept |= plan.at_walls(places, SIDE) & (values < 0).any(axis=(1, 2, 3))
     place = crossings[:, 1:4] / (SIDE * plan.steps)
     inner = ((place >= low) & (place < high)).all(axis=1)
     return Tile(places[kept], values[kept], confidence[kept], crossings[inner])
-
-
-def _beyond(values: NDArray[np.float32], places: NDArray[np.int32], shape: tuple[int, ...]) -> None:
-    """Nodes of the last blocks that are not on the grid have no value."""
-    for axis in range(3):
-        index = places[:, axis, None].astype(np.int64) * SIDE + np.arange(SIDE)
-        beside = np.flatnonzero((index >= shape[axis]).any(axis=1))
-        for row in beside:
-            np.moveaxis(values[row], axis, 0)[index[row] >= shape[axis]] = np.nan
 
 
 def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:

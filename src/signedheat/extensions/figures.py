@@ -61,7 +61,7 @@ def describe(field: Any) -> dict[str, Any]:
             "shape": list(field.grid.shape),
             "area_outside": note.area_outside if note else 0.0,
             "area_cancelled": note.area_cancelled if note else 0.0,
-            "confidence": field.surface_confidence if isinstance(field, GridField) else None,
+            "confidence": field.surface_confidence,
         }
         if isinstance(field, BandField):
             where |= {"band": field.width, "blocks": len(field.blocks), "nodes": field.n_nodes}

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.validation import finite_number
-from ..errors import OutsideError, SignedHeatError, SourceError
+from ..errors import OutsideError, SignedHeatError
+from ..fields.band_field import BandField
+from ..fields.closest_points import known_surface
 from ..fields.grid_field import GridField
 from ..operators.grid.exact_surface import ExactSurface
 from ..slots import Slot
@@ -110,7 +112,7 @@ class Samples:
 
 
 def sample(
-    field: GridField,
+    field: GridField | BandField,
     n: int = 250_000,
     *,
     near: float = 0.8,
@@ -125,7 +127,7 @@ def sample(
 
     Parameters
     ----------
-    field : GridField
+    field : GridField or BandField
         Distance in space, from `solid_distance` or ``sharpen(field, shape)``.
     n : int
         Number of points.
@@ -163,12 +165,7 @@ def sample(
         raise SignedHeatError(f"the share near the surface is {near:g}", remedy="choose it from 0 to 1")
     scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
     n_near = round(near * n) if scales else 0
-    if field.surface is None:
-        raise SourceError(
-            "the field does not know the surface that it is the distance to",
-            remedy="take it from solid_distance or sharpen(field, shape), not from a file",
-        )
-    triangles, _ = surface_triangles(field, field.surface)
+    triangles, _ = surface_triangles(field, known_surface(field.surface))
     lower, upper = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     center = (lower + upper) / 2
     radius = float(np.linalg.norm(triangles - center, axis=2).max())
@@ -184,11 +181,15 @@ def sample(
     return Samples(points, found.distances, found.gradients, is_near, found.completed, center, radius)
 
 
-def surface_triangles(field: GridField, surface: ExactSurface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def surface_triangles(
+    field: GridField | BandField, surface: ExactSurface
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """(m, 3, 3) triangles that cover the surface of a field once, and which of them only stand in for missing faces."""
     faces = surface.features.corners.reshape(-1, 3, 3) + surface.origin
     try:
-        contour = cast("GridField[Literal[3]]", field).contour(0.0)  # which every field with a surface is
+        contour = cast("GridField[Literal[3]] | BandField", field).contour(
+            0.0
+        )  # every field with a surface is in space
     except OutsideError:  # open sheets, which bound nothing
         return faces, np.zeros(len(faces), dtype=bool)
     triangles = contour.vertices[contour.faces]

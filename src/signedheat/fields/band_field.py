@@ -17,11 +17,16 @@ from ..errors import GeometryError, OutsideError
 from ..operators.grid.block_contours import block_contour
 from ..operators.grid.blocks import NODES, SIDE, Blocks
 from ..operators.grid.exact_surface import ExactSurface
+from ..parallel import in_chunks
+from .closest_points import ClosestPoints, closest_points
 from .files import save_field
 from .grid_field import GridField
 
 if TYPE_CHECKING:
     import pyvista
+
+TOGETHER = 4096
+"""Blocks that are looked at together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +105,7 @@ class BandField(Displayed):
         """
         given = np.asarray(points, dtype=np.float64)
         places = self._checked(given)
-        values = self._fine(places)
-        beyond = np.isnan(values)
-        if beyond.any():
-            values[beyond] = self.coarse(places[beyond])
+        values = in_chunks(self._values_of_chunk, places)[0]
         return values if given.ndim == 2 else values[0]
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
@@ -119,19 +121,60 @@ class BandField(Displayed):
         (n, 3) float
             Gradients; of length about 1, since φ is a distance.
         """
+        return in_chunks(self._slopes_of_chunk, self._checked(points))[0]
+
+    def closest_points(self, points: ArrayLike) -> ClosestPoints:
+        """The nearest place of the surface itself for points in space, and exact distances to it.
+
+        See `GridField.closest_points`; points may lie anywhere, in the band or beyond.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        ClosestPoints
+            Places, signed distances, gradients, and whether the place is one that had to be completed.
+
+        Raises
+        ------
+        SourceError
+            If the field does not know its surface: it was read from a file.
+        """
+        return closest_points(self.surface, self._checked(points), self)
+
+    def confidence_at(self, points: ArrayLike) -> NDArray[np.float32]:
+        """How far the surface that is nearest was there (1), or had to be completed (less), interpolated.
+
+        Parameters
+        ----------
+        points : (n, 3) float
+            Positions, such as the vertices of an offset; beyond the band the coarse field tells.
+
+        Returns
+        -------
+        (n,) float
+            From 0 to 1; 1 if nothing is known of it.
+        """
         places = self._checked(points)
-        slopes = np.empty_like(places)
-        for axis, step in enumerate(self.grid.spacing):
-            ahead, behind = places.copy(), places.copy()
-            ahead[:, axis] = np.minimum(ahead[:, axis] + step, self.grid.upper[axis])
-            behind[:, axis] = np.maximum(behind[:, axis] - step, self.grid.origin[axis])
-            span = ahead[:, axis] - behind[:, axis]
-            rise = self._fine(ahead) - self._fine(behind)
-            slopes[:, axis] = np.where(span > 0, rise / np.where(span > 0, span, 1.0), np.nan)
-        beyond = np.isnan(slopes).any(axis=1)
-        if beyond.any():
-            slopes[beyond] = self.coarse.gradient(places[beyond])
-        return slopes
+        if self.confidence is None:
+            return np.ones(len(places), dtype=np.float32)
+        return in_chunks(self._confidence_of_chunk, places)[0]
+
+    @property
+    def surface_confidence(self) -> float | None:
+        """Mean confidence at the nodes within a cell of the zero set, one number for the whole field; or None."""
+        if self.confidence is None:
+            return None
+        total, count, cell = 0.0, 0, float(self.grid.spacing.max())
+        for begin in range(0, len(self.blocks), TOGETHER):  # in bounded memory
+            here = slice(begin, begin + TOGETHER)
+            near = np.abs(self.values[here]) < cell
+            total += float(self.confidence[here][near].sum(dtype=np.float64))
+            count += int(near.sum())
+        return total / count if count else None
 
     @property
     def domain(self) -> Grid:
@@ -220,6 +263,40 @@ class BandField(Displayed):
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format given by its extension: ``.npz`` or ``.vdb``."""
         save_field(self, path)
+
+    def _values_of_chunk(self, places: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+        values = self._fine(places)
+        beyond = np.isnan(values)
+        if beyond.any():
+            values[beyond] = self.coarse(places[beyond])
+        return (values,)
+
+    def _slopes_of_chunk(self, places: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+        slopes = np.empty_like(places)
+        for axis, step in enumerate(self.grid.spacing):
+            ahead, behind = places.copy(), places.copy()
+            ahead[:, axis] = np.minimum(ahead[:, axis] + step, self.grid.upper[axis])
+            behind[:, axis] = np.maximum(behind[:, axis] - step, self.grid.origin[axis])
+            span = ahead[:, axis] - behind[:, axis]
+            rise = self._fine(ahead) - self._fine(behind)
+            slopes[:, axis] = np.where(span > 0, rise / np.where(span > 0, span, 1.0), np.nan)
+        beyond = np.isnan(slopes).any(axis=1)
+        if beyond.any():
+            slopes[beyond] = self.coarse.gradient(places[beyond])
+        return (slopes,)
+
+    def _confidence_of_chunk(self, places: NDArray[np.float64]) -> tuple[NDArray[np.float32]]:
+        cells = (np.clip(places, self.grid.origin, self.grid.upper) - self.grid.origin) / self.grid.spacing
+        base = np.minimum(cells.astype(np.int64), np.array(self.grid.shape) - 2)
+        share, found = cells - base, np.zeros(len(places))
+        assert self.confidence is not None
+        for corner in np.ndindex(2, 2, 2):
+            weight = np.where(np.array(corner, dtype=bool), share, 1.0 - share).prod(axis=1)
+            found += np.where(weight > 0, weight * self.blocks.values_at(self.confidence, base + corner), 0.0)
+        beyond = np.isnan(found)
+        if beyond.any():
+            found[beyond] = self.coarse.confidence_at(places[beyond])
+        return (np.clip(found, 0.0, 1.0).astype(np.float32),)
 
     def _checked(self, points: ArrayLike) -> NDArray[np.float64]:
         places = np.atleast_2d(np.asarray(points, dtype=np.float64))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SourceError
 from ..operators.grid.exact_surface import ExactSurface
 
 NEAR = 2.0
@@ -39,12 +40,23 @@ class ClosestPoints:
         return f"ClosestPoints({len(self.points)} points, {int(self.completed.sum())} on completed surface)"
 
 
+def known_surface(surface: ExactSurface | None) -> ExactSurface:
+    """The surface of a field, which is refused if there is none."""
+    if surface is None:
+        raise SourceError(
+            "the field does not know the surface that it is the distance to",
+            remedy="take it from solid_distance or sharpen(field, shape), not from a file",
+        )
+    return surface
+
+
 def closest_points(
-    surface: ExactSurface,
+    surface: ExactSurface | None,
     points: NDArray[np.float64],
     field: Callable[[NDArray[np.float64]], NDArray[np.float64]],
 ) -> ClosestPoints:
     """The nearest place of a surface for each of (n, 3) points; `field` gives the side where no face near tells it."""
+    surface = known_surface(surface)
     places = surface.nearest(points - surface.origin)
     untold = (places.sides == 0) | (places.distances > NEAR * float(surface.steps.max()))
     sides = places.sides.copy()

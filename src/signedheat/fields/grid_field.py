@@ -17,7 +17,7 @@ from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import contiguous
-from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
+from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.marching import closed_surface, level_lines
 from ..operators.grid.exact_surface import ExactSurface
@@ -163,11 +163,6 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         >>> closest.points.round(6).tolist(), closest.distances.tolist(), closest.gradients.tolist()
         ([[0.3, 0.2, 0.0]], [0.5], [[0.0, 0.0, -1.0]])
         """
-        if self.surface is None:
-            raise SourceError(
-                "the field does not know the surface that it is the distance to",
-                remedy="take it from solid_distance or sharpen(field, shape), not from a file",
-            )
         return closest_points(self.surface, np.atleast_2d(self._checked(points)), self)
 
     @property

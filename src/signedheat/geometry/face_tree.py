@@ -208,7 +208,7 @@ def _gap(
     bounds: NDArray[np.float64], discs: NDArray[np.float64], node: int, x: float, y: float, z: float, best: float
 ) -> float:
     """Squared distance to a box, or to the disc in it where that is farther and the box is nearer than the best."""
-    gap = _box_gap(bounds, node, x, y, z)
+    gap: float = _box_gap(bounds, node, x, y, z)
     if gap >= best or discs[node, 7] < 0.0:
         return gap
     px, py, pz = x - discs[node, 0], y - discs[node, 1], z - discs[node, 2]
@@ -218,4 +218,5 @@ def _gap(
     flat = height * height
     if beside > 0.0:
         flat += beside * beside
-    return max(gap, flat)
+    larger: float = max(gap, flat)
+    return larger

@@ -11,7 +11,8 @@ def shell(n):
     place = np.stack(np.meshgrid(*[np.linspace(-1, 1, n)] * 3, indexing="ij"), axis=-1)
     near = np.abs(np.linalg.norm(place, axis=-1) - 0.8) < 12 / n
     chosen = near & (place[..., 2] > 0.2)
-    return SomeNodes.of(chosen), place[chosen]
+    nodes = SomeNodes.of(chosen)
+    return nodes, place[tuple(nodes.nodes.T)]
 
 
 def test_the_preconditioner_is_symmetric_and_positive():

@@ -67,5 +67,13 @@ def check(arguments: Namespace) -> None:
         error(f"argument --spacing: one number or 3, not {len(arguments.spacing)}")
     if arguments.spacing is not None and arguments.resolution is not None:
         error("--resolution does not go with --spacing: give one of them")
+    if arguments.band is not None:
+        if arguments.plain:
+            error("--band does not go with --plain")
+        if arguments.volume not in (None, "npz", "vdb"):
+            error("a band is written as .npz or .vdb")
+        reach = max((abs(distance) for distance in arguments.offset), default=0.0)
+        if reach > arguments.band:
+            error(f"the band reaches to {arguments.band:g}, and the distances to {reach:g}")
     if arguments.scheduler is not None and arguments.workers is not None:
         error("--workers does not go with --scheduler, which has workers of its own")

@@ -5,7 +5,15 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from .options import add_command, add_grid_options, add_label_option, add_placing_options, check_grid_options, finite
+from .options import (
+    add_command,
+    add_grid_options,
+    add_label_option,
+    add_placing_options,
+    add_tile_options,
+    check_grid_options,
+    finite,
+)
 
 
 def add_to(commands: Any) -> None:
@@ -36,6 +44,7 @@ def add_to(commands: Any) -> None:
     add_label_option(parser)
     add_placing_options(parser)
     add_grid_options(parser)
+    add_tile_options(parser)
     parser.set_defaults(check=check_offset_options)
 
 

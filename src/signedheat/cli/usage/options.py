@@ -50,13 +50,6 @@ def add_grid_options(parser: Parser) -> None:
     """Add the options of the grid and of the computation."""
     grid = add_room_options(parser)
     grid.add_argument(
-        "--band",
-        type=positive,
-        metavar="B",
-        help="fine nodes only up to this distance from the surface, in the units of the shape, and coarse ones beyond: "
-        "for grids too fine to be computed whole",
-    )
-    grid.add_argument(
         "--origin", type=finite, nargs="+", metavar="X", help="first node of a grid of your own: X Y Z, or X Y"
     )
     grid.add_argument(
@@ -128,7 +121,27 @@ def add_room_options(parser: Parser) -> argparse._ArgumentGroup:
         "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each axis"
     )
     grid.add_argument("--padding", type=not_negative, metavar="P", help="room around the shape, in its units")
+    grid.add_argument(
+        "--band",
+        type=positive,
+        metavar="B",
+        help="fine nodes only up to this distance from the surface, in the units of the shape, and coarse ones beyond: "
+        "for grids too fine to be computed whole",
+    )
     return grid
+
+
+def add_tile_options(parser: Parser) -> None:
+    """Add the options of a band that is computed tile by tile."""
+    tiles = parser.add_argument_group("tiles of a band")
+    tiles.add_argument(
+        "--tiles",
+        metavar="FOLDER",
+        help="compute the band in tiles, which are kept in this folder: for bands larger than memory; the same command "
+        "goes on where it was stopped",
+    )
+    tiles.add_argument("--workers", type=whole_number(1), metavar="N", help="processes for them (threads of this one)")
+    tiles.add_argument("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
 
 
 def add_solid_options(parser: Parser) -> None:
@@ -136,7 +149,7 @@ def add_solid_options(parser: Parser) -> None:
     add_room_options(parser)
     add_repair_options(parser)
     add_method_options(parser)
-    parser.set_defaults(origin=None, grid_shape=None, mask=None, band=None, preview=None, plain=False)
+    parser.set_defaults(origin=None, grid_shape=None, mask=None, preview=None, plain=False)
 
 
 def add_method_options(parser: Parser) -> None:
@@ -253,9 +266,22 @@ def check_grid_options(arguments: argparse.Namespace) -> None:
         return
     if arguments.band is not None and (dimension == 2 or arguments.plain):
         parser.error("--band is for shapes in space, and does not go with --plain")
+    check_tile_options(arguments)
     if own and (arguments.origin is None or arguments.grid_shape is None or spacing is None):
         parser.error("a grid of your own needs all of --origin, --spacing and --shape")
     if own and (arguments.resolution is not None or arguments.padding is not None):
         parser.error("--resolution and --padding do not go with --origin and --shape")
     if spacing is not None and arguments.resolution is not None:
         parser.error("--resolution does not go with --spacing: give one of them")
+
+
+def check_tile_options(arguments: argparse.Namespace) -> None:
+    """Reject tiles without a band, and two kinds of workers at a time."""
+    tiles, workers = getattr(arguments, "tiles", None), getattr(arguments, "workers", None)
+    scheduler = getattr(arguments, "scheduler", None)
+    if tiles is not None and arguments.band is None:
+        arguments.parser.error("--tiles goes with --band")
+    if tiles is None and (workers is not None or scheduler is not None):
+        arguments.parser.error("--workers and --scheduler go with --tiles")
+    if workers is not None and scheduler is not None:
+        arguments.parser.error("--workers does not go with --scheduler, which has workers of its own")

@@ -5,7 +5,14 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from .options import add_command, add_grid_options, add_label_option, add_placing_options, check_grid_options
+from .options import (
+    add_command,
+    add_grid_options,
+    add_label_option,
+    add_placing_options,
+    add_tile_options,
+    check_grid_options,
+)
 
 
 def add_to(commands: Any) -> None:
@@ -34,6 +41,7 @@ def add_to(commands: Any) -> None:
     add_label_option(parser)
     add_placing_options(parser)
     add_grid_options(parser)
+    add_tile_options(parser)
     parser.set_defaults(check=check)
 
 

@@ -1,7 +1,7 @@
 """The three steps of the method on some nodes of a grid, given by their neighbours: what lies beyond is a wall.
 
-Nodes are numbered in the order of the grid. Each has six neighbours: before and behind along every axis, −1 where there
-is none. Positions are in cells.
+Nodes lie in blocks, and are numbered block by block. Each has six neighbours: before and behind along every axis, −1
+where there is none. Positions are in cells.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 from .block_multigrid import Multigrid
+from .blocks import SIDE, Blocks, off_grid, row_of_node
 
 TINY = 1e-30
 """Values below this are treated as unknown."""
@@ -24,25 +25,28 @@ MOST = 100
 
 @dataclass(frozen=True, eq=False)
 class SomeNodes:
-    """Nodes of a box of a grid.
+    """Nodes of a grid.
 
     Attributes
     ----------
-    numbers : (nx, ny, nz) int32
-        Number of each node of the box, −1 for those that are none of them.
+    blocks : Blocks
+        In which they are.
+    numbers : (b, 8, 8, 8) int32
+        Number of each node of the blocks, −1 for those that are none of them.
     nodes : (n, 3) int32
         The nodes.
     neighbors : (n, 6) int32
         Nodes before and behind along each axis.
     """
 
+    blocks: Blocks
     numbers: NDArray[np.int32]
     nodes: NDArray[np.int32]
     neighbors: NDArray[np.int32]
 
     @classmethod
     def of(cls, chosen: NDArray[np.bool_]) -> SomeNodes:
-        """The chosen nodes of a box.
+        """The chosen nodes of a grid, all of which is given.
 
         Examples
         --------
@@ -50,21 +54,46 @@ class SomeNodes:
         >>> nodes.neighbors[:, 4:].tolist()
         [[-1, 1], [0, -1], [-1, -1]]
         """
-        nodes = np.argwhere(chosen).astype(np.int32)
-        numbers = np.full(chosen.shape, -1, dtype=np.int32)
-        numbers[chosen] = np.arange(len(nodes), dtype=np.int32)
-        return cls(numbers, nodes, _neighbors(numbers, nodes))
+        blocks = Blocks.of(np.argwhere(chosen) // SIDE, chosen.shape)
+        there = np.zeros((len(blocks), SIDE, SIDE, SIDE), dtype=bool)
+        at = np.argwhere(chosen)
+        i, j, k = (at % SIDE).T
+        there[blocks.rows(at // SIDE), i, j, k] = True
+        return cls._numbered(blocks, there)
+
+    @classmethod
+    def of_blocks(cls, blocks: Blocks) -> SomeNodes:
+        """All nodes of some blocks that are on their grid."""
+        there = np.ones((len(blocks), SIDE, SIDE, SIDE), dtype=bool)
+        off_grid(there, blocks, False)
+        return cls._numbered(blocks, there)
+
+    @classmethod
+    def _numbered(cls, blocks: Blocks, there: NDArray[np.bool_]) -> SomeNodes:
+        numbers = np.full(there.shape, -1, dtype=np.int32)
+        at = np.nonzero(there)
+        numbers[at] = np.arange(len(at[0]), dtype=np.int32)
+        nodes = np.empty((len(at[0]), 3), dtype=np.int32)
+        for axis in range(3):
+            nodes[:, axis] = blocks.places[at[0], axis] * SIDE + at[axis + 1]
+        return cls(blocks, numbers, nodes, _neighbors(*blocks.tables, numbers, nodes, np.array(blocks.shape)))
+
+    def in_blocks(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(b, 8, 8, 8) values of all nodes of the blocks; NaN where there is none."""
+        spread = np.full(self.numbers.shape, np.nan)
+        spread[self.numbers >= 0] = values
+        return spread
 
     def splat(self, positions: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, 4) values (s, 4) at positions (s, 3) spread to the nodes around, as far as they are there."""
         result = np.zeros((len(self.nodes), 4))
-        _splat(self.numbers, positions, values, result)
+        _splat(*self.blocks.tables, self.numbers, positions, values, np.array(self.blocks.shape), result)
         return result
 
     def at(self, values: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s,) values at positions, linear between the nodes that are there; NaN where none is."""
         result = np.empty(len(positions))
-        _read(self.numbers, positions, values, result)
+        _read(*self.blocks.tables, self.numbers, positions, values, np.array(self.blocks.shape), result)
         return result
 
     def diffuse(self, sources: NDArray[np.float64], ratios: NDArray[np.float64], rounds: int) -> NDArray[np.float64]:
@@ -113,26 +142,119 @@ class SomeNodes:
         return phi
 
 
+@dataclass(frozen=True, eq=False)
+class BlockSources:
+    """Samples of faces among some nodes, whose vectors are diffused from there.
+
+    Attributes
+    ----------
+    nodes : SomeNodes
+        The nodes.
+    positions : (s, 3) float
+        Of the samples, in cells.
+    vectors : (s, 3) float
+        Areas times normals.
+    steps : (3,) float
+        Distance between nodes.
+    diffusion : float
+        τ in ``t = τ h²``.
+    rounds : int
+        See `SomeNodes.diffuse`.
+    """
+
+    nodes: SomeNodes
+    positions: NDArray[np.float64]
+    vectors: NDArray[np.float64]
+    steps: NDArray[np.float64]
+    diffusion: float
+    rounds: int
+
+    @property
+    def _weights(self) -> NDArray[np.float64]:
+        weights: NDArray[np.float64] = np.linalg.norm(self.vectors, axis=1)
+        return weights
+
+    def _diffused(self, rows: NDArray[np.bool_], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        ratios = self.diffusion * (float(self.steps.mean()) / self.steps) ** 2
+        return self.nodes.diffuse(self.nodes.splat(self.positions[rows], values), ratios, self.rounds)
+
+    def directions(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """(n, 3) Y = X / |X|, and (n,) whether X is known at a node; it is 0 where it is not."""
+        every = np.ones(len(self.vectors), dtype=bool)
+        diffused = self._diffused(every, np.concatenate([self.vectors, self._weights[:, None]], axis=1))[:, :3]
+        largest = np.abs(diffused).max(axis=1)
+        arrived = largest > TINY * float(self._weights.max())
+        directions = diffused / np.where(arrived, largest, 1.0)[:, None]
+        lengths = np.linalg.norm(directions, axis=1)
+        directions /= np.where(lengths > 0, lengths, 1.0)[:, None]
+        return directions, np.asarray(arrived)
+
+    def heights(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n,) weights of the samples around each node, and the sums of φ at them times these."""
+        known, sums = self._heights(phi)
+        spread = self.nodes.splat(self.positions[known], sums)
+        return spread[:, 0], spread[:, 1]
+
+    def offsets(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """(n,) by how much φ is off at the samples around each node, diffused, and whether it is known."""
+        spread = self._diffused(*self._heights(phi))
+        there = spread[:, 0] > TINY * float(self._weights.max())
+        return np.where(there, spread[:, 1] / np.where(there, spread[:, 0], 1.0), 0.0), np.asarray(there)
+
+    def _heights(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+        """(s,) samples among the nodes, and for these (k, 4) weights and φ times these."""
+        heights = self.nodes.at(phi, self.positions)
+        known = np.isfinite(heights)
+        sums = np.zeros((int(known.sum()), 4))
+        sums[:, 0], sums[:, 1] = self._weights[known], self._weights[known] * heights[known]
+        return known, sums
+
+
 @compiled(nogil=True)
-def _neighbors(numbers: NDArray[np.int32], nodes: NDArray[np.int32]) -> NDArray[np.int32]:
-    n0, n1, n2 = numbers.shape
+def _number(
+    cubes: NDArray[np.int32],
+    rows: NDArray[np.int32],
+    numbers: NDArray[np.int32],
+    limit: NDArray[np.int64],
+    i: int,
+    j: int,
+    k: int,
+) -> np.int32:
+    """Of a node; −1 where there is none."""
+    if not (0 <= i < limit[0] and 0 <= j < limit[1] and 0 <= k < limit[2]):
+        return np.int32(-1)
+    row = row_of_node(cubes, rows, i, j, k)
+    return np.int32(numbers[row, i % 8, j % 8, k % 8]) if row >= 0 else np.int32(-1)
+
+
+@compiled(nogil=True)
+def _neighbors(
+    cubes: NDArray[np.int32],
+    rows: NDArray[np.int32],
+    numbers: NDArray[np.int32],
+    nodes: NDArray[np.int32],
+    limit: NDArray[np.int64],
+) -> NDArray[np.int32]:
     result = np.empty((len(nodes), 6), dtype=np.int32)
     for p in range(len(nodes)):
-        i, j, k = nodes[p, 0], nodes[p, 1], nodes[p, 2]
-        result[p, 0] = numbers[i - 1, j, k] if i > 0 else -1
-        result[p, 1] = numbers[i + 1, j, k] if i + 1 < n0 else -1
-        result[p, 2] = numbers[i, j - 1, k] if j > 0 else -1
-        result[p, 3] = numbers[i, j + 1, k] if j + 1 < n1 else -1
-        result[p, 4] = numbers[i, j, k - 1] if k > 0 else -1
-        result[p, 5] = numbers[i, j, k + 1] if k + 1 < n2 else -1
+        i, j, k = np.int64(nodes[p, 0]), np.int64(nodes[p, 1]), np.int64(nodes[p, 2])
+        result[p, 0] = _number(cubes, rows, numbers, limit, i - 1, j, k)
+        result[p, 1] = _number(cubes, rows, numbers, limit, i + 1, j, k)
+        result[p, 2] = _number(cubes, rows, numbers, limit, i, j - 1, k)
+        result[p, 3] = _number(cubes, rows, numbers, limit, i, j + 1, k)
+        result[p, 4] = _number(cubes, rows, numbers, limit, i, j, k - 1)
+        result[p, 5] = _number(cubes, rows, numbers, limit, i, j, k + 1)
     return result
 
 
 @compiled(nogil=True)
 def _splat(
+    cubes: NDArray[np.int32],
+    rows: NDArray[np.int32],
     numbers: NDArray[np.int32],
     positions: NDArray[np.float64],
     values: NDArray[np.float64],
+    limit: NDArray[np.int64],
     out: NDArray[np.float64],
 ) -> None:
     for s in range(len(positions)):
@@ -140,20 +262,21 @@ def _splat(
         f, g, h = positions[s, 0] - i, positions[s, 1] - j, positions[s, 2] - k
         for corner in range(8):
             a, b, c = corner >> 2 & 1, corner >> 1 & 1, corner & 1
-            x, y, z = i + a, j + b, k + c
-            if 0 <= x < numbers.shape[0] and 0 <= y < numbers.shape[1] and 0 <= z < numbers.shape[2]:
-                p = numbers[x, y, z]
-                part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
-                if p >= 0:
-                    for d in range(4):
-                        out[p, d] += part * values[s, d]
+            p = _number(cubes, rows, numbers, limit, i + a, j + b, k + c)
+            part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
+            if p >= 0:
+                for d in range(4):
+                    out[p, d] += part * values[s, d]
 
 
 @compiled(nogil=True)
 def _read(
+    cubes: NDArray[np.int32],
+    rows: NDArray[np.int32],
     numbers: NDArray[np.int32],
     positions: NDArray[np.float64],
     values: NDArray[np.float64],
+    limit: NDArray[np.int64],
     out: NDArray[np.float64],
 ) -> None:
     for s in range(len(positions)):
@@ -162,13 +285,11 @@ def _read(
         total, weight = 0.0, 0.0
         for corner in range(8):
             a, b, c = corner >> 2 & 1, corner >> 1 & 1, corner & 1
-            x, y, z = i + a, j + b, k + c
-            if 0 <= x < numbers.shape[0] and 0 <= y < numbers.shape[1] and 0 <= z < numbers.shape[2]:
-                p = numbers[x, y, z]
-                part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
-                if p >= 0:
-                    total += part * values[p]
-                    weight += part
+            p = _number(cubes, rows, numbers, limit, i + a, j + b, k + c)
+            part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
+            if p >= 0:
+                total += part * values[p]
+                weight += part
         out[s] = total / weight if weight > 0.5 else np.nan
 
 

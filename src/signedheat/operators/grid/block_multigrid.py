@@ -18,6 +18,8 @@ FEWEST = 64
 """Nodes of a level from which on there is no coarser one."""
 LAST = 8
 """Pairs of sweeps on the last level."""
+SPARSE = 64
+"""Cells of a box for each node from which on a table of all of them is larger than sorting the nodes is slow."""
 STIFF = 1.8
 """By how much corrections are enlarged; 2 for smooth ones in the middle of many nodes, less at walls."""
 
@@ -64,7 +66,7 @@ class Multigrid:
         [200, 100, 50]
         """
         weights = np.where(neighbors >= 0, np.repeat(axis_weights, 2), 0.0).astype(np.float32)
-        levels = []
+        levels: list[Level] = []
         while True:
             diagonal = weights.sum(axis=1, dtype=np.float32)
             diagonal[diagonal == 0] = 1.0
@@ -97,13 +99,17 @@ class Multigrid:
 def _cubes(nodes: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Cubes of 2³ nodes, in order, and the cube of each node."""
     halves = nodes >> 1
+    halves -= halves.min(axis=0)
     extent = halves.max(axis=0).astype(np.int64) + 1
     flat = (halves[:, 0] * extent[1] + halves[:, 1]) * extent[2] + halves[:, 2]
-    taken = np.zeros(int(extent.prod()), dtype=np.bool_)
-    taken[flat] = True
-    number = np.cumsum(taken, dtype=np.int32) - 1
-    parents = np.stack(np.unravel_index(np.flatnonzero(taken), tuple(extent)), axis=1).astype(np.int32)
-    return parents, number[flat].astype(np.int32)
+    if extent.prod() > SPARSE * len(flat):
+        held, number = np.unique(flat, return_inverse=True)
+        cubes = number.astype(np.int32)
+    else:
+        taken = np.zeros(int(extent.prod()), dtype=np.bool_)
+        taken[flat] = True
+        held, cubes = np.flatnonzero(taken), (np.cumsum(taken, dtype=np.int32) - 1)[flat]
+    return np.stack(np.unravel_index(held, tuple(extent)), axis=1).astype(np.int32), cubes
 
 
 @compiled(nogil=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ class Blocks:
         result[inside[held]] = rows[number[held], a, b, c]
         return result
 
-    def values_at(self, values: NDArray[np.float32], nodes: NDArray[np.integer]) -> NDArray[np.float64]:
+    def values_at(self, values: NDArray[np.floating[Any]], nodes: NDArray[np.integer]) -> NDArray[np.float64]:
         """(k,) values at (k, 3) nodes; NaN where there is no block."""
         row = self.rows(nodes // SIDE)
         result = np.full(len(row), np.nan)
@@ -115,6 +116,14 @@ def block_points(places: NDArray[np.int32], steps: NDArray[np.float64]) -> NDArr
     inner = np.stack(np.meshgrid(*(np.arange(SIDE),) * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     nodes = places.astype(np.int64)[:, None] * SIDE + inner
     return nodes.reshape(-1, 3) * steps
+
+
+def off_grid(values: NDArray[Any], blocks: Blocks, nothing: float) -> None:
+    """Give nodes of the last of some blocks, (n, 8, 8, 8), that are not on the grid another value."""
+    for axis in range(3):
+        index = blocks.places[:, axis, None].astype(np.int64) * SIDE + np.arange(SIDE)
+        for row in np.flatnonzero((index >= blocks.shape[axis]).any(axis=1)):
+            np.moveaxis(values[row], axis, 0)[index[row] >= blocks.shape[axis]] = nothing
 
 
 @compiled(nogil=True)

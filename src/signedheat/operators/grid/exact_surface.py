@@ -119,20 +119,19 @@ class ExactSurface(Frozen):
             told = found.regular if self.telling is None else found.regular & self.telling[found.faces]
             sides = np.where(told, np.where(found.cosines < 0, -1.0, 1.0), 0.0)
         if len(self.crossings):
-            _, which = self._crossing_tree.query(sorted_points)
-            other = np.empty(n)
             reach = float(np.linalg.norm(self.steps))
-            distances_to_crossings(sorted_points, which.astype(np.int32), self.crossings, reach, other)
-            rows = self.crossings[which]
-            touched = sorted_points - other[:, None] * away_from_circles(sorted_points, rows)
+            near, which = self._nearest_crossings(sorted_points, distances + reach)
+            points, rows = sorted_points[near], self.crossings[which]
+            other = np.empty(len(near))
+            distances_to_crossings(points, which.astype(np.int32), self.crossings, reach, other)
+            touched = points - other[:, None] * away_from_circles(points, rows)
             strayed = np.linalg.norm(touched - rows[:, 1:4], axis=1) > 0.5 * reach  # off the end of the zero set
             touched[strayed] = rows[strayed, 1:4]
-            other = np.where(strayed, np.linalg.norm(sorted_points - rows[:, 1:4], axis=1), other)
-            completed = other < distances
-            distances = np.minimum(distances, other)
-            feet = np.where(completed[:, None], touched, feet)
-            directions = np.where(completed[:, None], rows[:, 5:8], directions)
-            sides = np.where(completed, 0.0, sides)
+            other = np.where(strayed, np.linalg.norm(points - rows[:, 1:4], axis=1), other)
+            nearer = other < distances[near]
+            taken = near[nearer]
+            completed[taken], sides[taken] = True, 0.0
+            distances[taken], feet[taken], directions[taken] = other[nearer], touched[nearer], rows[nearer, 5:8]
         apart = sorted_points - feet
         lengths = np.linalg.norm(apart, axis=1)
         clear = lengths > 1e-12 * np.abs(sorted_points).max(initial=1e-290)
@@ -141,6 +140,25 @@ class ExactSurface(Frozen):
         back = np.empty(n, dtype=np.int64)
         back[order] = np.arange(n)
         return distances[back], feet[back], directions[back], sides[back], completed[back]
+
+    def _nearest_crossings(
+        self, points: NDArray[np.float64], limits: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Those of (n, 3) points that may have a crossing within their limit, and the nearest for each.
+
+        Points with limits of about the same size are asked for together: most are near a face, and far from any
+        crossing, where a search without a limit is slow.
+        """
+        sizes = np.minimum(np.ceil(2 * np.log2(limits / float(self.steps.max()))), np.finfo(np.float64).maxexp)
+        found, which = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+        for size in np.unique(sizes):
+            rows = np.flatnonzero(sizes == size)
+            limit = float(limits[rows].max()) * (1 + 1e-9)
+            _, nearest = self._crossing_tree.query(points[rows], distance_upper_bound=limit)
+            there = nearest < len(self.crossings)
+            found.append(rows[there])
+            which.append(nearest[there])
+        return np.concatenate(found), np.concatenate(which)
 
     def on_level(self, points: NDArray[np.float64], values: NodeValues, level: float) -> NDArray[np.float64]:
         """Points on edges of the grid, where values of the nodes pass a level, moved along to where distance does.
