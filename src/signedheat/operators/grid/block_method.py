@@ -219,12 +219,12 @@ def _number(
     i: int,
     j: int,
     k: int,
-) -> np.int32:
+) -> int:
     """Of a node; −1 where there is none."""
     if not (0 <= i < limit[0] and 0 <= j < limit[1] and 0 <= k < limit[2]):
-        return np.int32(-1)
+        return -1
     row = row_of_node(cubes, rows, i, j, k)
-    return np.int32(numbers[row, i % 8, j % 8, k % 8]) if row >= 0 else np.int32(-1)
+    return int(numbers[row, i % 8, j % 8, k % 8]) if row >= 0 else -1
 
 
 @compiled(nogil=True)
