@@ -27,8 +27,16 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 root_doc = "index"
+templates_path = ["_templates"]  # pages of the reference, with the examples that use the name
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build", "gallery/**/*.ipynb", "gallery/**/*.py", "gallery/**/*.zip", "gallery/**/*.md5"]
+exclude_patterns = [
+    "_build",
+    "_templates",
+    "gallery/**/*.ipynb",
+    "gallery/**/*.py",
+    "gallery/**/*.zip",
+    "gallery/**/*.md5",
+]
 html_theme = "furo"
 html_title = f"signedheat {release}"
 html_logo = None
@@ -69,6 +77,8 @@ def setup(app: Sphinx) -> None:
 sphinx_gallery_conf = {
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],
+    "backreferences_dir": "gallery/backreferences",
+    "doc_module": ("signedheat",),
     "filename_pattern": r"\.py$",
     "image_scrapers": [scrape],
     "within_subsection_order": "FileNameSortKey",
