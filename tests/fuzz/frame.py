@@ -49,7 +49,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -150,11 +150,7 @@ def run_case(chosen: Family, seed: int, number: int) -> Outcome:
         return Outcome(chosen.name, seed, number, kind, failed, about, time.monotonic() - begin)
 
     with tempfile.TemporaryDirectory(prefix="fuzz-") as folder, warnings.catch_warnings():
-        warnings.simplefilter("error")
-        warnings.simplefilter("ignore", UserWarning)
-        warnings.filterwarnings(
-            "ignore", "Setting the shape on a NumPy", DeprecationWarning, "skimage"
-        )  # as pytest does
+        fail_on_warnings("ignore")
         try:
             subject = chosen.build(random, Path(folder))
         except BaseException:
@@ -173,6 +169,13 @@ def run_case(chosen: Family, seed: int, number: int) -> Outcome:
     if grown > chosen.memory:
         return outcome("memory", True, f"{grown / 1e6:.0f} MB more than before")
     return outcome(kind)
+
+
+def fail_on_warnings(of_users: Literal["ignore", "always"]) -> None:
+    """Make warnings errors, but for our own words to users, and for what other packages owe to newer ones."""
+    warnings.simplefilter("error")
+    warnings.simplefilter(of_users, UserWarning)
+    warnings.filterwarnings("ignore", category=DeprecationWarning, module="(skimage|nrrd)")
 
 
 def _peak() -> int:

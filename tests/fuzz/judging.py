@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import signedheat as sh
-from fuzz.frame import Wrong
+from fuzz.frame import Wrong, fail_on_warnings
 from signedheat.cache import fingerprint
 
 BEYOND_REASON = 100.0
@@ -49,8 +49,7 @@ def unchanged(*arrays: Any) -> Iterator[None]:
 def announced(call: Callable[[], Any]) -> tuple[Any, bool]:
     """The result of a call, and whether it warned of parts that no source reaches; other warnings are failures."""
     with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("error")
-        warnings.simplefilter("always", UserWarning)
+        fail_on_warnings("always")
         result = call()
     return result, any(issubclass(w.category, sh.UnreachedWarning) for w in caught)
 
