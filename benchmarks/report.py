@@ -98,9 +98,9 @@ def page(kept: dict[str, dict[str, str]]) -> str:
         "# Benchmarks",
         "",
         "What the comparisons print, unshortened: one run each, all programs of a comparison one after the other on",
-        "the same machine. Times of single runs scatter by a third on a shared machine: trust ratios. A peer is called",
-        "as its best user would call it; where one is better, the table shows it. `python benchmarks/report.py` makes",
-        "this page.",
+        "the same machine, which was busy with other work: times are up to several times those of an idle one, and",
+        "scatter, so trust ratios, and figures of error and memory. A peer is called as its best user would call it;",
+        "where one is better, the table shows it. `python benchmarks/report.py` makes this page.",
     ]
     for name, comparison in COMPARISONS.items():
         if name in kept:
