@@ -92,3 +92,7 @@ def test_no_remedy_hides_in_a_cause():
         where for where, cause, _ in calls_of_errors() if re.search(remedy, cause) or cause.startswith('f"{path}: ')
     ]
     assert found == []
+
+
+def test_what_is_quoted_keeps_errors_to_one_line():
+    assert str(sh.SignedHeatError(f"no {np.zeros((2, 2))!r}", remedy="none")) == "no array([[0., 0.], [0., 0.]]): none"

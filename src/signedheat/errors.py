@@ -39,6 +39,7 @@ class SignedHeatError(ValueError):
         element: str | None = None,
         path: str | os.PathLike[str] | None = None,
     ) -> None:
+        cause = " ".join(cause.split())  # one line, whatever was quoted
         super().__init__(cause)
         self.cause, self.remedy, self.element = cause, remedy, element
         self.path = None if path is None else str(path)

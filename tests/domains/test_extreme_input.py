@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.degenerate_meshes import with_caps, with_needles
 from shapes.surface_cases import sphere, square
 from shapes.tet_cases import boxes
@@ -212,3 +213,44 @@ def test_flat_tets_among_others_do_no_harm():
         assert error.remedy or error.element
     else:
         assert np.isfinite(field.values).all() and np.isfinite(sharp.values).all()
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-160, 1e160, 1e300])
+def test_only_the_directions_of_normals_of_curves_count(scale):
+    mesh = sphere(2)
+    ring = mesh.level_set(mesh.vertices[:, 2], 0.15)[0]
+    normals = np.random.default_rng(0).normal(size=(ring.n_segments, 3)) * 0.1 + [0, 0, 1]
+    fields = [
+        sh.SignedHeatSolver(mesh)
+        .distance(sh.Curve(ring.faces, ring.barycentric, True, normals=factor * normals))
+        .values
+        for factor in (1.0, scale)
+    ]
+    np.testing.assert_allclose(fields[1], fields[0], atol=1e-12)
+
+
+@pytest.mark.parametrize("area", [1e-2, 1e-6, 1e-10])
+def test_convex_sharpening_on_tets_holds_sources_of_any_size(area):
+    mesh = boxes((2, 2, 2), 1.0)
+    size = np.sqrt(area)
+    middle = mesh.vertices.mean(axis=0) + np.array([0.01, 0.02, 0.03])
+    patch = sh.TriangleMesh(middle + size * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.1]]), [[0, 1, 2]])
+    phi = sh.SignedHeatSolver(mesh).distance(patch)
+    sharp = sh.sharpen(phi, sh.Convex(max_rounds=20))
+    assert np.abs(sharp.values).max() < 3 * np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+
+
+def test_voxels_whose_corners_fall_together_are_refused():
+    volume = np.random.default_rng(0).random((4, 4, 4)) < 0.5
+    voxels = sh.DigitalSurface(volume, 1e-12, [1e6, 1e6, 1e6])
+    with refused(sh.GeometryError, "spacing"):
+        sh.SignedHeatSolver(voxels).distance(voxels.points_at(0))
+
+
+@pytest.mark.parametrize("name", ["closed", "oriented"])
+@pytest.mark.parametrize("value", [None, 1, "yes", np.zeros((2, 2, 2)), np.ma.masked_array([True], mask=True)])
+def test_flags_are_refused_in_one_line(name, value):
+    mesh = sphere(1)
+    with refused(sh.SignedHeatError, name) as caught:
+        mesh.polyline(mesh.vertices[:3], **{name: value})
+    assert "\n" not in str(caught.value)

@@ -33,7 +33,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     on_edges = edges.face_edges[crossed[:, None], sides]
 
     tail, head = (values[edges.vertices[:, k]] for k in (0, 1))
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         along = np.clip((level - tail) / (head - tail), 0.0, 1.0)
     oriented = is_consistent(mesh)
     normals = None if oriented else gradients(mesh, values, crossed)

@@ -86,7 +86,8 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             directions = frozen(directions / np.linalg.norm(directions, axis=1)[:, None])
         if areas is not None:
             sizes = numbers(areas, "areas")
-            _same_length(sizes, positions, "areas")
+            if sizes.ndim == 1:
+                _same_length(sizes, positions, "areas")
             if sizes.ndim != 1 or not (np.isfinite(sizes) & (sizes > 0)).all():
                 raise GeometryError("areas must be one positive, finite number per point", element="areas")
             sizes = frozen(sizes)

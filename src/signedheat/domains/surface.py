@@ -12,7 +12,7 @@ from ..geometry.surface_points import corners_at
 from .curves import Curve, SurfacePoints
 from .level_sets import boundary_curves, level_set, region_boundary
 from .projection import projected_curve
-from .validation import array_of, finite_number, numbers
+from .validation import array_of, finite_number, flag, numbers
 
 
 class Surface(Frozen):
@@ -115,6 +115,7 @@ class Surface(Frozen):
         >>> mesh.polyline([[0.8, 0.2, 0.01], [0.2, 0.8, 0.01]]).barycentric.round(3).tolist()
         [[0.2, 0.6, 0.2], [0.5, 0.0, 0.5], [0.2, 0.2, 0.6]]
         """
+        closed, oriented = flag(closed, "closed"), flag(oriented, "oriented")
         return projected_curve(self.triangulation, points, closed, oriented, max_distance)
 
     def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:

@@ -123,6 +123,7 @@ def piecewise_distance(
             assert not isinstance(domain, IntrinsicTriangulation)  # which `conforms` refuses
             domain = intrinsic_delaunay(domain.triangulation, keep=listed)
             discretization = _lowered(domain)
+            holds(discretization, listed)  # or it is refused: curves on faces so flat that rounding moves them
     with stopwatch("diffuse"):
         discretization, groups = discretization.adapt(listed)
         triangles = discretization.triangles
@@ -243,7 +244,7 @@ def is_continuous(
 def gradients(triangles: IntrinsicMesh, at_corners: NDArray[np.float64]) -> NDArray[np.complex128]:
     """(m,) gradients of functions that are linear in every face, in its layout."""
     opposite = 1j * np.roll(triangles.edge_vectors, -1, axis=1)
-    result: NDArray[np.complex128] = (at_corners * opposite).sum(axis=1) / (2.0 * triangles.face_areas)
+    result: NDArray[np.complex128] = (at_corners * opposite).sum(axis=1) / (2.0 * triangles.areas_as_divisors)
     return result
 
 

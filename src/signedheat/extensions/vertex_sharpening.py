@@ -14,7 +14,7 @@ from ..diagnostics import GeodesicWindows, Note
 from ..discretization import SourceTerm, discretize
 from ..domains.curves import Curve, CurvesAndPoints, SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
-from ..errors import GeometryError, UnsupportedTypeError
+from ..errors import GeometryError, SourceError, UnsupportedTypeError
 from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import interpolation_at
 from ..geometry.geodesics.exact import distance_to_segments, distance_to_zero_line
@@ -51,7 +51,10 @@ def _(
     if isinstance(method, Curve | SurfacePoints | Sequence):
         method, curves = None, method
     if curves is not None:
-        method = ToCurves(list(chain.from_iterable(surface.segments(as_list(curves)))))
+        parts = list(chain.from_iterable(surface.segments(as_list(curves))))
+        if not parts:
+            raise SourceError("there are no curves to sharpen to", remedy="leave them out", element="curves")
+        method = ToCurves(parts)
     elements = LinearElements.on_triangles(surface.triangles)
     new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), method, progress)
     values = new if surface.restriction is None else new[surface.restriction]

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import floor
+from heapq import heappop, heappush
+from itertools import pairwise
+from math import dist, floor
 
 Point = tuple[float, float]
 Cell = tuple[int, int]
@@ -178,6 +180,48 @@ def triangulate(
     for a, b in segments:
         force(points, apex, leaving, a, b)
     return sorted({rotated(u, v, w) for (u, v), w in apex.items()})
+
+
+def paths_along(
+    points: Sequence[Point], triangles: Sequence[Triangle], chains: Sequence[Sequence[int]]
+) -> list[list[int]]:
+    """The chains, with segments that are no edges replaced by the shortest ways along edges.
+
+    Segments become edges, except where points nearer to each other than `CLOSE` are in their way, which such a way
+    goes through.
+
+    Examples
+    --------
+    >>> paths_along([(0.0, 0.0), (1.0, 0.0), (0.5, 1e-12), (0.5, -1.0)], [(0, 2, 3), (2, 1, 3)], [[0, 1]])
+    [[0, 2, 1]]
+    """
+    around = defaultdict(set)
+    for triangle in triangles:
+        for u, v in edges_of(triangle):
+            around[u].add(v)
+            around[v].add(u)
+    return [
+        [chain[0], *(i for a, b in pairwise(chain) for i in ([b] if b in around[a] else way(points, around, a, b)))]
+        for chain in chains
+    ]
+
+
+def way(points: Sequence[Point], around: dict[int, set[int]], a: int, b: int) -> list[int]:
+    """Points on the shortest way along edges from one to another, without the first (Dijkstra)."""
+    waiting, before = [(0.0, a, a)], dict[int, int]()
+    while waiting:
+        length, u, came_from = heappop(waiting)
+        if u in before:
+            continue
+        before[u] = came_from
+        if u == b:
+            break
+        for v in around[u]:
+            heappush(waiting, (length + dist(points[u], points[v]), v, u))
+    path = [b]
+    while before[path[-1]] != a:
+        path.append(before[path[-1]])
+    return path[::-1]
 
 
 def rotated(u: int, v: int, w: int) -> tuple[int, int, int]:

@@ -72,6 +72,9 @@ def given_directions(
     On an edge the normal is projected into the plane of each of the edge's faces; the mean of these projections,
     expressed in the frame of the edge, is used.
     """
+    largest = np.abs(normals).max(axis=1, initial=0.0)
+    extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # whose squares cannot be computed
+    normals = normals / np.where(extreme, largest, 1.0)[:, None]
     inside = np.flatnonzero(edges < 0)
     directions = np.zeros(len(faces), dtype=np.complex128)
     directions[inside] = in_layout(triangles, positions, faces[inside], normals[inside])

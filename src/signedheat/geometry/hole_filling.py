@@ -114,7 +114,9 @@ def _ears(
         u, v, w = here - before, after - here, before - after
         twice_area = np.cross(u, v) @ normal / np.linalg.norm(normal)
         product = np.prod([np.linalg.norm(d, axis=1) for d in (u, v, w)], axis=0)
-        for ear in np.argsort(np.where(twice_area > 0, product / np.maximum(twice_area, 1e-300), np.inf)):
+        with np.errstate(over="ignore"):
+            radii = np.where(twice_area > 0, product / np.maximum(twice_area, 1e-300), np.inf)
+        for ear in np.argsort(radii):
             i, j, k = loop[ear - 1], loop[ear], loop[(ear + 1) % len(loop)]
             diagonal = (min(i, k), max(i, k))
             if twice_area[ear] > 0 and diagonal not in known and diagonal not in made:

@@ -19,6 +19,8 @@ from .edges import EdgeTable, edge_table
 from .triangle_kernels import gather
 
 Index = NDArray[np.int64] | slice
+FLATTEST = 1e-18
+"""Area relative to the square of the longest edge, below which a face is taken to be as thick as that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,12 +112,17 @@ class IntrinsicMesh(Frozen):
         first, _, last = self.edge_vectors.T
         return -0.5 * (np.conj(first) * last).imag
 
+    @property
+    def areas_as_divisors(self) -> NDArray[np.float64]:
+        """(m,) areas, those of flat faces as if they were `FLATTEST`."""
+        return np.maximum(self.face_areas, FLATTEST * (np.abs(self.edge_vectors) ** 2).max(axis=1))
+
     @cached_property
     def corner_cotangents(self) -> NDArray[np.float64]:
         """(m, 3) cotangent of the angle at each corner."""
         leaving = self.edge_vectors
         arriving = -np.roll(leaving, 1, axis=1)
-        return (np.conj(leaving) * arriving).real / (2.0 * self.face_areas)[:, None]
+        return (np.conj(leaving) * arriving).real / (2.0 * self.areas_as_divisors)[:, None]
 
     @cached_property
     def edge_directions(self) -> NDArray[np.complex128]:

@@ -164,7 +164,8 @@ def cut_into_triangles(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
         before, here, after = np.roll(left, 1), left, np.roll(left, -1)
         a, b, c = plane[before], plane[here], plane[after]
         area = (np.conj(b - a) * (c - a)).imag
-        quality = area / (np.abs(b - a) ** 2 + np.abs(c - b) ** 2 + np.abs(a - c) ** 2)
+        size = np.abs(b - a) ** 2 + np.abs(c - b) ** 2 + np.abs(a - c) ** 2
+        quality = area / np.where(size > 0, size, 1.0)
         z = plane[left][:, None]
         inside = np.ones((len(left), len(left)), dtype=bool)  # [point, ear]
         for u, v in ((a, b), (b, c), (c, a)):

@@ -10,10 +10,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..discretization import Levels, SourceTerm
+from ..linear import Factor
 from .direct_integration import BATCH, DirectIntegration
 
 PIN = 1e6
 """Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
+
+ANCHOR = 10.0
+"""Least stiffness of all springs together that hold φ, relative to the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,11 @@ class SpringIntegration(DirectIntegration):
             constants = np.linalg.solve(balance, forces @ (rows @ fitted - values))
             fitted = fitted + factor.solve(pull @ (members @ constants))
         return self._centered(fitted, source)
+
+    def anchored(self, source: SourceTerm) -> Factor:
+        """Factor of C with φ held at zero along the source, however small a part of it lies in the domain."""
+        springs, least = self.springs(source), ANCHOR * float(self.stiffness.diagonal().max())
+        return self._pulled_factor(source.interpolation, springs * max(1.0, least / float(springs.sum())))
 
     def springs(self, source: SourceTerm) -> NDArray[np.float64]:
         """(s,) stiffness of the springs: stiff for samples at vertices, soft for those inside cells."""

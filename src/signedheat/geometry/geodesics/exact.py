@@ -23,7 +23,7 @@ from .initial_windows import MADE, WANTED, Faces, Search
 from .propagation_kernels import ROUND, continue_search, start_search
 from .sources import GeodesicSources, PlacedSegments, zero_line
 
-WINDOWS_PER_HALFEDGE = 300
+WINDOWS_PER_HALFEDGE = 100
 """A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual."""
 
 Report: TypeAlias = Callable[[], None]

@@ -32,6 +32,8 @@ from .windows import (
 )
 
 ROUND = 1e-10
+MANY = 4
+"""Windows on a halfedge, the comparing of which with each other counts as the making of one."""
 
 
 @compiled(nogil=True)
@@ -59,6 +61,11 @@ def _collect(
     while row >= 0:
         count += 1
         row = following[row]
+    row, before = settled[halfedge], 0
+    while row >= 0:
+        before += 1
+        row = following[row]
+    counts[MADE] += count * (count + before) // MANY**2  # each is compared with every other one
     chosen = np.empty((count, 6))
     count, row = 0, queued[halfedge]
     while row >= 0:

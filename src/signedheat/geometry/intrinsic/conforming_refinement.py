@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..constrained_triangulation import arrange, triangulate
+from ..constrained_triangulation import arrange, paths_along, triangulate
 from ..curve_segments import CurveSegments
 from ..edges import EdgeTable
 from ..intrinsic_mesh import IntrinsicMesh
@@ -244,7 +244,8 @@ class FaceCutter:
         positions = q[0] + flat[:, 0] * (q[1] - q[0]) + flat[:, 1] * (q[2] - q[0])
 
         segments = [pair for chain in chains for pair in pairwise(chain)]
-        for corner in triangulate(points, sides, segments):
+        parts = triangulate(points, sides, segments)
+        for corner in parts:
             edges, ahead = [], []
             for u, v in pairwise((*corner, corner[0])):
                 if (u, v) not in edge_of:
@@ -254,7 +255,7 @@ class FaceCutter:
                 ahead.append(edge_of[u, v][1])
             self.faces.append(NewFace(face, [vertices[i] for i in corner], edges, ahead, positions[list(corner)]))
 
-        for p, chain in zip(inside, chains, strict=True):
+        for p, chain in zip(inside, paths_along(points, parts, chains), strict=True):
             whole = abs(positions[chain[-1]] - positions[chain[0]])
             for u, v in pairwise(chain):
                 edge = (edge_of.get((u, v)) or edge_of[v, u])[0]

@@ -10,8 +10,16 @@ from numpy.typing import NDArray
 
 from ...frozen import Frozen
 from ..curve_segments import CurveSegments
-from ..intrinsic_mesh import IntrinsicMesh
-from ..surface_points import SNAP, barycentric_in, concatenated, locate_points, unique_points
+from ..intrinsic_mesh import FLATTEST, IntrinsicMesh
+from ..surface_points import (
+    SNAP,
+    LocatedPoints,
+    barycentric_in,
+    concatenated,
+    contain,
+    locate_points,
+    unique_points,
+)
 from .conforming_refinement import FaceCutter, MergedSources, affected_elements
 from .history import History, straight_lines
 
@@ -96,7 +104,14 @@ def differences_of(
     q = triangles.corner_positions[faces]
     u, v = (q[:, 1] - q[:, 0])[:, None], (q[:, 2] - q[:, 0])[:, None]
     area = (np.conj(u) * v).imag
+    flat = np.flatnonzero(area[:, 0] <= FLATTEST * (np.abs(u) ** 2 + np.abs(v) ** 2)[:, 0])
+    area[flat] = 1.0
     second, third = (np.conj(vectors) * v).imag / area, (np.conj(u) * vectors).imag / area
+    if len(flat):  # the shortest of the solutions that come nearest
+        sides = np.stack([u[flat], v[flat]], axis=-1)
+        sides = np.stack([sides.real, sides.imag], axis=-2)
+        parts = np.stack([vectors[flat].real, vectors[flat].imag], axis=-1)
+        second[flat], third[flat] = np.moveaxis(np.einsum("fkij,fkj->fki", np.linalg.pinv(sides, 1e-7), parts), -1, 0)
     return np.stack([-second - third, second, third], axis=-1)
 
 
@@ -118,36 +133,67 @@ def transfer_segments(
     vectors = np.stack([along, growth], axis=1)
     middle = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
     lines = straight_lines(after, *middle)
-
-    along = lines.vectors[:, 0]
-    fraction = np.einsum("rk,rk->r", lines.ends - lines.starts, along) / np.einsum("rk,rk->r", along, along)
-    keep = np.abs(fraction) > SNAP
-    owners, faces = lines.owners[keep], lines.faces[keep]
-    starts, ends = locate_points(after, faces, lines.starts[keep]), locate_points(after, faces, lines.ends[keep])
-    last = np.append(np.diff(owners) > 0, True)
-    first = np.append(True, last[:-1])
-    located = concatenated([nodes, ends[np.flatnonzero(~last)]])
-    who_end = np.where(last, source.ends[owners, 1], len(nodes) + np.cumsum(~last) - 1)
-    who_start = np.where(first, source.ends[owners, 0], np.roll(who_end, 1))
-    chosen, who = unique_points(located)
+    owners, faces, carried = lines.owners, lines.faces, lines.vectors
+    starts, ends = locate_points(after, faces, lines.starts), locate_points(after, faces, lines.ends)
+    located = concatenated([nodes, ends, starts])
+    joined = _joined(after, located, faces, owners, source.ends)
+    who = unique_points(located)[1]
+    keep = who[joined[:, 0]] != who[joined[:, 1]]
+    owners, faces, carried, starts, ends, joined = (
+        part[keep] for part in (owners, faces, carried, starts, ends, joined)
+    )
 
     # the angle between segment and normal is known; the transferred normal only tells the side, however thin the faces
     corners = after.corner_positions[faces]
     steps = ((ends.barycentric - starts.barycentric) * corners).sum(axis=1)
-    carried = np.conj(steps) * (lines.vectors[keep, 1] * corners).sum(axis=1)
+    carried = np.conj(steps) * (carried[:, 1] * corners).sum(axis=1)
     turn = (directions / (at_piece * np.abs(directions / at_piece)))[owners]
     grown = steps * np.where(carried.imag * turn.imag < 0, np.conj(turn), turn)
-    off = (starts.barycentric == 0) & (ends.barycentric == 0)
+    begin, finish = (barycentric_in(after, faces, located[end]) for end in joined.T)
+    off = (begin == 0) & (finish == 0)
     side = (off.argmax(axis=1) + 1) % 3
     on_edge = off.any(axis=1)
+    used = np.union1d(np.arange(len(nodes)), joined)
+    place = np.searchsorted(used, joined)
+    chosen, who = unique_points(located[used])
     return CurveSegments(
-        located[chosen],
-        who[np.stack([who_start, who_end], axis=1)],
+        located[used][chosen],
+        who[place],
         faces,
         np.where(on_edge, after.edges.face_edges[faces, side], -1),
         np.where(on_edge, after.in_edge_frames(grown, faces, side), grown),
         source.oriented,
     )
+
+
+def _joined(
+    triangles: IntrinsicMesh,
+    points: LocatedPoints,
+    faces: NDArray[np.int64],
+    owners: NDArray[np.int64],
+    nodes: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """(r, 2) the points that pieces of segments run between: each from where the last one ended, or from a node.
+
+    Parameters
+    ----------
+    points : LocatedPoints
+        The nodes, then where each piece ends in its face, then where each begins.
+    faces, owners : (r,) int
+        Face and segment of each piece.
+    nodes : (s, 2) int
+        Ends of the segments.
+    """
+    n = len(points) - 2 * len(faces)
+    last = np.append(np.diff(owners) > 0, True)
+    first = np.append(True, last[:-1])
+    ends = np.where(last, nodes[owners, 1], n + np.arange(len(owners)))
+    starts = np.where(first, nodes[owners, 0], np.roll(ends, 1))
+    joined = np.stack([starts, ends], axis=1)
+    for k, own in enumerate((n + len(faces), n)):  # where rounding has put a node beyond the face: their own ends
+        beyond = np.flatnonzero(~contain(triangles, faces, points[joined[:, k]]))
+        joined[beyond, k] = own + beyond
+    return joined
 
 
 def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[NDArray, NDArray, NDArray, NDArray]:

@@ -21,8 +21,13 @@ TOLERANCE = 1e-6
 """Relative residual at which conjugate gradients stop."""
 STIFFNESS = 10.0
 """Penalty of the augmented Lagrangian, in 1/h."""
+LEAST, STIFFEST = 1e-6, 30.0
+"""Of penalties, relative to the default: in the preconditioner, and as a penalty."""
 MULTIPLIER_STEPS = 5
 """Steps of the augmented Lagrangian."""
+
+NEGLIGIBLE = 1e-6
+"""Rows of samples that differ by less are taken as equal, and their levels as contradictory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +59,16 @@ class GridIntegration(SolvesEach):
         return phi
 
     def penalize(self, divergence: NDArray[np.float64], source: GridSource, strength: float) -> NDArray[np.float64]:
-        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples."""
+        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas of the samples.
+
+        What is as good as nothing imposes nothing. Beyond `STIFFEST`, where conjugate gradients would not end, the
+        level is imposed exactly.
+        """
         levels = Levels(np.zeros(len(source.weights)))
+        if strength < LEAST**2 * self.soft_weight:
+            return self.solve(divergence, source)
+        if strength > STIFFEST * self.soft_weight:
+            return self.fit_exactly(divergence, source, levels)
         zero = np.zeros(len(source.weights))
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
@@ -94,8 +107,8 @@ class GridIntegration(SolvesEach):
             pull = strength * deviation(rows @ phi, source, free)
             return (laplacian(phi.reshape(self.grid.shape), self.grid.spacing) + spread(pull)).ravel()
 
-        # constants are in the kernel of C; their cost is that of the penalty alone
-        constant = strength * float(weights.sum()) / self.grid.n_nodes
+        # constants are in the kernel of C; their cost is that of the penalty alone, and they are settled at the end
+        constant = max(strength, LEAST * self.soft_weight) * float(weights.sum()) / self.grid.n_nodes
 
         def precondition(residual: NDArray[np.float64]) -> NDArray[np.float64]:
             inverse = solve_poisson(residual.reshape(self.grid.shape), self.grid.spacing)
@@ -104,6 +117,7 @@ class GridIntegration(SolvesEach):
         wanted = strength * deviation(levels.values, source, free) - deviation(multipliers, source, free)
         right_hand_side = (divergence + spread(wanted)).ravel()
         phi = conjugate_gradients(apply, right_hand_side, precondition, start.ravel(), TOLERANCE)
+        phi += np.average(wanted / strength - deviation(rows @ phi, source, free), weights=source.weights)
         return phi.reshape(self.grid.shape)
 
 
@@ -142,5 +156,6 @@ def least_correction(values: NDArray[np.float64], source: GridSource) -> NDArray
     """(n_nodes,) grid function of least norm that interpolates these values at the samples, in least squares."""
     touched = np.unique(source.interpolation.indices)
     change = np.zeros(source.grid.n_nodes)
-    change[touched] = lsqr(source.interpolation[:, touched], values, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
+    columns = source.interpolation[:, touched]
+    change[touched] = lsqr(columns, values, damp=NEGLIGIBLE, atol=1e-10, btol=1e-10, iter_lim=20000)[0]
     return change

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...discretization import discretize
 from ...domains.digital_surface import DigitalSurface
+from ...errors import GeometryError
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from ...geometry.surfels import count_surfels, separated_edges
@@ -28,7 +29,14 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
     mesh, corners = domain.triangulation, domain.smooth_vertices
     positions = np.concatenate([corners, corners[domain.surfels.corners].mean(axis=1)])
     placed = positions[mesh.faces]
-    lengths, _ = mollify(np.linalg.norm(np.roll(placed, -1, axis=1) - placed, axis=2), 1e-6)
+    sides = np.linalg.norm(np.roll(placed, -1, axis=1) - placed, axis=2)
+    if not sides.any():
+        raise GeometryError(
+            "the faces of the voxels are so small that their corners fall together",
+            remedy="scale spacing, or move origin to zero",
+            element="spacing",
+        )
+    lengths, _ = mollify(sides, 1e-6)
     edges = separated_edges(mesh.edges, domain.surfels)
     triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
     extent = float((domain.bounds[1] - domain.bounds[0]).max())

@@ -1,0 +1,37 @@
+"""What the fuzzer has found, again: a case or more of each kind of failure."""
+
+from __future__ import annotations
+
+import pytest
+
+from fuzz.frame import families, run_case
+
+FOUND = [
+    # points nearer to each other than rounding, along segments that have to become edges
+    ("surface distance", 100, 175), ("surface use", 103, 132), ("surface use", 104, 93),
+    ("surface triangulation", 102, 76), ("surface triangulation", 102, 158), ("surface triangulation", 105, 43),
+    ("surface piecewise", 102, 158),
+    # ends of segments beyond the face in which they lie
+    ("surface distance", 100, 191), ("surface use", 102, 2), ("surface use", 105, 68), ("surface piecewise", 103, 156),
+    ("surface piecewise", 104, 236),
+    # faces without area
+    ("surface use", 102, 212), ("surface use", 101, 223), ("surface piecewise", 102, 218), ("surface use", 100, 168),
+    # numbers whose squares or quotients leave the range
+    ("surface use", 100, 21), ("surface piecewise", 106, 119), ("arguments", 109, 172),
+    # weights of soft constraints
+    ("space grid", 100, 113), ("space grid", 103, 188), ("space grid", 103, 246), ("space grid", 112, 86),
+    ("space grid", 107, 217),
+    # samples that nearly coincide
+    ("space grid", 100, 175),
+    # sources that hardly touch the tets
+    ("space tets", 101, 49), ("space tets", 103, 81), ("space tets", 107, 207),
+    # arguments that are quoted, compared or counted
+    ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
+    ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "seed", "number"), FOUND)
+def test_what_was_found_stays_mended(name, seed, number):
+    outcome = run_case(families()[name], seed, number)
+    assert not outcome.failed, str(outcome)
