@@ -20,14 +20,17 @@ FOUND = [
     ("surface use", 100, 21), ("surface piecewise", 106, 119), ("arguments", 109, 172),
     # weights of soft constraints
     ("space grid", 100, 113), ("space grid", 103, 188), ("space grid", 103, 246), ("space grid", 112, 86),
-    ("space grid", 107, 217),
+    ("space grid", 107, 217), ("space grid", 208, 161), ("space grid", 206, 449),
+    ("space solid", 207, 161), ("space solid", 210, 435),
     # samples that nearly coincide
     ("space grid", 100, 175),
     # sources that hardly touch the tets
     ("space tets", 101, 49), ("space tets", 103, 81), ("space tets", 107, 207),
+    # paths through edges that are a rounding shorter than none
+    ("surface use", 202, 43),
     # arguments that are quoted, compared or counted
     ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
-    ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),
+    ("arguments", 206, 22), ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),
 ]  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from ..domains.grid import room_around
 from ..domains.kinds import Shape, ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
-from ..domains.validation import finite_number
+from ..domains.validation import finite_number, refuse_extreme
 from ..errors import GeometryError, MemoryLimitError
 from ..lowering.area_elements import area_elements, bounds_around
 from ..memory import refuse_beyond_memory
@@ -96,6 +96,7 @@ def tetrahedralize(
             element="resolution or grading",
         )
     spacing = longest / size
+    refuse_extreme(lower - padding, upper + padding, "padding")
     lower, sides = lower - padding, upper - lower + 2 * padding
     depth = int(np.clip(np.floor(np.log2(np.maximum(sides.max() / spacing / 4, 1))), 0, 16))
     if np.isinf(grading):

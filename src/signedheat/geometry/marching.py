@@ -52,6 +52,9 @@ def closed_surface(
     if np.isinf(values).any():
         raise GeometryError("infinite values have no contour", element="values")
     height = closed_at_unknown(heights_above(values, spacing, level))
+    largest = float(np.abs(height).max())
+    if not 1e-30 < largest < 1e30 and largest > 0:  # what follows computes with single precision
+        height = height / largest
     shift = 0
     if wall_signs(height) == {True, False}:
         height, shift = capped(height), 1

@@ -23,8 +23,9 @@ from .initial_windows import MADE, WANTED, Faces, Search
 from .propagation_kernels import ROUND, continue_search, start_search
 from .sources import GeodesicSources, PlacedSegments, zero_line
 
-WINDOWS_PER_HALFEDGE = 100
-"""A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual."""
+WINDOWS_PER_HALFEDGE, FEW_WINDOWS, ON_SMALL = 100, 1_000_000, 1000
+"""A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual. Small meshes
+of many sheets take more, which is little in all."""
 
 Report: TypeAlias = Callable[[], None]
 """Called every tenth of a second or so; an exception that it raises ends the search."""
@@ -108,7 +109,8 @@ def is_pseudosource(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
 
 def window_limit(triangles: IntrinsicMesh) -> int:
     """Number of windows after which a search is cut short."""
-    return WINDOWS_PER_HALFEDGE * 3 * triangles.n_faces
+    n_halfedges = 3 * triangles.n_faces
+    return min(ON_SMALL * n_halfedges, WINDOWS_PER_HALFEDGE * n_halfedges + FEW_WINDOWS)
 
 
 def _distances(
@@ -139,6 +141,7 @@ def _distances(
 
 def _along_edges(triangles: IntrinsicMesh, distance: NDArray[np.float64]) -> NDArray[np.float64]:
     """The least of these distances and of those along edges from other vertices."""
+    distance = np.maximum(distance, 0.0)  # which merged windows may miss by their tolerance; Dijkstra needs it
     n, known = len(distance), np.flatnonzero(np.isfinite(distance))
     tails, heads = triangles.edges.vertices.T
     rows, columns = np.concatenate([tails, np.full(len(known), n)]), np.concatenate([heads, known])

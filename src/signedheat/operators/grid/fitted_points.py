@@ -115,5 +115,6 @@ def _fit(
     planes = 0.5 * (normals + mean[:, None])
     heights = np.einsum("pk,pki,pki->p", weights, planes, places[:, None] - points)
     heights /= np.where(total > 0, total, 1.0)
+    gap = gap if gap > 0 else float(reach.max()) or 1.0  # most points lie in one place
     enough = np.clip(((weights > 0).sum(axis=1) - 2) / 4, 0.0, 1.0)
     return heights, enough * np.where(total > 0, np.clip(1.0 + REACH - ranked[:, 0] / gap, 0.0, 1.0), 0.0)

@@ -77,6 +77,7 @@ def interpolation_stencil(
     positions: NDArray[np.float64], shape: tuple[int, ...]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """(s, 2^k) nodes and weights of multilinear interpolation at positions in cells; k axes have more than one node."""
+    positions = np.clip(positions, 0, np.array(shape) - 1)  # rounding may put one outside
     cell = np.minimum(positions.astype(np.int64), np.array(shape) - 2)
     part = positions - cell
     nodes = np.zeros((len(positions), 1), dtype=np.int64)

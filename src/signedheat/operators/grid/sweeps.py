@@ -57,7 +57,7 @@ def diffuse_by_sweeps(
         sources.places.reshape(lines, -1),
         active.reshape(lines, -1),
         np.array(shape),
-        ratios.astype(np.float32),
+        np.minimum(ratios, 1e30).astype(np.float32),
         line_pivots(shape, ratios),
     )
     return vectors
