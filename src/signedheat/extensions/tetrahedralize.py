@@ -26,6 +26,8 @@ from ..errors import GeometryError, MemoryLimitError
 from ..lowering.area_elements import area_elements, bounds_around
 from ..memory import refuse_beyond_memory
 
+FINEST = 1e9
+"""Largest resolution; memory ends before."""
 LEAST_GRADING = 2.7
 """Below this, neighbouring leaves could differ by more than a factor of two in size: g/2 must exceed √3·¾."""
 
@@ -90,9 +92,9 @@ def tetrahedralize(
     padding = room_around((lower, upper)) if padding is None else finite_number(padding, "padding", 0, GeometryError)
     if not (isinstance(grading, float) and grading == np.inf):
         grading = finite_number(grading, "grading", error=GeometryError)
-    if size < 1 or grading < LEAST_GRADING:
+    if not 1 <= size <= FINEST or grading < LEAST_GRADING:
         raise GeometryError(
-            f"resolution must be at least 1 and grading at least {LEAST_GRADING}, not {size:g} and {grading:g}",
+            f"resolution must be 1 to {FINEST:g}, not {size:g}, and grading at least {LEAST_GRADING}, not {grading:g}",
             element="resolution or grading",
         )
     spacing = longest / size
