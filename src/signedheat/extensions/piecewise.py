@@ -123,7 +123,7 @@ def piecewise_distance(
             assert not isinstance(domain, IntrinsicTriangulation)  # which `conforms` refuses
             domain = intrinsic_delaunay(domain.triangulation, keep=listed)
             discretization = _lowered(domain)
-            holds(discretization, listed)  # or it is refused: curves on faces so flat that rounding moves them
+            conforms(discretization, listed)  # or it is refused: curves on faces so flat that rounding moves them
     with stopwatch("diffuse"):
         discretization, groups = discretization.adapt(listed)
         triangles = discretization.triangles
