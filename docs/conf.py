@@ -41,6 +41,8 @@ html_theme = "furo"
 html_title = f"signedheat {release}"
 html_logo = None
 html_show_sphinx = False
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
 
 myst_enable_extensions = ["amsmath", "dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
