@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...frozen import Frozen
 from ..intrinsic_mesh import IntrinsicMesh
 from .delaunay import glue
+from .gluing_kernels import Gluing
 from .transfer_kernels import trace_both_ways, transfer
 
 
@@ -73,13 +74,23 @@ class History(Frozen):
         faces, barycentric, _ = self.backward(np.full(count, -1), np.zeros((count, 3)))
         return faces, barycentric
 
+    @cached_property
+    def gluing_before(self) -> Gluing:
+        """How the triangles of `before` are glued, for lines across them."""
+        return for_tracing(self.before)
+
+    @cached_property
+    def gluing_after(self) -> Gluing:
+        """How the triangles of `after` are glued, for lines across them."""
+        return for_tracing(self.after)
+
     def edges_before(self) -> Lines:
         """The edges of `after`, from tail to head, as lines on `before`."""
-        return straight_lines(self.before, *self.backward(*edge_middles(self.after)))
+        return straight_lines(self.gluing_before, *self.backward(*edge_middles(self.after)))
 
     def edges_after(self) -> Lines:
         """The edges of `before`, from tail to head, as lines on `after`."""
-        return straight_lines(self.after, *self.forward(*edge_middles(self.before)))
+        return straight_lines(self.gluing_after, *self.forward(*edge_middles(self.before)))
 
     def _transfer(
         self,
@@ -106,14 +117,19 @@ def edge_middles(triangles: IntrinsicMesh) -> tuple[NDArray, NDArray, NDArray]:
     return faces, middle, along
 
 
+def for_tracing(triangles: IntrinsicMesh) -> Gluing:
+    """A gluing to trace lines on, without room for a history."""
+    gluing = glue(triangles)
+    return gluing._replace(steps=gluing.steps[:0].copy(), weights=gluing.weights[:0].copy())
+
+
 def straight_lines(
-    triangles: IntrinsicMesh,
+    gluing: Gluing,
     faces: NDArray[np.int64],
     barycentric: NDArray[np.float64],
     vectors: NDArray[np.float64],
 ) -> Lines:
     """Straight lines given by their midpoints and vectors there, of which the first is the whole extent of the line."""
-    gluing = glue(triangles)
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
     halves[:, 0] *= 0.5
     room = 4 * len(faces) + 16

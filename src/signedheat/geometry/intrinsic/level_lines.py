@@ -34,7 +34,7 @@ def level_lines(
         return []
     spots = barycentric_of(history.after, line.faces, line.positions)
     lines = straight_lines(
-        refinement.triangles, *history.backward(line.faces, spots.mean(axis=1), np.diff(spots, axis=1))
+        history.gluing_before, *history.backward(line.faces, spots.mean(axis=1), np.diff(spots, axis=1))
     )
     faces, starts = refinement.pull_back(lines.faces, lines.starts)
     ends = refinement.pull_back(lines.faces, lines.ends)[1]

@@ -132,7 +132,7 @@ def transfer_segments(
     at_piece = (along * before.corner_positions[faces]).sum(axis=1)
     vectors = np.stack([along, growth], axis=1)
     middle = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
-    lines = straight_lines(after, *middle)
+    lines = straight_lines(history.gluing_after, *middle)
     owners, faces, carried = lines.owners, lines.faces, lines.vectors
     starts, ends = locate_points(after, faces, lines.starts), locate_points(after, faces, lines.ends)
     located = concatenated([nodes, ends, starts])
@@ -203,8 +203,10 @@ def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[NDArray, 
     """
     faces = source.faces.copy()
     on_edge = np.flatnonzero(source.edges >= 0)
-    flat = triangles.edges.face_edges.ravel()
-    order = np.lexsort([triangles.face_areas[np.arange(len(flat)) // 3], flat])
+    flat, used = triangles.edges.face_edges.ravel(), np.zeros(triangles.n_edges, dtype=bool)
+    used[source.edges[on_edge]] = True
+    chosen = np.flatnonzero(used[flat])
+    order = chosen[np.lexsort([triangles.face_areas[chosen // 3], flat[chosen]])]
     fattest = np.empty(triangles.n_edges, dtype=np.int64)
     fattest[flat[order]] = order
     halfedge = fattest[source.edges[on_edge]]
