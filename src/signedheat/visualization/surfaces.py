@@ -48,7 +48,16 @@ def save_surface(
     figure = new_figure(8.0, 7.0)
     axes = figure.add_subplot(1, 1, 1)
     draw_surface(field, axes, sources, n_contours, up=up)
+    add_legend(axes, with_sources=bool(sources))
     write_figure(figure, path)
+
+
+def add_legend(axes: Axes, with_sources: bool) -> None:
+    """Say what the heavy lines are."""
+    axes.plot([], [], color="0.1", linewidth=1.6, label="φ = 0")
+    if with_sources:
+        axes.plot([], [], color="#ffd83b", linewidth=2.5, label="source")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=2, frameon=False, fontsize=8)
 
 
 def draw_surface(
@@ -81,7 +90,8 @@ def draw_surface(
     for item in flat:
         draw_source(axes, item, own, camera, depth)
     axes.set_axis_off()
-    add_color_bar(axes.figure, [axes], colors, isolines, step)
+    spanned = np.array([low, *isolines, high]) if high > low else isolines  # both signs, however little of one there is
+    add_color_bar(axes.figure, [axes], colors, spanned, step)
 
 
 def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[np.bool_], step: float) -> None:
