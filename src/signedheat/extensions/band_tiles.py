@@ -68,7 +68,8 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     confidence = np.ones(distances.shape, dtype=np.float16)
     crossings = np.zeros((0, 18))
     if is_open:
-        crossings = _crossings(plan, sides, low - wide, high + wide)
+        last = -(-np.array(plan.grid.shape) // SIDE)
+        crossings = _crossings(plan, sides, np.maximum(low - wide, 0), np.minimum(high + wide, last))
         _completed(plan, places, distances, confidence, crossings)
     values = (signs * distances).astype(np.float32).reshape(-1, SIDE, SIDE, SIDE)
     confidence = confidence.reshape(values.shape)

@@ -112,7 +112,8 @@ def sharpened_to_curves(
     sides, known = there.sides, there.sides.regions != 0
     beside = sides.reach <= distance * (1 + 1e-9)
     side = np.where(known, sides.regions, np.where(beside, sides.nearby, 0))
-    values = np.where((side != 0) & (np.sign(values) != side), side * distance, values)
+    turned = (side != 0) & (np.sign(values) != side)
+    values = np.where(turned, np.copysign(distance, side), values)
     missing, more = missing_parts(triangles, values, parts, there, spacing, tolerance, report)
     counts += more
     completed = float(missing.lengths.sum())
