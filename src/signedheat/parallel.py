@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 INTERVAL = 0.1
 """Seconds between two progress reports."""
-CHUNK = 1 << 16
+CHUNK = 1 << 13
 """Rows that a thread works on at a time."""
 
 
