@@ -17,6 +17,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..geometry.face_features import FaceFeatures
+from ..geometry.face_tree import FaceTree
 from ..operators.grid.closest_points import crossed_edges, crossings_at
 from ..operators.grid.exact_surface import ExactSurface
 from ..operators.grid.fitted_points import REACH, fitted_to_points, mean_gap, points_as_crossings
@@ -109,8 +110,7 @@ def assemble(
         sides = fitted_to_points(sides, steps, cloud.points - grid.origin, cloud.normals)
     features = FaceFeatures.of(*_joined([part for part in parts if not isinstance(part, PointCloud)], grid.origin))
     band = FaceBand.of(features, grid.shape, steps)
-    evidence = np.concatenate([band.feet[:, 1:], *(cloud.points - grid.origin for cloud in clouds)])
-    n_faces = len(features.rows)
+    whole, n_faces = features, len(features.rows)
     left_out = np.full(n_faces, fit == "smooth")
     if fit == "auto" and n_faces:
         left_out = layered_faces(features, band, middle, steps)
@@ -125,17 +125,13 @@ def assemble(
         kept = _unreached(cloud.points - grid.origin, cloud.normals, crossings, gaps + FAR * float(steps.max()))
         nodes, rows = points_as_crossings(*kept, steps, grid.shape)
         edges, crossings = np.concatenate([edges, nodes]), np.concatenate([crossings, rows])
-    trusted = confidence_at(crossings[:, 1:4], evidence, gaps)
     nearby = sampled_surface(features, band, edges, crossings, steps)
-    telling = telling_faces = None
-    if tells is not None:
-        telling = tells(band.feet[:, 1:] / steps)
-        votes = np.bincount(band.faces, np.where(telling, 1, -1), len(features.rows))
-        telling, telling_faces = np.concatenate([telling, np.zeros(len(crossings), dtype=bool)]), votes > 0
-        silent = np.bincount(band.faces, minlength=len(votes)) == 0  # faces too small to be the nearest of any node
-        telling_faces[silent] = tells(features.corners[silent].reshape(-1, 3, 3).mean(axis=1) / steps)
-    values, confidence = signed_distances(nearby, sides < 0, trusted, telling)
+    telling, telling_faces = (None, None) if tells is None else _telling(tells, features, band, len(crossings), steps)
     surface = ExactSurface(features, crossings, np.array(grid.origin), steps, telling_faces)
+    trees = [] if not (len(crossings) and n_faces) else [surface.tree if features is whole else FaceTree.of(whole)]
+    points = [cloud.points - grid.origin for cloud in clouds]
+    trusted = confidence_at(np.ascontiguousarray(crossings[:, 1:4]), trees, points, gaps)
+    values, confidence = signed_distances(nearby, sides < 0, trusted, telling)
     share = float(left_out.mean()) if n_faces else 0.0
     return Assembled(values, confidence, surface, share, completed)
 
@@ -153,6 +149,22 @@ def _missing(
     points = np.ascontiguousarray(crossings[:, 1:4])
     missing = band.search(features, points, steps).distances > FAR * float(steps.max())
     return edges[missing], crossings[missing], float(missing.sum() / n_edges)
+
+
+def _telling(
+    tells: Callable[[NDArray[np.float64]], NDArray[np.bool_]],
+    features: FaceFeatures,
+    band: FaceBand,
+    n_crossings: int,
+    steps: NDArray[np.float64],
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Feet of a band, followed by crossings, and faces that tell a side; a face does where most of its feet do."""
+    feet = tells(band.feet[:, 1:] / steps)
+    votes = np.bincount(band.faces, np.where(feet, 1, -1), len(features.rows))
+    faces = votes > 0
+    silent = np.bincount(band.faces, minlength=len(votes)) == 0  # faces too small to be the nearest of any node
+    faces[silent] = tells(features.corners[silent].reshape(-1, 3, 3).mean(axis=1) / steps)
+    return np.concatenate([feet, np.zeros(n_crossings, dtype=bool)]), faces
 
 
 def _unreached(
@@ -173,13 +185,17 @@ def _around_faces(chosen: NDArray[np.bool_], band: FaceBand) -> NDArray[np.bool_
     return np.asarray(scipy.ndimage.binary_dilation(near, iterations=2))
 
 
-def confidence_at(points: NDArray[np.float64], evidence: NDArray[np.float64], gap: float = 0.0) -> NDArray[np.float32]:
+def confidence_at(
+    points: NDArray[np.float64], trees: Sequence[FaceTree], clouds: Sequence[NDArray[np.float64]], gap: float = 0.0
+) -> NDArray[np.float32]:
     """(n,) from 1 at the shape to 0 far from it: ``1 / (1 + excess / (DOUBT · diagonal))``, excess beyond a gap."""
-    if not len(points) or not len(evidence):
+    places = [tree.features.corners.reshape(-1, 3) for tree in trees] + list(clouds)
+    if not len(points) or not sum(map(len, places)):
         return np.zeros(len(points), dtype=np.float32)
-    diagonal = float(np.linalg.norm(np.ptp(evidence, axis=0)))
-    distances, _ = scipy.spatial.cKDTree(evidence).query(points, workers=-1)
-    excess = np.maximum(distances - gap, 0.0)
+    diagonal = float(np.linalg.norm(np.ptp(np.concatenate(places), axis=0)))
+    distances = [tree.distances(points) for tree in trees]
+    distances += [scipy.spatial.cKDTree(cloud).query(points, workers=-1)[0] for cloud in clouds]
+    excess = np.maximum(np.min(distances, axis=0) - gap, 0.0)
     return np.asarray(DOUBT * diagonal / (DOUBT * diagonal + excess), dtype=np.float32)
 
 

@@ -46,8 +46,8 @@ from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of
 
 STEPS = 7
 """Steps that are timed."""
-BYTES_PER_NODE, BYTES_IF_CLOSED = 64, 36
-"""Measured peak memory: of shapes with holes or overlaps, and of others, all of whose parts are closed."""
+BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 64, 54, 36
+"""Measured peak memory: of points and shapes with holes or overlaps; of φ alone; of shapes whose parts are closed."""
 GAPS = 1.5
 """Mean gaps between points, besides `FAR` cells, within which φ tells the sides of a cloud."""
 BOUNDING = 0.22
@@ -227,14 +227,14 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
-    refuse_beyond_memory(grid, BYTES_IF_CLOSED if steps.sharpen and steps.orient else None)
+    refuse_beyond_memory(grid, BYTES_IF_CLOSED if steps.sharpen and steps.orient else BYTES_IF_PLAIN)
     with stopwatch("orient"):
         merged, closed = _oriented(shape, notes) if steps.orient else (merge_duplicates(shape), False)
     if closed and steps.sharpen:
         field = _bounded(merged, grid, steps, notes, stopwatch)
         if field is not None:
             return field
-    refuse_beyond_memory(grid, BYTES_PER_NODE if steps.sharpen else None)
+    refuse_beyond_memory(grid, BYTES_PER_NODE if steps.sharpen else BYTES_IF_PLAIN)
     discretization = discretize(grid)
     with stopwatch("unite"):
         shape, samples, winding = _united(merged, grid, steps, notes)

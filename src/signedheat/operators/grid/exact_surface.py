@@ -83,7 +83,8 @@ class ExactSurface(Frozen):
     telling: NDArray[np.bool_] | None = None
 
     @cached_property
-    def _faces(self) -> FaceTree:
+    def tree(self) -> FaceTree:
+        """Of the faces, of which there is at least one."""
         return FaceTree.of(self.features)
 
     @cached_property
@@ -113,7 +114,7 @@ class ExactSurface(Frozen):
         distances, feet, directions = np.full(n, np.inf), sorted_points.copy(), np.zeros((n, 3))
         sides, completed = np.zeros(n), np.zeros(n, dtype=bool)
         if len(self.features.corners):
-            found = self._faces.search(sorted_points)
+            found = self.tree.search(sorted_points)
             distances, feet = found.distances, found.feet
             directions = self.features.face_normals[found.faces]
             told = found.regular if self.telling is None else found.regular & self.telling[found.faces]

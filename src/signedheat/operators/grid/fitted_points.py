@@ -55,16 +55,26 @@ def fitted_to_points(
     gap = mean_gap(points)
     result = np.array(phi, dtype=np.float64)
     nodes = np.argwhere(np.abs(phi) < WIDTH * float(steps.max()))
-    slopes: list[NDArray[np.float64]] = list(np.gradient(phi, *steps))
     for begin in range(0, len(nodes), CHUNK):
         some = tuple(nodes[begin : begin + CHUNK].T)
         places = np.stack(some, axis=1) * steps
-        ahead = np.stack([slope[some] for slope in slopes], axis=1)
+        ahead = _slopes(phi, nodes[begin : begin + CHUNK], steps)
         ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), np.finfo(float).tiny)
         reach, near = tree.query(places, k=[*range(1, n_neighbours + 1)], workers=-1)
         heights, share = _fit(places, ahead, reach, points[near], normals[near], gap)
         result[some] += share * (heights - phi[some])
     return result
+
+
+def _slopes(phi: NDArray[np.float64], nodes: NDArray[np.int64], steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k, 3) differences of φ at nodes, one-sided at the walls."""
+    slopes = np.empty((len(nodes), 3))
+    for axis, step in enumerate(steps):
+        low, high = nodes.copy(), nodes.copy()
+        low[:, axis] = np.maximum(low[:, axis] - 1, 0)
+        high[:, axis] = np.minimum(high[:, axis] + 1, phi.shape[axis] - 1)
+        slopes[:, axis] = (phi[tuple(high.T)] - phi[tuple(low.T)]) / ((high[:, axis] - low[:, axis]) * step)
+    return slopes
 
 
 def points_as_crossings(

@@ -56,6 +56,7 @@ def winding_numbers(
         dense = np.pad(dense, [*room, (0, 0)])
         shape, positions = dense.shape[:-1], positions + [below for below, _ in room]
     right = divergence(dense, spacing)
+    del dense
     right *= -(volume ** ((dimension - 1) / dimension)) / volume
     dipoles, strengths = blocks_of_dipoles(positions, vectors, dimension)
     walls = [_wall(axis, end, shape) for axis in range(dimension) for end in (0, 1)]
