@@ -90,3 +90,10 @@ def test_picture_of_the_floors_shows_all_of_them():
     package = Path(signedheat.__file__).parent
     floors = {path.stem for path in package.glob("*.py")} | {path.parent.name for path in package.glob("*/__init__.py")}
     assert sorted(drawn) == sorted(floors - {"__init__"})
+
+
+@pytest.mark.parametrize("name", sorted(signedheat.__all__))
+def test_docstrings_hold_no_substitutions(name):
+    """Docutils takes |x| outside of literals for a substitution, of which there is none."""
+    text = re.sub(r"``.*?``|`.*?`", "", getattr(signedheat, name).__doc__ or "")
+    assert not re.search(r"\|[^\s|][^|\n]*[^\s|]\||\|[^\s|]\|", text)

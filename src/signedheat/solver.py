@@ -328,7 +328,7 @@ def signed_distance(
     padding : float, optional
         Least distance between the shape and the boundary of that grid; by default a fifth of its longest side.
     band : float, optional
-        Compute nodes of the grid only where ``|φ|`` is at most this, or a face is as near, and a coarse grid elsewhere.
+        Compute nodes of the grid only where ``|φ|`` is at most this or a face as near, and a coarse grid elsewhere.
         φ then vanishes at the shape in the mean of each connected part of the band; there is no other constraint.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
         Imposed on φ at the source; `ZeroSet` by default.
