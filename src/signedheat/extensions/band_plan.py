@@ -21,6 +21,8 @@ TILE = SIDE * CUBE
 """Nodes along each edge of a tile."""
 NEAR = 2.0
 """Coarse cells from a face within which it tells the side."""
+WIDEST = 1e3
+"""Half width of a band, relative to the grid, beyond which it is taken for a mistake."""
 FAR = 1.5
 """Cells from any face beyond which a zero set stands in for missing surface."""
 RATIO = 4
@@ -197,6 +199,13 @@ def plan_band(coarse: GridField, grid: Grid, band: float) -> BandPlan:
     """
     if not (np.isfinite(band) and band > 0):
         raise GeometryError(f"the band must be a positive length, not {band}", remedy="give its half width")
+    extent = float((coarse.grid.upper - coarse.grid.origin).max())
+    if band > WIDEST * extent:
+        raise GeometryError(
+            f"the band, {band:g} on either side, is {WIDEST:g} times wider than the grid, {extent:g}",
+            remedy="leave it out",
+            element="band",
+        )
     surface = coarse.surface
     if surface is None:
         raise GeometryError("the coarse field does not know its surface", remedy="measure to a solid")

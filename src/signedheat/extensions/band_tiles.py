@@ -56,7 +56,8 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     low = np.asarray(tile, dtype=np.int64) * CUBE
     high = low + CUBE
     is_open = plan.is_open(low, high)
-    wide = max(2 + int(plan.reach // (SIDE * float(plan.steps.min()))), halo(plan)) if is_open else 0
+    reach = min(plan.reach / (SIDE * float(plan.steps.min())), float(max(plan.grid.shape)))
+    wide = max(2 + int(reach), halo(plan)) if is_open else 0
     held = plan.blocks_in(low - wide, high + wide)
     beside = ~((held >= low) & (held < high)).all(axis=1)  # these matter only where surface is missing
     needed = np.concatenate([held[~beside], plan.near_open(held[beside], NONE * plan.coarse_cell)])

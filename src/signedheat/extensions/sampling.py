@@ -166,6 +166,8 @@ def sample(
     scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
     n_near = round(near * n) if scales else 0
     triangles, _ = surface_triangles(field, known_surface(field.surface))
+    if not len(triangles):
+        raise OutsideError("the field has no zero set to sample", remedy="compute it on a finer grid", element="field")
     lower, upper = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     center = (lower + upper) / 2
     radius = float(np.linalg.norm(triangles - center, axis=2).max())

@@ -13,6 +13,7 @@ from ..diagnostics import Diagnostics
 from ..domains.display import Displayed, to_pyvista
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import refuse_extreme
 from ..errors import GeometryError, OutsideError
 from ..operators.grid.block_contours import block_contour
 from ..operators.grid.blocks import NODES, SIDE, Blocks
@@ -302,6 +303,8 @@ class BandField(Displayed):
         places = np.atleast_2d(np.asarray(points, dtype=np.float64))
         if places.shape[-1] != 3 or not np.isfinite(places).all():
             raise GeometryError("points must be finite, with 3 coordinates each", element="points")
+        if len(places):
+            refuse_extreme(places.min(axis=0), places.max(axis=0), "points")
         return places
 
     def _fine(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
