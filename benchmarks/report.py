@@ -109,6 +109,9 @@ def page(kept: dict[str, dict[str, str]]) -> str:
             lines += ["", f"## {comparison.title}", "", comparison.about, ""]
             lines += [f"`python benchmarks/{command}` ({run['seconds']} s; {run['machine']}; {run['versions']})", ""]
             lines += ["```", run["printed"], "```"]
+    left = [f"`python benchmarks/report.py {name}`" for name in COMPARISONS if name not in kept]
+    if left:
+        lines += ["", "## Not run yet", "", "Comparisons whose output this page does not have: " + ", ".join(left) + "."]
     return "\n".join(lines) + "\n"
 
 
