@@ -111,7 +111,8 @@ def page(kept: dict[str, dict[str, str]]) -> str:
             lines += ["```", run["printed"], "```"]
     left = [f"`python benchmarks/report.py {name}`" for name in COMPARISONS if name not in kept]
     if left:
-        lines += ["", "## Not run yet", "", "Comparisons whose output this page does not have: " + ", ".join(left) + "."]
+        about = "Comparisons whose output this page does not have: "
+        lines += ["", "## Not run yet", "", about + ", ".join(left) + "."]
     return "\n".join(lines) + "\n"
 
 
