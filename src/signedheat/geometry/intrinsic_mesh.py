@@ -115,7 +115,8 @@ class IntrinsicMesh(Frozen):
     @property
     def areas_as_divisors(self) -> NDArray[np.float64]:
         """(m,) areas, those of flat faces as if they were `FLATTEST`."""
-        return np.maximum(self.face_areas, FLATTEST * (np.abs(self.edge_vectors) ** 2).max(axis=1))
+        squares: NDArray[np.float64] = (np.abs(self.edge_vectors) ** 2).max(axis=1)
+        return np.maximum(self.face_areas, FLATTEST * squares)
 
     @cached_property
     def corner_cotangents(self) -> NDArray[np.float64]:

@@ -139,9 +139,8 @@ def transfer_segments(
     joined = _joined(after, located, faces, owners, source.ends)
     who = unique_points(located)[1]
     keep = who[joined[:, 0]] != who[joined[:, 1]]
-    owners, faces, carried, starts, ends, joined = (
-        part[keep] for part in (owners, faces, carried, starts, ends, joined)
-    )
+    owners, faces, carried, joined = owners[keep], faces[keep], carried[keep], joined[keep]
+    starts, ends = starts[keep], ends[keep]
 
     # the angle between segment and normal is known; the transferred normal only tells the side, however thin the faces
     corners = after.corner_positions[faces]
@@ -196,7 +195,9 @@ def _joined(
     return joined
 
 
-def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def in_faces(
+    triangles: IntrinsicMesh, source: CurveSegments
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]:
     """Face, start, end (barycentric) and normal in the layout of the face of every segment, along edges or not.
 
     For a segment along an edge it is the face of the edge with the largest area.
