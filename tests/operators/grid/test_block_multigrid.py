@@ -27,6 +27,15 @@ def test_the_preconditioner_is_symmetric_and_positive():
         assert a @ apply(a) > 0
 
 
+@pytest.mark.parametrize("length", [1e-40, 1e30])
+def test_lengths_do_not_matter(length):
+    nodes, _ = shell(16)
+    right = np.random.default_rng(0).normal(size=len(nodes.nodes)).astype(np.float32)
+    steps = np.array([1.0, 0.7, 1.4])
+    one, other = (Multigrid.of(nodes.nodes, nodes.neighbors, 1 / (u * steps) ** 2)(right) for u in (1.0, length))
+    np.testing.assert_allclose(other / np.abs(other).max(), one / np.abs(one).max(), atol=1e-5)
+
+
 @pytest.mark.parametrize("n", [24, 48, 72])
 def test_iterations_do_not_grow_with_the_nodes(n, monkeypatch):
     monkeypatch.setattr(block_method, "MOST", 12)

@@ -5,7 +5,7 @@ import pytest
 
 from signedheat import Grid, Polyline, TriangleMesh, samples
 from signedheat.lowering.area_elements import sample_on_grid
-from signedheat.operators.grid.winding import winding_numbers
+from signedheat.operators.grid.winding import blocks_of_dipoles, winding_numbers
 
 
 def winding_on(shape, grid):
@@ -71,3 +71,14 @@ def test_in_the_plane():
     radius = np.linalg.norm(grid.points, axis=-1)
     far = np.abs(radius - 1) > 0.15
     assert np.abs(winding_on(circle, grid) - (radius < 1))[far].max() < 0.02
+
+
+@pytest.mark.parametrize("reach", [1e3, 1e9, 1e18])
+def test_blocks_of_shapes_that_are_far_larger_than_the_grid(reach):
+    rng = np.random.default_rng(0)
+    positions = rng.uniform(-reach, reach, (40, 3))
+    vectors = rng.normal(size=(40, 3))
+    means, sums = blocks_of_dipoles(np.repeat(positions, 2, axis=0), np.repeat(vectors, 2, axis=0), 3)
+    order, wanted = np.lexsort(means.T[::-1]), np.lexsort(positions.T[::-1])
+    np.testing.assert_allclose(means[order], positions[wanted], rtol=1e-12)
+    np.testing.assert_allclose(sums[order], 2 * vectors[wanted], rtol=1e-12)

@@ -54,7 +54,7 @@ class Multigrid:
 
     @classmethod
     def of(cls, nodes: NDArray[np.int32], neighbors: NDArray[np.int32], axis_weights: NDArray[np.float64]) -> Multigrid:
-        """Levels over (n, 3) nodes, with one weight for differences along each axis.
+        """Levels over (n, 3) nodes, with one weight for differences along each axis, up to a common factor.
 
         Examples
         --------
@@ -65,7 +65,9 @@ class Multigrid:
         >>> [len(level.neighbors) for level in grids.levels]
         [200, 100, 50]
         """
-        weights = np.where(neighbors >= 0, np.repeat(axis_weights, 2), 0.0).astype(np.float32)
+        _, power = np.frexp(axis_weights.max())  # single precision has room for no more; directions do not depend on it
+        along = np.ldexp(axis_weights, -power)
+        weights = np.where(neighbors >= 0, np.repeat(along, 2), 0.0).astype(np.float32)
         levels: list[Level] = []
         while True:
             diagonal = weights.sum(axis=1, dtype=np.float32)
@@ -79,7 +81,7 @@ class Multigrid:
             nodes = parents
 
     def __call__(self, right: NDArray[np.float32]) -> NDArray[np.float32]:
-        """An approximate solution of the equation with a right side: one V-cycle from zero."""
+        """An approximate solution of the equation with a right side, up to a factor: one V-cycle from zero."""
         return self._cycle(0, right)
 
     def _cycle(self, depth: int, right: NDArray[np.float32]) -> NDArray[np.float32]:

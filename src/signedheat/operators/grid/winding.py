@@ -92,8 +92,12 @@ def blocks_of_dipoles(
     """Mean positions and sums of the area vectors in each block of `BLOCK` cells."""
     blocks = np.floor(positions / BLOCK).astype(np.int64)
     blocks -= blocks.min(axis=0)
-    key = np.ravel_multi_index(tuple(blocks.T), tuple(blocks.max(axis=0) + 1))
-    _, which = np.unique(key, return_inverse=True)
+    which = blocks[:, 0]
+    for column in blocks.T[1:]:
+        if float(which.max()) * float(column.max()) > 2.0**60:  # a shape far larger than the grid
+            which, column = (np.unique(part, return_inverse=True)[1] for part in (which, column))
+        which = which * (column.max() + 1) + column
+    _, which = np.unique(which, return_inverse=True)
     weights = np.linalg.norm(vectors, axis=1) + 1e-300
     total = np.bincount(which, weights)
     means = np.stack([np.bincount(which, weights * positions[:, d]) / total for d in range(dimension)], axis=1)
