@@ -5,7 +5,8 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, TimeoutError
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import TimeoutError as FutureTimeout  # the builtin one only since Python 3.11
 from threading import Thread
 from typing import Any
 
@@ -80,7 +81,7 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
     while True:
         try:
             return future.result(INTERVAL)
-        except TimeoutError:
+        except FutureTimeout:
             if future.done():  # the timeout is the job's own
                 raise
             report()
@@ -114,7 +115,7 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
     thread.start()
     try:
         return future.result(seconds)
-    except TimeoutError:
+    except FutureTimeout:
         if future.done():  # the timeout is the job's own
             raise
         raise TimeoutError(f"it takes more than {seconds:.0f} seconds") from None

@@ -120,11 +120,11 @@ def test_a_report_ends_the_search():
 
 
 def test_ctrl_c_ends_the_search():
-    """A run of many seconds ends soon after the interrupt, since kernels return every now and then."""
-    triangles, values = random_faces(0, 30, 2000)
+    """A run of seconds ends soon after the interrupt, since kernels return every now and then."""
+    triangles, values = random_faces(0, 100, 20000)
     distance_to_zero_line(*random_faces(1, 12, 47))
     threading.Timer(0.3, _thread.interrupt_main).start()
     begin = time.process_time()
     with pytest.raises(KeyboardInterrupt):
         distance_to_zero_line(triangles, values, 0.0)
-    assert time.process_time() - begin < 3.0
+    assert time.process_time() - begin < 1.5
