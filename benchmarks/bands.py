@@ -1,13 +1,13 @@
 """Surfaces from narrow bands, beside other programs at the same spacing.
 
-``python benchmarks/bands.py [RESOLUTION]`` prints the table of docs/large.md; ``… RESOLUTION SHAPE WHO`` measures one
-row, here.
+``python benchmarks/bands.py [RESOLUTION]`` prints the table of docs/large.md.
 Each row is a process of its own. The error is that of the vertices of the closed surface, against the unit sphere.
 Packages: MeshLib's voxels, libigl's fast winding numbers (pip install meshlib libigl).
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import resource
 import subprocess
@@ -126,15 +126,19 @@ def measure(resolution: int, shape: str, who: str) -> dict[str, object]:
 
 def main() -> None:
     """Print all rows, or one as JSON."""
-    resolution = int(sys.argv[1]) if len(sys.argv) > 1 else 256
-    if len(sys.argv) > 3:
-        print(json.dumps(measure(resolution, sys.argv[2], sys.argv[3])))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("resolution", nargs="?", type=int, default=256, help="nodes along a side")
+    parser.add_argument("--shapes", nargs="+", default=list(SHAPES), choices=SHAPES)
+    parser.add_argument("--row", nargs=2, metavar=("SHAPE", "WHO"), help="measure this one, here")
+    options = parser.parse_args()
+    if options.row:
+        print(json.dumps(measure(options.resolution, *options.row)))
         return
     print("| sphere | with | CPU s | peak GB | error, cells | worst | closed |")
     print("|---|---|---|---|---|---|---|")
-    for shape in SHAPES:
+    for shape in options.shapes:
         for who in WHO:
-            command = [sys.executable, __file__, str(resolution), shape, who]
+            command = [sys.executable, __file__, str(options.resolution), "--row", shape, who]
             done = subprocess.run(command, capture_output=True, text=True)
             if done.returncode:
                 print(

@@ -1,6 +1,6 @@
 """Every domain beside its peer, on shapes with a known answer: time, memory, error, in one run.
 
-    python benchmarks/domains.py [--sizes 4000 16000 64000] [--volumes 70000 260000]
+    python benchmarks/domains.py [polygons points voxels volumes] [--sizes 4000 16000 64000] [--volumes 70000 260000]
 
 Polygons and points: potpourri3d. The others have no peer here (signedheat3d has no wheel), but a comparison: voxels
 without corrected normals; tets and grids, with and without solid corners, plain beside sharpened. Each measurement runs
@@ -214,6 +214,11 @@ def in_process_of_its_own(*arguments: str) -> dict:
 def main() -> None:
     """Print one line per case, with ratios (below 1: ours is better)."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    kinds = ["polygons", "points", "voxels", "volumes"]
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"some of {', '.join(kinds)}; by default all")
+    parser.add_argument(
+        "--repeats", type=int, default=3, help="runs of ours and the peer's in turn; the fastest counts"
+    )
     parser.add_argument("--sizes", type=int, nargs="+", default=[4000, 16000, 64000])
     parser.add_argument("--volumes", type=int, nargs="+", default=[70000, 260000], help="tets, or nodes")
     parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
@@ -222,18 +227,29 @@ def main() -> None:
         program, kind, name, size = arguments.one
         print(json.dumps(measured(program, kind, name, int(size))))
         return
+    if unknown := set(arguments.kinds) - set(kinds):
+        parser.error(f"{', '.join(sorted(unknown))}: none of {', '.join(kinds)}")
     print(f"{'case':33}{'unknowns':>8} | {'ours s':>7}{'MB':>7}{'ε':>9} | {'peer s':>7}{'MB':>7}{'ε':>9} | ratios s, ε")
     table = [("polygons", n) for n in POLYGONS] + [("points", n) for n in CLOUDS] + [("voxels", "ball (raw as peer)")]
     table += [("volumes", name) for name in VOLUMES]
     for kind, name in table:
+        if arguments.kinds and kind not in arguments.kinds:
+            continue
         previous = None
         for size in arguments.volumes if kind == "volumes" else arguments.sizes:
-            ours, peer = (in_process_of_its_own(p, kind, name, str(size)) for p in ("ours", "peer"))
+            rounds = [
+                [in_process_of_its_own(program, kind, name, str(size)) for program in ("ours", "peer")]
+                for _ in range(arguments.repeats)
+            ]
+            ours, peer = (min(runs, key=lambda run: run["seconds"]) for runs in zip(*rounds, strict=True))
             columns = [f"{r['seconds']:7.2f}{r['megabytes']:7.0f}{r['error']:9.1e}" for r in (ours, peer)]
             ratio = f"{ours['seconds'] / peer['seconds']:.2f}, {ours['error'] / max(peer['error'], 1e-15):.3f}"
             if previous is not None:
                 steps = [np.log(ours[key] / previous[key]) for key in ("seconds", "vertices")]
                 ratio += f", growth {steps[0] / steps[1]:.2f}"
+            slowest = [max(run["seconds"] for run in runs) for runs in zip(*rounds, strict=True)]
+            over = [f"{100 * (s / r['seconds'] - 1):.0f}" for s, r in zip(slowest, (ours, peer), strict=True)]
+            ratio += f"; slowest +{over[0]}, +{over[1]} %"
             previous = ours
             print(f"{kind + ': ' + name:33}{ours['vertices']:8} | {columns[0]} | {columns[1]} | {ratio}", flush=True)
 

@@ -1,9 +1,10 @@
 """Distance on grids: seconds per step beside one cosine transform of that size, memory, error, and what others take.
 
-    python benchmarks/grid.py [64 128 256 …] [--peers]
+    python benchmarks/grid.py [64 128 256 …]
+    python benchmarks/grid.py --peers
 
-Each size runs in a process of its own, so that its peak memory is its own. With ``--peers`` the same job is done by
-libigl (unsigned distance with the sign of fast winding numbers, each tree built once), MeshLib (general offset) and
+Each size runs in a process of its own, so that its peak memory is its own. With ``--peers`` a like job is done at 128³
+by libigl (unsigned distance with the sign of fast winding numbers, each tree built once), MeshLib (general offset) and
 signedheat3d, where they are installed; they are not needed otherwise.
 """
 
@@ -76,12 +77,23 @@ def relative_error(values: np.ndarray, exact: np.ndarray) -> float:
 
 def best(job: Callable[[], Any]) -> tuple[float, Any]:
     """Least wall-clock seconds of a few runs, and the last result."""
+    seconds, result = repeated(job, REPEATS)
+    return min(seconds), result
+
+
+def repeated(job: Callable[[], Any], times: int = 3) -> tuple[list[float], Any]:
+    """Wall-clock seconds of each run, and the last result."""
     seconds = []
-    for _ in range(REPEATS):
+    for _ in range(times):
         begin = time.perf_counter()
         result = job()
         seconds.append(time.perf_counter() - begin)
-    return min(seconds), result
+    return seconds, result
+
+
+def told(seconds: list[float]) -> str:
+    """The least, and how far above it the slowest was."""
+    return f"{min(seconds):7.2f} s (+{100 * (max(seconds) / min(seconds) - 1):3.0f} %)"
 
 
 def peak_bytes() -> int:
@@ -153,12 +165,13 @@ def peers(n: int) -> None:
     }
     for name, shape in shapes.items():
         print(f"{name}, {n}³")
-        seconds, field = best(lambda shape=shape: sh.solid_distance(shape, grid))
-        contouring, surface = best(lambda field=field: field.offset(OFFSET))
+        times, field = repeated(lambda shape=shape: sh.solid_distance(shape, grid))
+        seconds = min(times)
+        contouring, surface = repeated(lambda field=field: field.offset(OFFSET))
         radius = np.abs(np.linalg.norm(surface.vertices, axis=1) - 1 - OFFSET).max()
         print(
-            f"  signedheat     {seconds:7.2f} s  ε {relative_error(field.values, exact):.5f}   offset included "
-            f"{seconds + contouring:.2f} s, radius off by {radius:.4f}",
+            f"  signedheat     {told(times)}  ε {relative_error(field.values, exact):.5f}   offset included "
+            f"{seconds + min(contouring):.2f} s, radius off by {radius:.4f}",
             flush=True,
         )
         for peer in (libigl, meshlib, signedheat3d):
@@ -172,14 +185,17 @@ def libigl(shape: sh.TriangleMesh, grid: sh.Grid, exact: np.ndarray, ours: float
     import igl
 
     points, vertices, faces = grid.points.reshape(-1, 3), np.array(shape.vertices), np.array(shape.faces)
-    begin = time.perf_counter()
-    tree = igl.AABB()
-    tree.init(vertices, faces)
-    unsigned = np.sqrt(tree.squared_distance(vertices, faces, points)[0])
-    inside = np.asarray(igl.fast_winding_number(vertices, faces, points)) > 0.5
-    seconds = time.perf_counter() - begin
-    error = relative_error(np.where(inside, -unsigned, unsigned).reshape(grid.shape), exact)
-    return f"libigl         {seconds:7.2f} s  ε {error:.5f}   {seconds / ours:.1f} times ours"
+
+    def signed() -> np.ndarray:
+        tree = igl.AABB()
+        tree.init(vertices, faces)
+        unsigned = np.sqrt(tree.squared_distance(vertices, faces, points)[0])
+        inside = np.asarray(igl.fast_winding_number(vertices, faces, points)) > 0.5
+        return np.where(inside, -unsigned, unsigned)
+
+    seconds, values = repeated(signed)
+    error = relative_error(values.reshape(grid.shape), exact)
+    return f"libigl         {told(seconds)}  ε {error:.5f}   {min(seconds) / ours:.1f} times ours"
 
 
 def meshlib(shape: sh.TriangleMesh, grid: sh.Grid, exact: np.ndarray, ours: float) -> str:
@@ -189,12 +205,10 @@ def meshlib(shape: sh.TriangleMesh, grid: sh.Grid, exact: np.ndarray, ours: floa
     settings = mrmeshpy.GeneralOffsetParameters()
     settings.voxelSize = float(grid.spacing[0])
     settings.signDetectionMode = mrmeshpy.SignDetectionMode.HoleWindingRule
-    begin = time.perf_counter()
-    surface = mrmeshpy.generalOffsetMesh(mesh, OFFSET, settings)
-    seconds = time.perf_counter() - begin
+    seconds, surface = repeated(lambda: mrmeshpy.generalOffsetMesh(mesh, OFFSET, settings))
     radius = np.linalg.norm(mrmeshnumpy.getNumpyVerts(surface), axis=1)
     off = np.abs(radius - 1 - OFFSET).max()
-    return f"MeshLib        {seconds:7.2f} s  (offset)   {seconds / ours:.1f} times ours, radius off by {off:.4f}"
+    return f"MeshLib        {told(seconds)}  (offset)   {min(seconds) / ours:.1f} times ours, radius off by {off:.4f}"
 
 
 def signedheat3d(shape: sh.TriangleMesh, grid: sh.Grid, exact: np.ndarray, ours: float) -> str:
@@ -211,17 +225,20 @@ def signedheat3d(shape: sh.TriangleMesh, grid: sh.Grid, exact: np.ndarray, ours:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("sizes", nargs="*", type=int, default=[64, 128, 256], help="nodes along each axis")
-    parser.add_argument("--peers", action="store_true", help="compare with libigl, MeshLib and signedheat3d at 128³")
+    parser.add_argument("sizes", nargs="*", type=int, help="nodes along each axis; by default 64 128 256")
+    parser.add_argument(
+        "--peers", action="store_true", help="instead, compare with libigl, MeshLib and signedheat3d at 128³"
+    )
     parser.add_argument("--measure", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.measure:
         print(json.dumps(measure(options.measure)))
         return
-    for n in options.sizes:
-        report(n)
     if options.peers:
         peers(128)
+        return
+    for n in options.sizes or (64, 128, 256):
+        report(n)
 
 
 if __name__ == "__main__":

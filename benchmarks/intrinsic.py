@@ -178,7 +178,7 @@ def reference(case: Case) -> tuple[np.ndarray, str]:
 
 def away_from_zero(case: Case) -> np.ndarray:
     """Distance along the surface from the line where the case's values are zero."""
-    triangles = sh.SignedHeatSolver(case.mesh).discretization.triangles
+    triangles = sh.SignedHeatSolver(case.mesh, intrinsic=False).discretization.triangles
     return distance_to_zero_line(triangles, case.values, 0.0)[0]
 
 
@@ -205,7 +205,7 @@ def compare(case: Case, expected: np.ndarray, areas: np.ndarray) -> str:
     refined, making = timed(lambda: sh.intrinsic_delaunay(case.mesh, keep=curves, refine=True))
     errors, seconds = [], []
     for domain in (case.mesh, flipped, refined):
-        phi, taken = timed(lambda domain=domain: sh.SignedHeatSolver(domain).distance(curves))
+        phi, taken = timed(lambda domain=domain: sh.SignedHeatSolver(domain, intrinsic=False).distance(curves))
         squares = (phi.values[: len(expected)] - np.where(np.isfinite(expected), expected, np.nan)) ** 2
         known = np.isfinite(squares) & (areas > 0)
         errors.append(np.sqrt(areas[known] @ squares[known] / areas[known].sum()) / np.ptp(expected[known]))

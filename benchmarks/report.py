@@ -1,16 +1,18 @@
-"""One page with every comparison, as its commands printed it: `python benchmarks/report.py` writes docs/benchmarks.md.
+"""One page with every comparison, as its command printed it: `python benchmarks/report.py` writes docs/benchmarks.md.
 
     python benchmarks/report.py [NAME …]     (some comparisons only; the others keep what their last run printed)
 
 Each comparison runs in a process of its own, ours and the peers' side by side in one run. Nothing is picked from what
-it prints.
+it prints. How busy the machine was before and after is kept too.
 """
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import platform
+import shlex
 import subprocess
 import sys
 import time
@@ -34,30 +36,91 @@ class Comparison:
 
 
 COMPARISONS = {
-    "space": Comparison(
+    "grids": Comparison(
         "Grids in space",
-        ("grid.py", "64", "128", "256", "--peers"),
-        "Seconds per step beside one cosine transform, memory, error; then whole, holed, scattered, turned and noisy "
-        "spheres beside libigl (unsigned distance × sign of fast winding numbers, trees built once) and MeshLib. "
-        "Both do less, and are as exact or more where the whole surface is there or little of it is missing.",
+        ("grid.py", "64", "128", "256"),
+        """Seconds per step of the method alone on a closed sphere of 20,000 faces, beside one cosine transform of that
+        size (dctn), the least that any solver of Poisson's equation on grids takes; memory; error before and after
+        sharpening. Times are the least of six runs.""",
+    ),
+    "spheres": Comparison(
+        "Solids in space: spheres",
+        ("grid.py", "--peers"),
+        """Spheres, whole and damaged, at 128³: `sh.solid_distance` and its offset; unsigned distance × sign of fast
+        winding numbers by libigl, each tree built once; offsets by MeshLib. Both do less, and are as exact or more
+        where the whole surface is there or little of it is missing. Times are the least of three runs; in brackets,
+        how much longer the slowest took.""",
+    ),
+    "solids-turned": Comparison(
+        "Solids in space: whole shapes and turned faces",
+        ("solids.py", "whole", "10 % of the faces turned", "half of the faces turned", "--repeats", "2"),
+        """Four closed shapes, at the same resolution for all three programs. libigl and MeshLib take the winding number
+        for the sign, which is right while few faces are turned; and at points they are many times faster.""",
+    ),
+    "solids-missing": Comparison(
+        "Solids in space: missing faces",
+        ("solids.py", "15 % of the faces missing", "six holes", "half of it missing", "--repeats", "2"),
+        """The same shapes. Where single faces are missing, all are as good. Heat completes holes better than winding
+        numbers. With half of the shape gone, nothing tells where the rest was.""",
+    ),
+    "solids-noise": Comparison(
+        "Solids in space: noise and doubled faces",
+        ("solids.py", "noise", "loose faces with noise", "every face twice, shifted", "--repeats", "2"),
+        """The same shapes: vertices moved by 0.01 along each axis; loose faces, each moved by as much; every face
+        twice.""",
     ),
     "surfaces": Comparison(
         "Triangle meshes",
         ("surface.py", "--levels", "6", "--repeats", "3"),
-        "First, next and batched distances beside potpourri3d, which is the authors' own C++.",
+        """First, next and batched distances beside potpourri3d, which is the authors' own C++, and beside the two
+        sparse solves that the method cannot do without (bare). Times are the least of three rounds, in which the
+        programs take turns.""",
     ),
     "broken-curves": Comparison(
         "Broken curves on surfaces",
         ("broken_curves.py", "--seeds", "3"),
-        "Distance to what is left of a curve against distance to the whole.",
+        """Distance to what is left of a curve against distance to the whole: five meshes, three seeds ([ten seeds
+        each](extensions.md)). In brackets, how often a program failed.""",
     ),
-    "domains": Comparison(
+    "polygons": Comparison(
         "Polygons, points, voxels",
-        ("domains.py",),
-        "Every other surface beside potpourri3d where it has that domain.",
+        ("domains.py", "polygons", "points", "voxels", "--sizes", "4000", "16000", "--repeats", "2"),
+        """Every other surface beside potpourri3d or, for voxels, beside the same without smoothing ("peer").""",
     ),
-    "tets": Comparison("Tet meshes", ("tets.py",), "Against closed forms; there is no peer in Python."),
+    "volumes": Comparison(
+        "Grids with walls, and tets",
+        ("domains.py", "volumes", "--volumes", "70000", "--repeats", "2"),
+        """There is no peer in Python: "peer" is our own field without sharpening.""",
+    ),
+    "tets": Comparison(
+        "Tet meshes",
+        ("tets.py", "--most", "8e4"),
+        """Against closed forms, and beside a plain implementation of the paper's operators (following, recipe).""",
+    ),
+    "bands": Comparison(
+        "Narrow bands",
+        ("bands.py", "192", "--shapes", "whole", "six holes"),
+        """Closed surfaces of unit spheres at 192 nodes along a side, from narrow bands, beside MeshLib's OpenVDB and
+        winding modes, and libigl's winding numbers in blocks that it was given. MeshLib's OpenVDB mode is the fastest
+        for closed meshes.""",
+    ),
 }
+ABOUT = """# Benchmarks
+
+What the comparisons print, whole and unchanged. In each, all programs run one after the other on the same machine, and
+take turns where there are repeats. A peer is called as its documentation says; where one is better, the table shows it.
+`python benchmarks/report.py` makes this page anew, `python benchmarks/report.py NAME` one comparison of it, to repeat a
+run that was disturbed.
+
+**How far to trust the times.** Errors are the same in every run. Times are not: the machine is shared. Its load, the
+mean number of processes that wanted to run in the last minute, is given with each comparison; up to the number of cores
+it hardly matters. Where repeats are told, their spread is too. Ratios within one comparison hold better than seconds,
+and one of less than 1.3 means little.
+
+**Peers.** libigl, MeshLib and potpourri3d (`pip install libigl meshlib potpourri3d`). signedheat3d, the authors'
+program for volumes, has no wheel, and its source distribution downloads other libraries while it is built, which was
+not possible here: `python benchmarks/grid.py --peers` runs it where it is installed. What more packages can do at all
+is on [a page of its own](features.md)."""
 
 
 def main(names: list[str]) -> int:
@@ -68,13 +131,15 @@ def main(names: list[str]) -> int:
     kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
     for name in names or COMPARISONS:
         print(f"== {name}", flush=True)
-        begin = time.perf_counter()
+        begin, load = time.perf_counter(), os.getloadavg()[0]
         command = [sys.executable, "-W", "ignore", str(HERE / COMPARISONS[name].command[0])]
         run = subprocess.run([*command, *COMPARISONS[name].command[1:]], capture_output=True, text=True)
         if run.returncode:
             print(run.stderr, file=sys.stderr)
             return run.returncode
-        kept[name] = {"printed": run.stdout.rstrip(), "seconds": round(time.perf_counter() - begin), **circumstances()}
+        load = f"{load:.1f} before, {os.getloadavg()[0]:.1f} after"
+        seconds = round(time.perf_counter() - begin)
+        kept[name] = {"printed": run.stdout.rstrip(), "seconds": seconds, "load": load, **circumstances()}
         KEPT.write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         print(run.stdout, flush=True)
     PAGE.write_text(page(kept), encoding="utf-8")
@@ -94,25 +159,16 @@ def circumstances() -> dict[str, str]:
 
 
 def page(kept: dict[str, dict[str, str]]) -> str:
-    lines = [
-        "# Benchmarks",
-        "",
-        "What the comparisons print, unshortened: one run each, all programs of a comparison one after the other on",
-        "the same machine, which was busy with other work: times are up to several times those of an idle one, and",
-        "scatter, so trust ratios, and figures of error and memory. A peer is called as its best user would call it;",
-        "where one is better, the table shows it. `python benchmarks/report.py` makes this page.",
-    ]
+    lines = [ABOUT]
     for name, comparison in COMPARISONS.items():
-        if name in kept:
-            run = kept[name]
-            command = " ".join(comparison.command)
-            lines += ["", f"## {comparison.title}", "", comparison.about, ""]
-            lines += [f"`python benchmarks/{command}` ({run['seconds']} s; {run['machine']}; {run['versions']})", ""]
-            lines += ["```", run["printed"], "```"]
-    left = [f"`python benchmarks/report.py {name}`" for name in COMPARISONS if name not in kept]
-    if left:
-        about = "Comparisons whose output this page does not have: "
-        lines += ["", "## Not run yet", "", about + ", ".join(left) + "."]
+        lines += ["", f"## {comparison.title}", "", inspect.cleandoc(comparison.about), ""]
+        if name not in kept:
+            lines += [f"Not run yet: `python benchmarks/report.py {name}`."]
+            continue
+        run = kept[name]
+        lines += [f"`python benchmarks/{shlex.join(comparison.command)}` (`report.py {name}`; {run['seconds']} s; "]
+        lines += [f"load {run.get('load', 'unknown')}; {run['machine']}; {run['versions']})", ""]
+        lines += ["```text", run["printed"], "```"]
     return "\n".join(lines) + "\n"
 
 

@@ -56,7 +56,7 @@ def test_every_public_name_is_in_the_reference():
     assert len(listed) == len(set(listed))
 
 
-@pytest.mark.parametrize("name", ["quickstart", "tutorial", "recipes"])
+@pytest.mark.parametrize("name", ["quickstart", "tutorial", "recipes", "domains"])
 def test_code_of_pages_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
