@@ -43,7 +43,9 @@ class Free:
 
 @dataclass(frozen=True)
 class ZeroSet:
-    """φ = 0 on the source (Eq. 14). The default.
+    """φ = 0 on the source: the default.
+
+    Imposed as in Eq. 14.
 
     Parameters
     ----------
@@ -70,7 +72,9 @@ class ZeroSet:
 
 @dataclass(frozen=True)
 class EachComponent:
-    """φ is level on every connected component of the source, each at its own unknown level (Eq. 14, Fig. 10).
+    """φ is level on every connected component of the source, each at its own unknown level.
+
+    Imposed as in Eq. 14; Fig. 10 shows it.
 
     Parameters
     ----------

@@ -64,7 +64,9 @@ def sharpen(field: AnyField, method: Method | None = None, progress: Progress | 
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
 def sharpen(field: Field, *arguments: object, **options: object) -> Field:
-    """Replace a field by the distance to its own zero set, or to what it was computed from (Sec. 7.3).
+    """Replace a field by the distance to its own zero set, or to what it was computed from.
+
+    This is Section 7.3 of the paper.
 
     On grids: the distance of every node to the zero set, second order, with the signs of the field. With a ``shape``:
     exact distance to the faces of the shape where they are, and to the zero set where it is farther than 1.5 cells from
