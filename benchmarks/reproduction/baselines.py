@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import factorized
 
 import signedheat as sh
+from signedheat.discretization import discretize
+from signedheat.geometry.geodesics.exact import distance_to_segments
+from signedheat.geometry.geodesics.sources import PlacedSegments
 
 from .shapes import mean_edge
 
@@ -119,6 +122,13 @@ def _front(x: Array, a: Array, b: Array, at_a: float, at_b: float) -> float:
         return np.inf
     arrival = (q + np.sqrt(root)) / p
     return float(arrival) if (inverse @ (times - arrival * ones) >= 0).all() else np.inf
+
+
+def to_curves(mesh: sh.TriangleMesh, curves: list[sh.Curve]) -> Array:
+    """Exact unsigned distance along a surface to the segments of curves, by our own search."""
+    surface = discretize(mesh)
+    parts = [part for group in surface.segments(curves) for part in group]
+    return distance_to_segments(surface.triangles, [PlacedSegments.of(surface.triangles, parts)])[0]
 
 
 def to_segments(points: Array, lines: list[sh.Polyline]) -> tuple[Array, NDArray[np.int64], Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, Delaunay
 
 import signedheat as sh
 from signedheat import samples
@@ -88,10 +88,18 @@ def broken_blob(gaps: int = 5, share: float = 0.35, n: int = 240) -> list[sh.Pol
     return [sh.Polyline(points[np.arange(k * step, k * step + kept + 1) % n]) for k in range(gaps)]
 
 
+def star(points: int = 5, n: int = 60) -> sh.Polyline:
+    """A star with straight sides of n segments each; clockwise."""
+    angle = -np.pi * np.arange(2 * points) / points + 0.3
+    radius = np.where(np.arange(2 * points) % 2, 0.55, 1.25)
+    corners = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    along = np.linspace(0, 1, n, endpoint=False)[:, None]
+    sides = [a + along * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
+    return sh.Polyline(np.concatenate(sides), True)
+
+
 def flat_disk(n: int, seed: int = 0) -> sh.TriangleMesh:
     """A disk of radius 2 in irregular triangles, with about n vertices."""
-    from scipy.spatial import Delaunay
-
     rng = np.random.default_rng(seed)
     rings = max(4, round(np.sqrt(n / np.pi)))
     polar = [(r / rings, np.arange(max(1, round(2 * np.pi * r))) + 0.5 * (r % 2)) for r in range(rings + 1)]
@@ -100,10 +108,24 @@ def flat_disk(n: int, seed: int = 0) -> sh.TriangleMesh:
     )
     inner = np.linalg.norm(points, axis=1) < 2 - 1e-9
     points[inner] += rng.uniform(-0.25, 0.25, (int(inner.sum()), 2)) * 2 / rings
+    return _triangulated(points, 1e-3 / rings**2)
+
+
+def flat_square(n: int, seed: int = 1) -> sh.TriangleMesh:
+    """The square [−2, 2]² on about n random points: triangles of all sizes and angles."""
+    side = round(np.sqrt(n))
+    along, one = np.linspace(-2, 2, side, endpoint=False), np.full(side, 2.0)
+    rim = [np.stack(pair, axis=1) for pair in ((along, -one), (one, along), (-along, one), (-one, -along))]
+    inner = np.random.default_rng(seed).uniform(-2, 2, (n - 4 * side, 2)) * (1 - 1 / side)
+    return _triangulated(np.concatenate([*rim, inner]), 1e-9)
+
+
+def _triangulated(points: Array, least: float) -> sh.TriangleMesh:
+    """Delaunay's triangles on points of the plane, facing up, without those of less area than `least`."""
     faces = Delaunay(points).simplices
     a, b, c = (points[faces[:, k]] for k in range(3))
     area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces = np.where(area[:, None] > 0, faces, faces[:, ::-1])[np.abs(area) > 1e-3 / rings**2]
+    faces = np.where(area[:, None] > 0, faces, faces[:, ::-1])[np.abs(area) > least]
     return sh.TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces)
 
 
