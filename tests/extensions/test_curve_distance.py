@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from shapes.domain_cases import ball, error, globe, parallel, sphere_points
 from shapes.surfaces import disk
 from signedheat.diagnostics import SharpenedToCurves
 from signedheat.samples import sphere, torus
@@ -78,6 +79,43 @@ def test_a_gap_is_completed():
     note = phi.diagnostics.note(SharpenedToCurves)
     assert note.free_ends == 2
     assert 0.1 < note.completed_length < 0.3
+
+
+def pieces_of_a_parallel(surface, center, height: float) -> list[sh.Curve]:
+    """Twelve arcs of the parallel at this height, with gaps of two fifths between them; every fourth is turned."""
+    curves = []
+    for k in range(12):
+        angle = 2 * np.pi / 12 * (k + np.linspace(0, 0.6, 11))
+        arc = np.stack([np.cos(angle), np.sin(angle)], axis=1) * np.sqrt(1 - height**2)
+        points = np.pad(arc, ((0, 0), (0, 1)), constant_values=height) + center
+        curves.append(surface.polyline(points[::-1] if k % 4 == 1 else points))
+    return curves
+
+
+def ball_of_voxels():
+    volume, spacing, first = ball(28)
+    return sh.DigitalSurface(volume, spacing, first), np.zeros(3)
+
+
+@pytest.mark.parametrize(
+    ("build", "bound"),
+    [
+        (lambda: (sphere(3), np.zeros(3)), 3e-3),
+        (lambda: (sh.PolygonMesh(*globe(24)), np.zeros(3)), 2e-3),
+        (lambda: (sh.PointCloud(sphere_points(1500)), np.zeros(3)), 1e-3),
+        (ball_of_voxels, 4e-3),
+    ],
+    ids=["triangles", "polygons", "points", "voxels"],
+)
+def test_turned_and_lost_pieces_on_every_surface(build, bound):
+    """Two fifths of a parallel are missing and a quarter of the rest is turned: still the distance to the parallel."""
+    surface, center = build()
+    curves = pieces_of_a_parallel(surface, center, 0.3)
+    phi = sh.curve_distance(surface, curves).restrict()
+    vertices = surface.points if isinstance(surface, sh.PointCloud) else surface.vertices
+    out = (vertices - center) / np.linalg.norm(vertices - center, axis=1, keepdims=True)
+    exact = np.arcsin(out[:, 2].clip(-1, 1)) - np.arcsin(0.3)
+    assert error(phi.values, exact) < bound
 
 
 @pytest.mark.parametrize("build", [lambda: sphere(3), lambda: torus(n_around=30, n_across=16)])
