@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from shapes.domain_cases import ball, error, globe, parallel, sphere_points
+from shapes.domain_cases import ball, error, globe, sphere_points
 from shapes.surfaces import disk
 from signedheat.diagnostics import SharpenedToCurves
 from signedheat.samples import sphere, torus
