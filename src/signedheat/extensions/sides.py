@@ -181,6 +181,12 @@ def nothing_inside(shape: tuple[int, ...]) -> Sides:
     return Sides(nowhere, np.ones(shape), nowhere, True, bounds_nothing=BoundsNothing(1.0))
 
 
+def closed_sides(winding: NDArray[np.float64], cell: float) -> Sides:
+    """The sides of a shape whose parts are all closed: it bounds something, however small or thin its bodies are."""
+    function = (0.5 - winding) * cell
+    return Sides(function < 0, function, np.zeros(winding.shape, dtype=bool))
+
+
 def walls(values: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
     """The layers of nodes on the walls of a box."""
     return [np.moveaxis(values, axis, 0)[end] for axis in range(values.ndim) for end in (0, -1)]

@@ -35,12 +35,13 @@ from ..progress import Progress, Stopwatch, within
 from ..solver import SignedHeatSolver, checked
 from .band_plan import coarse_grid
 from .bands import band_around
+from .face_density import as_if_whole
 from .joining import Shape, joined_shape
 from .orientation import orientation
 from .point_orientation import orient_points
 from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .sharpening import sharpen
-from .sides import FAR, Sides, choose_sides, nothing_inside
+from .sides import FAR, Sides, choose_sides, closed_sides, nothing_inside
 from .steps import Steps
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
 
@@ -254,7 +255,9 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     if not steps.sharpen and phi is not None:
         return GridField(grid, phi, _diagnostics(notes, stopwatch, time))
     with stopwatch("sides"):
-        sides = _closed_sides(winding, grid) if closed else _sides(phi, winding, samples, grid)
+        if samples is not None and not closed:
+            winding, samples = as_if_whole(winding, samples)
+        sides = closed_sides(winding, float(grid.spacing.max())) if closed else _sides(phi, winding, samples, grid)
     with stopwatch("sharpen"):
         sharpened = _sharpened(shape, phi, sides, closed, winding, grid, steps.closed)
     notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
@@ -378,12 +381,6 @@ def _wound(shape: Shape, grid: Grid) -> tuple[AreaSamples | None, NDArray[np.flo
     except CancellingNormalsError:
         return None, np.zeros(grid.shape)
     return samples, winding_of(samples, grid)
-
-
-def _closed_sides(winding: NDArray[np.float64], grid: Grid) -> Sides:
-    """The sides of a shape whose parts are all closed: it bounds something, however small or thin its bodies are."""
-    function = (0.5 - winding) * float(grid.spacing.max())
-    return Sides(function < 0, function, np.zeros(grid.shape, dtype=bool))
 
 
 def _sides(
