@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 
 import signedheat as sh
 from refusals import refused
@@ -244,3 +245,18 @@ def test_bad_input_is_refused():
         sh.sharpen(sh.GridField(flat, np.linalg.norm(flat.points, axis=-1) - 0.5), mesh)
     with refused(sh.OutsideError, "shape"):
         sh.sharpen(sh.GridField(GRID, np.ones(GRID.shape)), sh.TriangleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1, 1]]))
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.05])
+def test_folded_faces_make_no_specks(missing):
+    """Noise turns some faces over: the nearest face then tells the wrong side, the shape as a whole does not."""
+    ball = samples.sphere(4)
+    noisy = samples.without_faces(samples.with_noise(ball, 0.025, seed=1), missing, seed=1)
+    field = sh.solid_distance(noisy, resolution=48)
+    _, bodies = scipy.ndimage.label(field.values < 0)
+    _, rest = scipy.ndimage.label(field.values >= 0)
+    assert (bodies, rest) == (1, 1)
+    away = 0.3
+    vertices = field.offset(away).vertices
+    off = np.abs(distance_to(noisy, vertices) - away) / field.grid.spacing.max()
+    assert np.quantile(off, 0.99) < 0.01 and off.max() < 0.3  # nodes may have a face that is but nearly the nearest

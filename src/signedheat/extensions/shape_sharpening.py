@@ -18,6 +18,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
+from ..geometry.winding_tree import winding_numbers_of_points
 from ..operators.grid.closest_points import crossed_edges, crossings_at
 from ..operators.grid.exact_surface import ExactSurface
 from ..operators.grid.fitted_points import REACH, fitted_to_points, mean_gap, points_as_crossings
@@ -30,6 +31,8 @@ Shape = TriangleMesh | PolygonMesh | PointCloud
 
 FAR = 1.5
 """Cells: what the zero set has farther from any face stands in for missing surface."""
+COVERED, CLEAR = 0.5, 0.25
+"""Winding numbers above which no face has its front, which is at most 0, and below which hardly one its back."""
 DOUBT = 0.05
 """Distance from the shape, over its diagonal, at which confidence in a completed surface has fallen to a half."""
 
@@ -131,9 +134,22 @@ def assemble(
     trees = [] if not (len(crossings) and n_faces) else [surface.tree if features is whole else FaceTree.of(whole)]
     points = [cloud.points - grid.origin for cloud in clouds]
     trusted = confidence_at(np.ascontiguousarray(crossings[:, 1:4]), trees, points, gaps)
-    values, confidence = signed_distances(nearby, sides < 0, trusted, telling)
+    inside = sides < 0
+    values, confidence = signed_distances(nearby, inside, trusted, telling)
+    _unfold(values, inside, surface)
     share = float(left_out.mean()) if n_faces else 0.0
     return Assembled(values, confidence, surface, share, completed)
+
+
+def _unfold(values: NDArray[np.float64], inside: NDArray[np.bool_], surface: ExactSurface) -> None:
+    """Turn, in place, values with the sign of a face that is folded over: the whole shape winds the other way there."""
+    doubtful = np.argwhere((values < 0) != inside)
+    if not len(doubtful):
+        return
+    triangles = surface.features.corners.reshape(-1, 3, 3)
+    winding = winding_numbers_of_points(triangles, surface.tree.tree, doubtful * surface.steps)
+    doubtful = doubtful[np.where(inside[tuple(doubtful.T)], winding > COVERED, winding < CLEAR)]
+    values[tuple(doubtful.T)] *= -1.0
 
 
 def _missing(

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from ..errors import SourceError
 from ..operators.grid.exact_surface import ExactSurface
 
-NEAR = 2.0
-"""Cells from a face within which it tells the side; farther away the field does."""
-
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoints:
@@ -58,7 +55,7 @@ def closest_points(
     """The nearest place of a surface for each of (n, 3) points; `field` gives the side where no face near tells it."""
     surface = known_surface(surface)
     places = surface.nearest(points - surface.origin)
-    untold = (places.sides == 0) | (places.distances > NEAR * float(surface.steps.max()))
+    untold = places.sides == 0
     sides = places.sides.copy()
     sides[untold] = np.where(field(points[untold]) < 0, -1.0, 1.0)
     towards = np.where(places.distances > 0, sides, 1.0)

@@ -16,6 +16,7 @@ from ...geometry.face_features import FaceFeatures
 from ...geometry.face_tree import FaceTree
 from ...parallel import in_chunks
 from .closest_points import distances_to_crossings
+from .sampled_surface import NEAR
 
 CLOSE = 1e-3
 """Cells off a level that a point may be and stay as it is."""
@@ -48,7 +49,7 @@ class SurfacePlaces:
     directions : (n, 3) float
         Unit vectors from there to the point; where distance is 0, normals.
     sides : (n,) float
-        −1 behind, 1 in front of a face that tells the side; 0 where none does.
+        −1 behind, 1 in front of a face that tells the side; 0 where none does within `NEAR` cells.
     completed : (n,) bool
         Whether the nearest place is on the zero set, where there are no faces.
     """
@@ -118,6 +119,7 @@ class ExactSurface(Frozen):
             distances, feet = found.distances, found.feet
             directions = self.features.face_normals[found.faces]
             told = found.regular if self.telling is None else found.regular & self.telling[found.faces]
+            told &= distances <= NEAR * float(self.steps.max())
             sides = np.where(told, np.where(found.cosines < 0, -1.0, 1.0), 0.0)
         if len(self.crossings):
             reach = float(np.linalg.norm(self.steps))
