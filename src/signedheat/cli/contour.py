@@ -16,7 +16,9 @@ from ..io import (
     write_curves,
     write_polylines,
 )
+from ..io.labels import LabelImage
 from .computing import Summary, prefix_errors
+from .images import field_of, field_or_image
 from .offset import counts, ensure_offset_writable
 
 
@@ -24,13 +26,19 @@ def run(arguments: Namespace) -> Summary:
     """Load, contour, write."""
     known = (SHAPE_FORMATS | CURVE_FORMATS | POLYLINE_FORMATS) - {".xyz", ".pc"}
     ensure_writable(arguments.output, known, "a surface, curves or lines")
-    field = load_field(arguments.field)
+    field, image = field_or_image(arguments.field), None
+    if field is None:
+        field = load_field(arguments.field)  # on tets, or refused
+    if isinstance(field, LabelImage):
+        field, image = field_of(field), field
     if isinstance(field, VertexField):
         return lines(field, arguments)
     planar = isinstance(field, GridField) and field.grid.dimension == 2
     ensure_offset_writable(arguments.output, planar)
     with prefix_errors(arguments.field):
         found = field.contour(arguments.level)
+    if image is not None:
+        found = image.to_world(found)
     if planar:
         write_polylines(arguments.output, found)
     else:

@@ -14,14 +14,16 @@ from ..errors import SignedHeatError, SourceError
 from ..extensions.orientation import Orientation, orientation
 from ..extensions.solid_distance import BYTES_PER_NODE
 from ..extensions.thickness import Thickness, thickness
-from ..io import FIELD_FORMATS, load_field, read, read_curves, read_polylines
+from ..io import read, read_curves, read_polylines
 from ..io.files import extension
+from ..io.labels import LabelImage
 from ..io.obj import read_obj_lines
 from ..lowering.area_elements import bounds_around
 from ..lowering.grid.discretization import fitting_spacing, memory_estimate
 from ..memory import available_memory
 from .computing import Summary, describe
 from .curve_report import as_text, curve_reports
+from .images import field_or_image, image_report
 from .streams import say
 from .usage.options import is_planar
 
@@ -44,9 +46,12 @@ def run(arguments: Namespace) -> Summary:
 
 
 def report(file: str, arguments: Namespace) -> Summary:
-    """Inspect a shape or a field."""
-    if extension(file) in FIELD_FORMATS:
-        field = load_field(file)
+    """Inspect a shape, a field or an image."""
+    field = field_or_image(file)
+    if isinstance(field, LabelImage):
+        summary = image_report(file, field)
+        return summary, _table(summary)
+    if field is not None:
         summary = {"file": file, "kind": type(field).__name__, **describe(field)}
         del summary["seconds"]
         return summary, _table(summary)

@@ -16,8 +16,9 @@ from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
-from ..io import FIELD_FORMATS, load_field, read
+from ..io import load_field, read
 from ..io.files import ensure_writable, extension
+from ..io.labels import LabelImage
 from ..io.tets import TET_FIELD_FORMATS
 from ..visualization import (
     PAGE_FORMATS,
@@ -29,6 +30,7 @@ from ..visualization import (
     save_surface,
 )
 from .computing import Summary, drawable, prefix_errors
+from .images import field_or_image, thing_of
 from .tets import on_grid
 
 
@@ -75,8 +77,12 @@ def ensure_output_writable(output: str) -> None:
 
 def shape_or_field(path: str) -> Any:
     """What a file holds; those of tets may hold either."""
-    if extension(path) in FIELD_FORMATS:
-        return load_field(path)
+    found = field_or_image(path)
+    if isinstance(found, LabelImage):
+        with prefix_errors(path):
+            return thing_of(found)
+    if found is not None:
+        return found
     thing = read(path)
     if isinstance(thing, TetMesh) and extension(path) in TET_FIELD_FORMATS:
         with suppress(FileFormatError):

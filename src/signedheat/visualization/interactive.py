@@ -119,7 +119,9 @@ def _add_isolines(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
     for levels, width in ((look["levels"], 1.0), ([0.0] if look["zero"] else [], 4.0)):
         lines = mesh.contour(list(levels), scalars=NAME) if len(levels) else None
         if lines is not None and lines.n_points:
-            plotter.add_mesh(lines, color=LINE, line_width=width, show_scalar_bar=False)
+            mapper = plotter.add_mesh(lines, color=LINE, line_width=width, show_scalar_bar=False).mapper
+            mapper.SetResolveCoincidentTopologyToPolygonOffset()  # lines win over the surface that they lie on
+            mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-2.0, -2.0)
 
 
 def _add_zero_set(plotter: Any, field: Any) -> None:
