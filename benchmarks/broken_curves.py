@@ -53,13 +53,30 @@ def main() -> None:
     parser.add_argument("--errors", help="where errors are kept (.npz); those that it holds are counted too")
     parser.add_argument("--picture", help="where to draw one case of each mesh")
     arguments = parser.parse_args()
-    warnings.simplefilter("ignore", sh.InexactWarning)
-    begin, shown, errors = time.perf_counter(), {}, {}
+    shown: dict[str, tuple] = {}
     kept = Path(arguments.errors) if arguments.errors else None
+    errors = study(arguments.seeds, arguments.meshes, kept, shown)
+    ways = list(dict.fromkeys(way for _, way in errors))
+    print(f"{'median / worst, %':>18}" + "".join(f"{way:>18}" for way in ways))
+    for damage in DAMAGES:
+        row = ""
+        for way in ways:
+            row += f"{told(errors[damage, way]):>18}"
+        print(f"{damage:>18}{row}")
+    if arguments.picture:
+        draw(shown, arguments.picture)
+
+
+def study(
+    seeds: int, names: list[str] | None = None, kept: Path | None = None, shown: dict[str, tuple] | None = None
+) -> dict[tuple[str, str], list[float]]:
+    """Errors by damage and way, of all meshes and seeds; what `kept` has is counted too."""
+    warnings.simplefilter("ignore", sh.InexactWarning)
+    begin, errors = time.perf_counter(), {}
     if kept and kept.exists():
         errors = {tuple(key.split("|")): found.tolist() for key, found in np.load(kept).items()}
     for name, (mesh, heights) in meshes().items():
-        if arguments.meshes and name not in arguments.meshes:
+        if names and name not in names:
             continue
         curve = max(mesh.level_set(heights, 0.0), key=lambda c: c.n_points)
         region = np.sign(heights) if name != "torus" else np.sign(sh.curve_distance(mesh, curve).values)
@@ -67,27 +84,22 @@ def main() -> None:
         solver = sh.SignedHeatSolver(mesh)
         peer = pp3d.MeshSignedHeatSolver(np.array(mesh.vertices), np.array(mesh.faces))
         for damage, options in DAMAGES.items():
-            for seed in range(arguments.seeds):
+            for seed in range(seeds):
                 pieces = damaged(mesh, heights, curve, np.random.default_rng(seed), **options)
                 for way, values in answers(mesh, solver, peer, pieces).items():
                     errors.setdefault((damage, way), []).append(error(values, truth))
-                if damage == "moved" and seed == 0:
+                if shown is not None and damage == "moved" and seed == 0:
                     shown[name] = mesh, pieces, solver.distance(pieces).values, truth
         print(f"{name}: {time.perf_counter() - begin:.0f} s", flush=True)
         if kept:
             np.savez(kept, **{"|".join(key): found for key, found in errors.items()})
-    ways = list(dict.fromkeys(way for _, way in errors))
-    print(f"{'median / worst, %':>18}" + "".join(f"{way:>18}" for way in ways))
-    for damage in DAMAGES:
-        row = ""
-        for way in ways:
-            found = np.array(errors[damage, way])
-            failed = int(np.isnan(found).sum())
-            text = f"{np.nanmedian(found):.2f} / {np.nanmax(found):.2f}" + (f" ({failed})" if failed else "")
-            row += f"{text:>18}"
-        print(f"{damage:>18}{row}")
-    if arguments.picture:
-        draw(shown, arguments.picture)
+    return errors
+
+
+def told(found: list[float]) -> str:
+    """Median and worst, and how many failed."""
+    failed = int(np.isnan(found).sum())
+    return f"{np.nanmedian(found):.2f} / {np.nanmax(found):.2f}" + (f" ({failed})" if failed else "")
 
 
 def answers(mesh, solver, peer, pieces) -> dict[str, np.ndarray]:

@@ -90,7 +90,7 @@ def write_chapter(folder: Path, numbers: Mapping[str, list[Row]], versions: str)
         "Errors ε are root mean squares over the domain in per cent of the range of the true distance, as in Sec. 9.1.",
     ]
     for number, section in sorted(FIGURES.items(), key=lambda item: order(item[0])):
-        name = f"Figure {number.replace('-', ' and ')}" if number != "9" else "Section 9"
+        name = f"Section {number}" if float(order(number)) in (9, 9.5) else f"Figure {number.replace('-', ' and ')}"
         lines += ["", f"## {name}: {section.title}", "", inspect.getdoc(section.make) or ""]
         if (folder / picture_name(number)).exists():
             lines += ["", f"![{section.title}](paper/{picture_name(number)})"]

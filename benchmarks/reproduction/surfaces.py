@@ -157,8 +157,9 @@ def failing_gracefully(page: Page) -> None:
     """One closed curve on a bumpy sphere, damaged in the three ways of the figure, more and more. ε against exact
     distance from the whole curve (the paper gives its own as colours only). Beside it `sh.curve_distance`, which also
     turns pieces and leaves out what belongs to no other; and a baseline that nobody can have: exact distance to what is
-    left, with the true sign of the whole curve. Where little is gone that baseline wins, since most of the surface is
-    nearer to what is left than to a gap.
+    left, with the true sign of the whole curve. It beats heat alone where little is gone, since most of the surface is
+    nearer to what is left than to a gap, and where curves were shifted; `sh.curve_distance` is as good there, and
+    better elsewhere.
     """
     mesh = shapes.subdivided(shapes.organic(4, 700), 1)
     heights = shapes.height(mesh.vertices, 4)
