@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,27 @@ from .components import same_positions
 from .edges import EdgeTable, edge_table
 from .point_triangle import triangle_rows
 
+Links: TypeAlias = tuple[
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.int32],
+    NDArray[np.int32],
+    NDArray[np.int32],
+    NDArray[np.int64],
+    NDArray[np.int32],
+    NDArray[np.bool_],
+]
+"""Attributes of `FaceFeatures` as kernels take them: see `FaceFeatures.links`."""
+Normals: TypeAlias = tuple[
+    NDArray[np.int32],
+    NDArray[np.int32],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    NDArray[np.bool_],
+    NDArray[np.bool_],
+]
+"""See `FaceFeatures.normals`."""
 FOLD = 0.02
 """Where unit normals of two faces add up to less than this, the edge between them is a fold and tells no side."""
 
@@ -39,12 +61,10 @@ class FaceFeatures:
         Unit normals of the faces, their sums at edges, and angle-weighted at vertices.
     edge_regular, vertex_regular : (·,) bool
         Whether the surface is closed and consistent there.
-    across : (m, 3) int
-        The face on the other side of each edge; −1 where it is not regular.
+    across, apexes : (m, 3) int
+        The face on the other side of each edge, and its vertex that is not on it; −1 where the edge is not regular.
     vertex_starts, vertex_corners : (n + 1,), (3 m,) int
         Corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2.
-    spokes : (3 m, 6) float
-        Directions of the two sides of each of these corners: unit vectors away from the vertex.
     """
 
     corners: NDArray[np.float64]
@@ -58,9 +78,36 @@ class FaceFeatures:
     edge_regular: NDArray[np.bool_]
     vertex_regular: NDArray[np.bool_]
     across: NDArray[np.int32]
+    apexes: NDArray[np.int32]
     vertex_starts: NDArray[np.int64]
     vertex_corners: NDArray[np.int32]
-    spokes: NDArray[np.float32]
+
+    @property
+    def links(self) -> Links:
+        """What a walk from face to face needs."""
+        return (
+            self.rows,
+            self.vertices,
+            self.faces,
+            self.across,
+            self.apexes,
+            self.vertex_starts,
+            self.vertex_corners,
+            self.vertex_regular,
+        )
+
+    @property
+    def normals(self) -> Normals:
+        """What tells the side of a foot."""
+        return (
+            self.faces,
+            self.edges,
+            self.face_normals,
+            self.edge_normals,
+            self.vertex_normals,
+            self.edge_regular,
+            self.vertex_regular,
+        )
 
     @classmethod
     def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceFeatures:
@@ -105,8 +152,9 @@ class FaceFeatures:
             edge_regular,
             vertex_regular,
             across,
+            np.where(across < 0, -1, faces[across].sum(axis=2) - faces - np.roll(faces, -1, axis=1)).astype(np.int32),
             starts,
-            *_corners_around(faces, vertices, starts),
+            _corners_around(faces, starts),
         )
 
 
@@ -141,33 +189,16 @@ def _by_first_use(faces: NDArray[np.int64], n_vertices: int) -> tuple[NDArray[np
     return order[:count], result
 
 
-@compiled(nogil=True, error_model="numpy")
-def _corners_around(
-    faces: NDArray[np.int64], vertices: NDArray[np.float64], starts: NDArray[np.int64]
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+@compiled(nogil=True)
+def _corners_around(faces: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.int32]:
     fill = starts.copy()
     corners = np.empty(3 * len(faces), dtype=np.int32)
-    spokes = np.zeros((3 * len(faces), 6), dtype=np.float32)
     for f in range(len(faces)):
         for c in range(3):
             v = faces[f, c]
-            at = fill[v]
-            corners[at] = 3 * f + c
-            for turn in range(2):
-                w = faces[f, (c + 1 + turn) % 3]
-                x, y, z = (
-                    vertices[w, 0] - vertices[v, 0],
-                    vertices[w, 1] - vertices[v, 1],
-                    vertices[w, 2] - vertices[v, 2],
-                )
-                scale = 1.0 / np.sqrt(x * x + y * y + z * z)
-                spokes[at, 3 * turn], spokes[at, 3 * turn + 1], spokes[at, 3 * turn + 2] = (
-                    x * scale,
-                    y * scale,
-                    z * scale,
-                )
+            corners[fill[v]] = 3 * f + c
             fill[v] += 1
-    return corners, spokes
+    return corners
 
 
 @compiled(nogil=True, error_model="numpy")

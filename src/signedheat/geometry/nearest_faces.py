@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from .face_features import FaceFeatures
+from .face_features import FaceFeatures, Links, Normals
 from .point_triangle import foot_on_triangle
 
 STEPS = 24
@@ -46,212 +46,123 @@ class NearestFaces:
     cosines: NDArray[np.float32]
     regular: NDArray[np.bool_]
 
-    def replaced(self, rows: NDArray[np.int64], others: NearestFaces) -> NearestFaces:
-        """What was found anew for some of the points, written over what is there."""
-        for name, values in vars(self).items():
-            values[rows] = getattr(others, name)
-        return self
-
 
 def search_from(
     features: FaceFeatures,
     points: NDArray[np.float64],
     candidates: NDArray[np.int32],
 ) -> NearestFaces:
-    """The nearest of (n, c) candidate faces of each of (n, 3) points, or one that leads on from it; −1 is none.
+    """The nearest of (n, c) candidate faces of each of (n, 3) points, or one that it leads on to; −1 is none.
 
-    What is nearest to the point before is a candidate, too: where points are in order, it is often the right one. As
-    long as there is no candidate, there is no face, and distance is infinite.
+    Where a point has no candidate, there is no face, and distance is infinite.
     """
     n = len(points)
-    found = NearestFaces(
-        np.empty(n, dtype=np.int32),
-        np.empty(n),
-        np.empty((n, 3)),
-        np.empty(n, dtype=np.int8),
-        np.empty(n, dtype=np.float32),
-        np.empty(n, dtype=np.bool_),
-    )
-    _search(
-        features.rows,
-        features.vertices,
-        features.faces,
-        features.across,
-        features.vertex_starts,
-        features.vertex_corners,
-        features.spokes,
-        features.edges,
-        features.face_normals,
-        features.edge_normals,
-        features.vertex_normals,
-        features.edge_regular,
-        features.vertex_regular,
-        points,
-        candidates,
-        found.faces,
-        found.distances,
-        found.feet,
-        found.features,
-        found.cosines,
-        found.regular,
-    )
-    return found
+    faces, squares, feet = np.empty(n, dtype=np.int32), np.empty(n), np.empty((n, 3))
+    codes, cosines, regular = np.empty(n, dtype=np.int8), np.empty(n, dtype=np.float32), np.empty(n, dtype=np.bool_)
+    nearest_of_candidates(features.links, points, candidates, faces, squares, codes, feet)
+    facing(features.normals, points, faces, codes, feet, cosines, regular)
+    return NearestFaces(faces, np.sqrt(squares), feet, codes, cosines, regular)
 
 
 @compiled(nogil=True, error_model="numpy")
-def _search(
-    rows: NDArray[np.float64],
-    places: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    across: NDArray[np.int32],
-    starts: NDArray[np.int64],
-    around: NDArray[np.int32],
-    spokes: NDArray[np.float32],
-    edges: NDArray[np.int32],
-    face_normals: NDArray[np.float64],
-    edge_normals: NDArray[np.float64],
-    vertex_normals: NDArray[np.float64],
-    edge_regular: NDArray[np.bool_],
-    vertex_regular: NDArray[np.bool_],
+def nearest_of_candidates(
+    links: Links,
     points: NDArray[np.float64],
     candidates: NDArray[np.int32],
     out_faces: NDArray[np.int32],
-    out_distances: NDArray[np.float64],
-    out_feet: NDArray[np.float64],
+    out_squares: NDArray[np.float64],
     out_features: NDArray[np.int8],
-    out_cosines: NDArray[np.float32],
-    out_regular: NDArray[np.bool_],
+    out_feet: NDArray[np.float64],
 ) -> None:
+    """From the nearest of some faces, and the foot of each point on it, to faces that are nearer, across their rims.
+
+    Over an edge lies what is nearer, if anything does, on the side of the point: the foot is the nearest place of the
+    edge, so the point must be in front of the plane that the edge divides from the other face's apex. Around a vertex
+    the side along which distance shrinks fastest leads on; where it grows along all of them no place is nearer.
+
+    All points in one call, since a call costs more than the way of one point.
+    """
+    rows, places, faces, across, apexes, starts, around, vertex_regular = links
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        face, square, feature, fx, fy, fz = -1, np.inf, 0, x, y, z
-        for c in range(-1, candidates.shape[1]):
-            if c >= 0:
-                other = np.int64(candidates[p, c])
-            else:
-                other = np.int64(out_faces[p - 1]) if p > 0 else -1
-            if other >= 0 and other != face and (c <= 0 or other != candidates[p, c - 1]):
+        face, square, feature, fx, fy, fz = np.int64(-1), np.inf, 0, x, y, z
+        for c in range(candidates.shape[1]):
+            other = np.int64(candidates[p, c])
+            if other >= 0 and other != face and (c == 0 or other != candidates[p, c - 1]):
                 s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
                 if s < square:
                     face, square, feature, fx, fy, fz = other, s, which, u, v, w
-        if feature != 0:
-            face, square, feature, fx, fy, fz = walk_to_nearest(
-                rows,
-                places,
-                faces,
-                across,
-                starts,
-                around,
-                spokes,
-                vertex_regular,
-                x,
-                y,
-                z,
-                face,
-                square,
-                feature,
-                fx,
-                fy,
-                fz,
-            )
-        out_faces[p], out_features[p], out_distances[p] = face, feature, np.sqrt(square)
-        out_feet[p, 0], out_feet[p, 1], out_feet[p, 2] = fx, fy, fz
-        out_cosines[p], out_regular[p] = facing(
-            faces,
-            edges,
-            face_normals,
-            edge_normals,
-            vertex_normals,
-            edge_regular,
-            vertex_regular,
-            face,
-            feature,
-            x - fx,
-            y - fy,
-            z - fz,
-            square,
-        )
-
-
-@compiled(nogil=True, error_model="numpy")
-def walk_to_nearest(
-    rows: NDArray[np.float64],
-    places: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    across: NDArray[np.int32],
-    starts: NDArray[np.int64],
-    around: NDArray[np.int32],
-    spokes: NDArray[np.float32],
-    vertex_regular: NDArray[np.bool_],
-    x: float,
-    y: float,
-    z: float,
-    face: int,
-    square: float,
-    feature: int,
-    fx: float,
-    fy: float,
-    fz: float,
-) -> tuple[int, float, int, float, float, float]:
-    """From a face and the foot of (x, y, z) on it to faces that are nearer, across their rims."""
-    for _ in range(STEPS):
-        before = face
-        if feature == 0:
-            break
-        if feature <= 3:
-            other = np.int64(across[face, feature - 1])
-        else:
-            vertex = np.int64(faces[face, feature - 4])
-            vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
-            dx, dy, dz = x - vx, y - vy, z - vz
-            steepest, other = 0.0, -1  # the side along which distance shrinks fastest; if none, no place is nearer
-            turns = 1 if vertex_regular[vertex] else 2  # around a whole vertex every side is the first of one corner
-            for k in range(starts[vertex], starts[vertex + 1]):
-                for turn in range(turns):
-                    gain = dx * spokes[k, 3 * turn] + dy * spokes[k, 3 * turn + 1] + dz * spokes[k, 3 * turn + 2]
-                    if gain > steepest:
-                        steepest, other = gain, np.int64(around[k]) // 3
-        if other >= 0:
+        for _ in range(STEPS):
+            if feature == 0:
+                break
+            other = np.int64(-1)
+            if feature <= 3:
+                vertex = np.int64(apexes[face, feature - 1])
+                if vertex >= 0:
+                    ax, ay, az = places[vertex, 0] - fx, places[vertex, 1] - fy, places[vertex, 2] - fz
+                    if (x - fx) * ax + (y - fy) * ay + (z - fz) * az > 0.0:
+                        other = np.int64(across[face, feature - 1])
+            else:
+                vertex = np.int64(faces[face, feature - 4])
+                vx, vy, vz = places[vertex, 0], places[vertex, 1], places[vertex, 2]
+                dx, dy, dz = x - vx, y - vy, z - vz
+                steepest = 0.0
+                turns = 1 if vertex_regular[vertex] else 2  # around a whole vertex every side is the first of a corner
+                for k in range(starts[vertex], starts[vertex + 1]):
+                    near = np.int64(around[k]) // 3
+                    corner = np.int64(around[k]) - 3 * near
+                    for _turn in range(turns):
+                        corner = corner + 1 if corner < 2 else 0
+                        end = np.int64(faces[near, corner])
+                        ex, ey, ez = places[end, 0] - vx, places[end, 1] - vy, places[end, 2] - vz
+                        gain = dx * ex + dy * ey + dz * ez
+                        if gain > 0.0:
+                            gain *= gain / (ex * ex + ey * ey + ez * ez)
+                            if gain > steepest:
+                                steepest, other = gain, near
+            if other < 0:
+                break
             s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
-            if s < square:
-                face, square, feature, fx, fy, fz = other, s, which, u, v, w
-        if face == before:
-            break
-    return face, square, feature, fx, fy, fz
+            if not s < square:
+                break
+            face, square, feature, fx, fy, fz = other, s, which, u, v, w
+        out_faces[p], out_squares[p], out_features[p] = face, square, feature
+        out_feet[p, 0], out_feet[p, 1], out_feet[p, 2] = fx, fy, fz
 
 
 @compiled(nogil=True, error_model="numpy")
 def facing(
-    faces: NDArray[np.int32],
-    edges: NDArray[np.int32],
-    face_normals: NDArray[np.float64],
-    edge_normals: NDArray[np.float64],
-    vertex_normals: NDArray[np.float64],
-    edge_regular: NDArray[np.bool_],
-    vertex_regular: NDArray[np.bool_],
-    face: int,
-    feature: int,
-    dx: float,
-    dy: float,
-    dz: float,
-    square: float,
-) -> tuple[float, bool]:
-    """Cosine between (dx, dy, dz), away from a foot, and the normal there; and whether that tells the side."""
-    if face < 0:
-        return 0.0, False
-    regular = True
-    if feature == 0:
-        nx, ny, nz = face_normals[face, 0], face_normals[face, 1], face_normals[face, 2]
-    elif feature <= 3:
-        e = edges[face, feature - 1]
-        nx, ny, nz = edge_normals[e, 0], edge_normals[e, 1], edge_normals[e, 2]
-        regular = edge_regular[e]
-    else:
-        e = faces[face, feature - 4]
-        nx, ny, nz = vertex_normals[e, 0], vertex_normals[e, 1], vertex_normals[e, 2]
-        regular = vertex_regular[e]
-    lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * square)
-    return (nx * dx + ny * dy + nz * dz) / lengths if lengths > 0.0 else 0.0, regular
+    normals: Normals,
+    points: NDArray[np.float64],
+    which: NDArray[np.int32],
+    codes: NDArray[np.int8],
+    feet: NDArray[np.float64],
+    out_cosines: NDArray[np.float32],
+    out_regular: NDArray[np.bool_],
+) -> None:
+    """Cosine between the way from each foot to its point and the normal there; and whether that tells the side."""
+    faces, edges, face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular = normals
+    for p in range(len(points)):
+        face, code = np.int64(which[p]), np.int64(codes[p])
+        out_cosines[p], out_regular[p] = 0.0, False
+        if face < 0:
+            continue
+        regular = True
+        if code == 0:
+            nx, ny, nz = face_normals[face, 0], face_normals[face, 1], face_normals[face, 2]
+        elif code <= 3:
+            e = edges[face, code - 1]
+            nx, ny, nz = edge_normals[e, 0], edge_normals[e, 1], edge_normals[e, 2]
+            regular = edge_regular[e]
+        else:
+            e = faces[face, code - 4]
+            nx, ny, nz = vertex_normals[e, 0], vertex_normals[e, 1], vertex_normals[e, 2]
+            regular = vertex_regular[e]
+        dx, dy, dz = points[p, 0] - feet[p, 0], points[p, 1] - feet[p, 1], points[p, 2] - feet[p, 2]
+        lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + dz * dz))
+        if lengths > 0.0:
+            out_cosines[p] = (nx * dx + ny * dy + nz * dz) / lengths
+        out_regular[p] = regular
 
 
 @compiled(nogil=True)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from ...compiled import compiled
 from ...errors import OutsideError
 from ...geometry.face_band import nearest_in_band
-from ...geometry.face_features import FaceFeatures
-from ...geometry.nearest_faces import NearestFaces, facing, feet_of_nodes, search_from, walk_to_nearest
+from ...geometry.face_features import FaceFeatures, Links, Normals
+from ...geometry.nearest_faces import NearestFaces, facing, feet_of_nodes, nearest_of_candidates, search_from
 from ...geometry.point_triangle import foot_on_triangle
 from ...parallel import n_threads
 from .closest_points import circle_distance, nearest_tiles, seed_edge_ends
@@ -27,6 +27,12 @@ NEAR = 2.0
 """Cells from a face within which it tells the side."""
 PLANES = 16
 """Planes of nodes that one thread goes through, each after the one before."""
+ROWS, ROW = 16, 64
+"""Lines of a tile of nodes, and nodes of each, in which samples are asked one after the other."""
+APART = 1.0
+"""Cells between feet from which on a neighbour's is taken to be on another part of the surface."""
+ROUNDING = 1e-6
+"""Of feet in single precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +50,7 @@ class SampledSurface:
     owners : (s,) int
         Which face each sample lies on, or −1 minus which crossing it is.
     nearest : (*shape) int
-        The sample that is nearest to each node, or nearly.
+        The sample that is nearest to each node, or nearly; see `signed_distances`.
     """
 
     features: FaceFeatures
@@ -135,14 +141,15 @@ def signed_distances(
     trusted: NDArray[np.float32],
     telling: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """Signed distance of every node to what is nearest to it or to nodes before; and how far that can be trusted.
+    """Signed distance of every node to what is nearest to it or its neighbours; and how far that can be trusted.
 
     Near a face the face tells the side, where the surface is closed and consistent around the foot; elsewhere `inside`.
+    ``surface.nearest`` then holds what is nearest itself, as `owners` name it, in place of samples.
 
     Parameters
     ----------
     surface : SampledSurface
-        What is near.
+        What is near; its samples are used up.
     inside : (*shape) bool
         Sides where no face tells them.
     trusted : (c,) float
@@ -150,156 +157,183 @@ def signed_distances(
     telling : (s,) bool, optional
         Samples whose faces tell a side; those of open sheets do not.
     """
-    shape = surface.nearest.shape
+    shape, nearest, steps = surface.nearest.shape, surface.nearest, surface.steps
     values, confidence = np.empty(shape), np.ones(shape, dtype=np.float32)
-    cell, reach = float(surface.steps.max()), float(np.linalg.norm(surface.steps))
-    features = surface.features
-    told = np.ones(0, dtype=np.bool_) if telling is None else telling
+    cell, reach = float(steps.max()), float(np.linalg.norm(steps))
+    links, normals = surface.features.links, surface.features.normals
 
-    def planes(which: range) -> None:
-        _distances_of_planes(
-            features.rows,
-            features.vertices,
-            features.faces,
-            features.across,
-            features.vertex_starts,
-            features.vertex_corners,
-            features.spokes,
-            features.edges,
-            features.face_normals,
-            features.edge_normals,
-            features.vertex_normals,
-            features.edge_regular,
-            features.vertex_regular,
-            surface.owners,
-            surface.nearest,
-            told,
-            surface.crossings,
-            trusted,
-            surface.steps,
-            (NEAR * cell) ** 2,
-            reach,
-            inside,
-            which.start,
-            which.stop,
-            values,
-            confidence,
-        )
+    def planes(first: int) -> None:
+        here = slice(first, first + PLANES)
+        told = np.zeros((0, 0, 0), dtype=np.bool_) if telling is None else telling[nearest[here]]
+        places = (nearest[here], values[here], np.empty((*nearest[here].shape, 3), dtype=np.float32))
+        _nearest_to_samples(links, surface.owners, surface.crossings, steps, reach, first, *places)
+        for way in (1, -1):
+            _nearest_to_neighbours(links, steps, first, (APART * cell) ** 2, way, *places)
+        _confidences(trusted, nearest[here], confidence[here])
+        _signs(surface.features.rows, normals, told, steps, first, NEAR * cell, inside[here], *places[:2])
 
-    threads = n_threads() if surface.nearest.size >= SMALL else 1
+    threads = n_threads() if nearest.size >= SMALL else 1
     with ThreadPoolExecutor(threads) as pool:
-        jobs = [pool.submit(planes, range(k, min(k + PLANES, shape[0]))) for k in range(0, shape[0], PLANES)]
-        for job in jobs:
+        for job in [pool.submit(planes, first) for first in range(0, shape[0], PLANES)]:
             job.result()
     return values, confidence
 
 
 @compiled(nogil=True, error_model="numpy")
-def _distances_of_planes(
-    rows: NDArray[np.float64],
-    places: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    across: NDArray[np.int32],
-    starts: NDArray[np.int64],
-    around: NDArray[np.int32],
-    spokes: NDArray[np.float32],
-    edges: NDArray[np.int32],
-    face_normals: NDArray[np.float64],
-    edge_normals: NDArray[np.float64],
-    vertex_normals: NDArray[np.float64],
-    edge_regular: NDArray[np.bool_],
-    vertex_regular: NDArray[np.bool_],
+def _nearest_to_samples(
+    links: Links,
     owners: NDArray[np.int32],
-    nearest: NDArray[np.int32],
-    telling: NDArray[np.bool_],
     crossings: NDArray[np.float64],
-    trusted: NDArray[np.float32],
     steps: NDArray[np.float64],
-    near: float,
     reach: float,
-    inside: NDArray[np.bool_],
     first: int,
-    last: int,
+    nearest: NDArray[np.int32],
     values: NDArray[np.float64],
-    confidence: NDArray[np.float32],
+    feet: NDArray[np.float32],
 ) -> None:
-    """See `signed_distances`; `near` is the square of a length.
+    """Faces that the nearest samples of planes of nodes lead to, distances, and feet; or crossings, −1 minus which.
 
-    What is nearest to the nodes before, along each axis, are candidates, too: they are often right.
+    In tiles, lest each line asks for faces that were just forgotten.
     """
-    n1, n2 = nearest.shape[1:]
+    planes, n1, n2 = nearest.shape
+    points, candidates = np.empty((ROW, 3)), np.empty((ROW, 1), dtype=np.int32)
+    found, squares = np.empty(ROW, dtype=np.int32), np.empty(ROW)
+    codes, places = np.empty(ROW, dtype=np.int8), np.empty((ROW, 3))
     away, side = np.zeros(4), np.empty(4)
-    plane = np.full((n1, n2), np.int32(-1))  # the last face at each place, of this plane or the one before
-    for i in range(first, last):
-        before = np.int64(-1)
+    for j0 in range(0, n1, ROWS):
+        for k0 in range(0, n2, ROW):
+            count = min(ROW, n2 - k0)
+            for i in range(planes):
+                for j in range(j0, min(j0 + ROWS, n1)):
+                    for q in range(count):
+                        points[q, 0], points[q, 1] = (first + i) * steps[0], j * steps[1]
+                        points[q, 2] = (k0 + q) * steps[2]
+                        candidates[q, 0] = owners[nearest[i, j, k0 + q]]
+                    nearest_of_candidates(links, points[:count], candidates[:count], found, squares, codes, places)
+                    for q in range(count):
+                        k = k0 + q
+                        nearest[i, j, k], values[i, j, k] = found[q], np.sqrt(squares[q])
+                        if candidates[q, 0] < 0:
+                            c = -1 - np.int64(candidates[q, 0])
+                            for d in range(3):
+                                away[1 + d] = points[q, d] - crossings[c, 1 + d]
+                            nearest[i, j, k] = candidates[q, 0]
+                            values[i, j, k] = circle_distance(crossings[c], away, side, reach)
+                        for d in range(3):
+                            feet[i, j, k, d] = places[q, d]
+
+
+@compiled(nogil=True, error_model="numpy")
+def _nearest_to_neighbours(
+    links: Links,
+    steps: NDArray[np.float64],
+    first: int,
+    apart: float,
+    way: int,
+    nearest: NDArray[np.int32],
+    values: NDArray[np.float64],
+    feet: NDArray[np.float32],
+) -> None:
+    """What is nearest to the node before along each axis, and from there, where that is nearer; upwards or downwards.
+
+    The distance d to a triangle is convex, so at x it is at least ``d(y) + ∇d(y) · (x − y)``: most neighbours' faces
+    need not be asked. Nor need those whose feet are within the root of `apart` from the node's own, unless they lie at
+    a rim: a walk came by.
+    """
+    across = links[3]
+    planes, n1, n2 = nearest.shape
+    points, candidates = np.empty((3 * n2, 3)), np.empty((3 * n2, 1), dtype=np.int32)
+    found, squares = np.empty(3 * n2, dtype=np.int32), np.empty(3 * n2)
+    codes, places, nodes = np.empty(3 * n2, dtype=np.int8), np.empty((3 * n2, 3)), np.empty(3 * n2, dtype=np.int64)
+    for line in range(planes * n1):
+        at = line if way > 0 else planes * n1 - 1 - line
+        i, j, count = at // n1, at % n1, 0
+        for step in range(n2):
+            k = step if way > 0 else n2 - 1 - step
+            for axis in range(3):
+                a, b, c = i - way * (axis == 0), j - way * (axis == 1), k - way * (axis == 2)
+                if not (0 <= a < planes and 0 <= b < n1 and 0 <= c < n2):
+                    continue
+                other = nearest[a, b, c]
+                if other < 0 or other == nearest[i, j, k]:
+                    continue
+                there = (first + a if axis == 0 else (b if axis == 1 else c)) * steps[axis]
+                near = values[a, b, c]
+                least = near * near + (there - feet[a, b, c, axis]) * way * steps[axis]
+                if least >= near * values[i, j, k] * (1.0 - ROUNDING):
+                    continue
+                if nearest[i, j, k] >= 0 and across[other, 0] >= 0 and across[other, 1] >= 0 and across[other, 2] >= 0:
+                    square = (feet[a, b, c, 0] - feet[i, j, k, 0]) ** 2 + (feet[a, b, c, 1] - feet[i, j, k, 1]) ** 2
+                    if square + (feet[a, b, c, 2] - feet[i, j, k, 2]) ** 2 < apart:
+                        continue
+                points[count, 0], points[count, 1] = (first + i) * steps[0], j * steps[1]
+                points[count, 2] = k * steps[2]
+                candidates[count, 0], nodes[count] = other, k
+                count += 1
+        if count == 0:
+            continue
+        nearest_of_candidates(links, points[:count], candidates[:count], found, squares, codes, places)
+        for q in range(count):
+            k, distance = nodes[q], np.sqrt(squares[q])
+            if distance < values[i, j, k]:
+                nearest[i, j, k], values[i, j, k] = found[q], distance
+                for d in range(3):
+                    feet[i, j, k, d] = places[q, d]
+
+
+@compiled(nogil=True)
+def _confidences(trusted: NDArray[np.float32], nearest: NDArray[np.int32], confidence: NDArray[np.float32]) -> None:
+    planes, n1, n2 = nearest.shape
+    for i in range(planes):
         for j in range(n1):
             for k in range(n2):
-                x, y, z = i * steps[0], j * steps[1], k * steps[2]
-                sample = nearest[i, j, k]
-                own = np.int64(owners[sample])
-                face, square, feature, fx, fy, fz = -1, np.inf, 0, x, y, z
-                for candidate in range(4):
-                    other = own
-                    if candidate == 0:
-                        other = np.int64(plane[j - 1, k]) if j > 0 else np.int64(-1)
-                    elif candidate == 1:
-                        other = before
-                    elif candidate == 3:
-                        other = np.int64(plane[j, k])
-                    if other >= 0 and other != face:
-                        s, which, u, v, w = foot_on_triangle(rows, other, x, y, z)
-                        if s < square:
-                            face, square, feature, fx, fy, fz = other, s, which, u, v, w
-                if feature != 0:
-                    face, square, feature, fx, fy, fz = walk_to_nearest(
-                        rows,
-                        places,
-                        faces,
-                        across,
-                        starts,
-                        around,
-                        spokes,
-                        vertex_regular,
-                        x,
-                        y,
-                        z,
-                        face,
-                        square,
-                        feature,
-                        fx,
-                        fy,
-                        fz,
+                if nearest[i, j, k] < 0:
+                    confidence[i, j, k] = trusted[-1 - np.int64(nearest[i, j, k])]
+
+
+@compiled(nogil=True, error_model="numpy")
+def _signs(
+    rows: NDArray[np.float64],
+    normals: Normals,
+    told: NDArray[np.bool_],
+    steps: NDArray[np.float64],
+    first: int,
+    near: float,
+    inside: NDArray[np.bool_],
+    nearest: NDArray[np.int32],
+    values: NDArray[np.float64],
+) -> None:
+    """Negative values where faces nearer than `near` tell so, else `inside`; where `told`, if it holds anything."""
+    planes, n1, n2 = nearest.shape
+    points, found = np.empty((n2, 3)), np.empty(n2, dtype=np.int32)
+    codes, places, nodes = np.empty(n2, dtype=np.int8), np.empty((n2, 3)), np.empty(n2, dtype=np.int64)
+    cosines, regular, behind = (
+        np.empty(n2, dtype=np.float32),
+        np.empty(n2, dtype=np.bool_),
+        np.empty(n2, dtype=np.bool_),
+    )
+    for i in range(planes):
+        for j in range(n1):
+            count = 0
+            for k in range(n2):
+                behind[k] = inside[i, j, k]
+                if nearest[i, j, k] >= 0 and values[i, j, k] < near and (len(told) == 0 or told[i, j, k]):
+                    points[count, 0], points[count, 1] = (first + i) * steps[0], j * steps[1]
+                    points[count, 2] = k * steps[2]
+                    found[count], nodes[count] = nearest[i, j, k], k
+                    count += 1
+            if count > 0:
+                for q in range(count):
+                    _, codes[q], places[q, 0], places[q, 1], places[q, 2] = foot_on_triangle(
+                        rows, found[q], points[q, 0], points[q, 1], points[q, 2]
                     )
-                before = face
-                plane[j, k] = face
-                distance, told = np.sqrt(square), square < near and (len(telling) == 0 or telling[sample])
-                if own < 0:
-                    c = -1 - own
-                    away[1], away[2], away[3] = x - crossings[c, 1], y - crossings[c, 2], z - crossings[c, 3]
-                    other_distance = circle_distance(crossings[c], away, side, reach)
-                    if other_distance < distance:
-                        distance, told = other_distance, False
-                        confidence[i, j, k] = trusted[c]
-                behind = inside[i, j, k]
-                if told:
-                    cosine, regular = facing(
-                        faces,
-                        edges,
-                        face_normals,
-                        edge_normals,
-                        vertex_normals,
-                        edge_regular,
-                        vertex_regular,
-                        face,
-                        feature,
-                        x - fx,
-                        y - fy,
-                        z - fz,
-                        square,
-                    )
-                    if regular:
-                        behind = cosine < 0.0
-                values[i, j, k] = -distance if behind else distance
+                facing(normals, points[:count], found, codes, places, cosines, regular)
+                for q in range(count):
+                    if regular[q]:
+                        behind[nodes[q]] = cosines[q] < 0.0
+            for k in range(n2):
+                if behind[k]:
+                    values[i, j, k] = -values[i, j, k]
 
 
 @compiled(nogil=True)
