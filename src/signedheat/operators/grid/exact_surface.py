@@ -10,10 +10,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from ...frozen import Frozen
 from ...geometry.box_tree import morton_codes
 from ...geometry.face_features import FaceFeatures
 from ...geometry.face_tree import FaceTree
+from ...geometry.nearest_faces import NearestFaces, search_from
 from ...parallel import in_chunks
 from .closest_points import distances_to_crossings
 from .sampled_surface import NEAR
@@ -24,6 +26,8 @@ ROUNDS = 10
 """Times a point is moved at most."""
 CLEARANCE = 1e-3
 """Fraction of a cell that points of a level keep from the nodes."""
+APART = 4.0
+"""Cells between corners of the faces nearest to the nodes of an edge from which on more than these are asked."""
 _BENDING = ((0, 0, 10), (1, 0, 12), (1, 1, 13), (2, 0, 15), (2, 1, 16), (2, 2, 17))
 """Row, column and place among the numbers of a crossing of its shape operator in space."""
 
@@ -75,6 +79,8 @@ class ExactSurface(Frozen):
         First node of the grid, and distance between its nodes.
     telling : (m,) bool, optional
         Faces that tell a side; those of open sheets do not.
+    nodes : (*shape) int, optional
+        What is nearest to each node of the grid: a face, or −1 minus a crossing.
     """
 
     features: FaceFeatures
@@ -82,6 +88,7 @@ class ExactSurface(Frozen):
     origin: NDArray[np.float64]
     steps: NDArray[np.float64]
     telling: NDArray[np.bool_] | None = None
+    nodes: NDArray[np.int32] | None = None
 
     @cached_property
     def tree(self) -> FaceTree:
@@ -91,15 +98,6 @@ class ExactSurface(Frozen):
     @cached_property
     def _crossing_tree(self) -> scipy.spatial.cKDTree:
         return scipy.spatial.cKDTree(self.crossings[:, 1:4])
-
-    def distances(self, points: NDArray[np.float64], guess: float) -> NDArray[np.float64]:
-        """(n,) signed distances of (n, 3) points around `origin`.
-
-        Where no face tells the side they have the sign of `guess`, and are NaN where that is 0.
-        """
-        places = self.nearest(points)
-        signs = np.where(places.sides == 0, np.sign(guess), places.sides)
-        return np.where(signs == 0, np.nan, np.where(signs < 0, -places.distances, places.distances))
 
     def nearest(self, points: NDArray[np.float64]) -> SurfacePlaces:
         """The nearest place of each of (n, 3) points around `origin`, in time O(n log m), on all threads."""
@@ -111,38 +109,91 @@ class ExactSurface(Frozen):
             return np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty(0), np.empty(0, dtype=bool)
         order = np.argsort(morton_codes(points), kind="stable")  # neighbours have nearly the same way through the tree
         sorted_points = points[order]
-        n = len(points)
-        distances, feet, directions = np.full(n, np.inf), sorted_points.copy(), np.zeros((n, 3))
-        sides, completed = np.zeros(n), np.zeros(n, dtype=bool)
+        found = self.tree.search(sorted_points) if len(self.features.corners) else None
+        limits = np.full(len(points), np.inf) if found is None else found.distances + float(np.linalg.norm(self.steps))
+        near, which = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        if len(self.crossings):
+            near, which = self._nearest_crossings(sorted_points, limits)
+        back = np.empty(len(points), dtype=np.int64)
+        back[order] = np.arange(len(points))
+        return tuple(part[back] for part in self._nearer(sorted_points, found, near, which))
+
+    def _nearest_to_nodes(self, points: NDArray[np.float64], labels: NDArray[np.int32]) -> tuple[NDArray[Any], ...]:
+        """The same of what is nearest to some nodes around each point, (n, k) as `nodes` names it."""
+        found = None
         if len(self.features.corners):
-            found = self.tree.search(sorted_points)
+            found = search_from(self.features, points, np.where(labels < 0, -1, labels))
+        near, which = np.flatnonzero((labels < 0).any(axis=1)), np.zeros(0, dtype=np.int64)
+        if len(near):
+            crossings = np.maximum(-1 - labels[near].astype(np.int64), 0)
+            squares = ((self.crossings[crossings, 1:4] - points[near, None]) ** 2).sum(axis=2)
+            chosen = np.where(labels[near] < 0, squares, np.inf).argmin(axis=1)
+            which = crossings[np.arange(len(near)), chosen]
+        return self._nearer(points, found, near, which)
+
+    def _labels_around(
+        self, base: NDArray[np.int64], axis: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+        """(n, 10) what is nearest to the nodes around edges, and whether that is not all on one part of the surface."""
+        if self.nodes is None:
+            return np.zeros((len(base), 0), dtype=np.int32), np.ones(len(base), dtype=bool)
+        along = np.eye(3, dtype=np.int64)[axis]
+        across = np.roll(along, 1, axis=1), np.roll(along, 2, axis=1)
+        beside = np.stack([0 * along, across[0], -across[0], across[1], -across[1]], axis=1)
+        places = base[:, None] + np.concatenate([beside, beside + along[:, None]], axis=1)
+        places = np.clip(places, 0, np.array(self.nodes.shape) - 1)  # at the walls some of them twice
+        labels = self.nodes[tuple(np.moveaxis(places, 2, 0))]
+        return labels, _apart(self.features.rows, labels, (APART * float(self.steps.max())) ** 2)
+
+    def _level_at(
+        self, points: NDArray[np.float64], labels: NDArray[np.int32], doubtful: NDArray[np.bool_], guess: float
+    ) -> NDArray[np.float64]:
+        """(n,) signed distances of points between nodes; the side is that of `guess` where none is told, NaN if 0."""
+        result = np.empty(len(points))
+        for rows, found in (
+            (doubtful, self._nearest_of_chunk(points[doubtful])),
+            (~doubtful, self._nearest_to_nodes(points[~doubtful], labels[~doubtful])),
+        ):
+            distances, sides = found[0], found[3]
+            signs = np.where(sides == 0, np.sign(guess), sides)
+            result[rows] = np.where(signs == 0, np.nan, np.where(signs < 0, -distances, distances))
+        return result
+
+    def _nearer(
+        self,
+        points: NDArray[np.float64],
+        found: NearestFaces | None,
+        near: NDArray[np.int64],
+        which: NDArray[np.int64],
+    ) -> tuple[NDArray[Any], ...]:
+        """Of the face found for each point, and of the crossings `which` for those at `near`, what is nearer."""
+        n = len(points)
+        distances, feet, directions = np.full(n, np.inf), points.copy(), np.zeros((n, 3))
+        sides, completed = np.zeros(n), np.zeros(n, dtype=bool)
+        if found is not None:
             distances, feet = found.distances, found.feet
             directions = self.features.face_normals[found.faces]
             told = found.regular if self.telling is None else found.regular & self.telling[found.faces]
             told &= distances <= NEAR * float(self.steps.max())
             sides = np.where(told, np.where(found.cosines < 0, -1.0, 1.0), 0.0)
-        if len(self.crossings):
+        if len(near):
             reach = float(np.linalg.norm(self.steps))
-            near, which = self._nearest_crossings(sorted_points, distances + reach)
-            points, rows = sorted_points[near], self.crossings[which]
+            there, rows = points[near], self.crossings[which]
             other = np.empty(len(near))
-            distances_to_crossings(points, which.astype(np.int32), self.crossings, reach, other)
-            touched = points - other[:, None] * away_from_circles(points, rows)
+            distances_to_crossings(there, which.astype(np.int32), self.crossings, reach, other)
+            touched = there - other[:, None] * away_from_circles(there, rows)
             strayed = np.linalg.norm(touched - rows[:, 1:4], axis=1) > 0.5 * reach  # off the end of the zero set
             touched[strayed] = rows[strayed, 1:4]
-            other = np.where(strayed, np.linalg.norm(points - rows[:, 1:4], axis=1), other)
+            other = np.where(strayed, np.linalg.norm(there - rows[:, 1:4], axis=1), other)
             nearer = other < distances[near]
             taken = near[nearer]
             completed[taken], sides[taken] = True, 0.0
             distances[taken], feet[taken], directions[taken] = other[nearer], touched[nearer], rows[nearer, 5:8]
-        apart = sorted_points - feet
+        apart = points - feet
         lengths = np.linalg.norm(apart, axis=1)
-        clear = lengths > 1e-12 * np.abs(sorted_points).max(initial=1e-290)
+        clear = lengths > 1e-12 * np.abs(points).max(initial=1e-290)
         directions = np.where(clear[:, None], apart / np.where(clear, lengths, 1.0)[:, None], directions)
-        distances = np.where(clear, distances, 0.0)
-        back = np.empty(n, dtype=np.int64)
-        back[order] = np.arange(n)
-        return distances[back], feet[back], directions[back], sides[back], completed[back]
+        return np.where(clear, distances, 0.0), feet, directions, sides, completed
 
     def _nearest_crossings(
         self, points: NDArray[np.float64], limits: NDArray[np.float64]
@@ -168,7 +219,7 @@ class ExactSurface(Frozen):
 
         By regula falsi, halving the weight of an end that stays twice (Dowell & Jarratt 1971). The ends of an edge keep
         the sides that their values have, so that every point stays on its edge. Points inside cells stay, and so do
-        those whose side nothing tells.
+        those whose side nothing tells. Where `nodes` is known, what is nearest to those around an edge is asked alone.
 
         Parameters
         ----------
@@ -179,6 +230,10 @@ class ExactSurface(Frozen):
         level : float
             Which.
         """
+        (moved,) = in_chunks(lambda chunk: (self._on_level(chunk, values, level),), points)
+        return moved
+
+    def _on_level(self, points: NDArray[np.float64], values: NodeValues, level: float) -> NDArray[np.float64]:
         cells = (points - self.origin) / self.steps
         near = np.rint(cells)
         cells = np.where(np.abs(cells - near) < 0.5 * CLEARANCE, near, cells)
@@ -195,6 +250,7 @@ class ExactSurface(Frozen):
         moved = np.array(points, dtype=np.float64)
         if not len(movable):
             return moved
+        labels, doubtful = self._labels_around(base, axis)
         start, stop, last = np.zeros(len(movable)), np.ones(len(movable)), np.zeros(len(movable), dtype=np.int8)
         active = np.flatnonzero((low < 0) != (high < 0))
         step = float(self.steps.min())
@@ -207,7 +263,7 @@ class ExactSurface(Frozen):
             at[np.arange(len(active)), axis[active]] += share
             at *= self.steps
             moved[movable[active]] = self.origin + at
-            off = self.distances(at, level) - level
+            off = self._level_at(at, labels[active], doubtful[active], level) - level
             same = (off < 0) == (low[active] < 0)
             ahead, behind = active[same], active[~same]
             start[ahead], low[ahead] = share[same], off[same]
@@ -217,6 +273,22 @@ class ExactSurface(Frozen):
             last[ahead], last[behind] = 1, -1
             active = active[np.abs(off) > CLOSE * step]  # not where it is NaN
         return moved
+
+
+@compiled(nogil=True)
+def _apart(rows: NDArray[np.float64], labels: NDArray[np.int32], limit: float) -> NDArray[np.bool_]:
+    """(n,) whether some of (n, k) labels are faces and others are not, or faces are farther apart than a limit."""
+    result = np.zeros(len(labels), dtype=np.bool_)
+    for p in range(len(labels)):
+        first = np.int64(labels[p, 0])
+        for c in range(1, labels.shape[1]):
+            other = np.int64(labels[p, c])
+            if (first < 0) != (other < 0):
+                result[p] = True
+            elif first >= 0 and other != first:
+                square = (rows[other, 0] - rows[first, 0]) ** 2 + (rows[other, 1] - rows[first, 1]) ** 2
+                result[p] |= square + (rows[other, 2] - rows[first, 2]) ** 2 > limit
+    return result
 
 
 def away_from_circles(points: NDArray[np.float64], crossings: NDArray[np.float64]) -> NDArray[np.float64]:
