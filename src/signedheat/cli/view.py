@@ -19,6 +19,7 @@ from ..fields.vertex_field import VertexField
 from ..io import load_field, read
 from ..io.files import ensure_writable, extension
 from ..io.labels import LabelImage
+from ..io.surface_fields import VALUE_FORMATS
 from ..io.tets import TET_FIELD_FORMATS
 from ..visualization import (
     PAGE_FORMATS,
@@ -83,6 +84,9 @@ def shape_or_field(path: str) -> Any:
             return thing_of(found)
     if found is not None:
         return found
+    if extension(path) in VALUE_FORMATS:
+        with suppress(FileFormatError):  # a shape without values
+            return load_field(path)
     thing = read(path)
     if isinstance(thing, TetMesh) and extension(path) in TET_FIELD_FORMATS:
         with suppress(FileFormatError):

@@ -121,8 +121,8 @@ def load_field(path: PathLike) -> Field | BandField:
     ----------
     path : str or path
         A ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` (with its ``.json``) or ``.vdb`` file; images of other programs can be
-        read if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets, a ``.npz`` file with
-        vertices a field on a surface, one with blocks a field in a band.
+        read if their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets; ``.ply``, ``.vtp``,
+        or ``.npz`` with vertices, one on a surface; ``.npz`` with blocks one in a band.
 
     Returns
     -------

@@ -48,10 +48,7 @@ class _Element:
 
 def read_ply(path: PathLike) -> SurfaceShape:
     """The faces of a PLY file, including triangle strips; or its points, with ``nx ny nz`` and ``area`` if present."""
-    data = contents(path)
-    form, elements, body = _header(data, path)
-    read_element = _text_reader(body, path) if form == "ascii" else _BinaryReader(body, form, path).read
-    tables = {element.name: read_element(element) for element in elements}
+    tables = _tables(path)
     vertex = {name: column for name, column in tables.get("vertex", {}).items() if not isinstance(column, tuple)}
     if not {"x", "y", "z"} <= vertex.keys():
         raise FileFormatError(
@@ -73,6 +70,12 @@ def read_ply(path: PathLike) -> SurfaceShape:
     return PointCloud(vertices, normals, vertex.get("area"))
 
 
+def read_ply_values(path: PathLike, name: str) -> NDArray[np.float64] | None:
+    """A property of the vertices, or None where there is none of that name."""
+    column = _tables(path).get("vertex", {}).get(name)
+    return None if column is None or isinstance(column, tuple) else np.asarray(column, dtype=np.float64)
+
+
 def write_ply(shape: SurfaceShape, path: PathLike) -> bytes:
     """Binary PLY in double precision."""
     names, columns = ["x", "y", "z"], [points_of(shape)]
@@ -89,6 +92,13 @@ def write_ply(shape: SurfaceShape, path: PathLike) -> bytes:
     starts = np.cumsum(counts) - counts
     listed = np.insert(corners, starts, counts).astype("<i4")
     return ("\n".join([*header, "end_header"]) + "\n").encode() + vertices.tobytes() + listed.tobytes()
+
+
+def _tables(path: PathLike) -> dict[str, dict[str, Any]]:
+    """The columns of each element."""
+    form, elements, body = _header(contents(path), path)
+    read_element = _text_reader(body, path) if form == "ascii" else _BinaryReader(body, form, path).read
+    return {element.name: read_element(element) for element in elements}
 
 
 def _columns(table: dict[str, Any], names: Any) -> NDArray[np.float64]:

@@ -21,7 +21,8 @@ from ..fields.vertex_field import VertexField
 from .arrays import names_in_npz, read_npz
 from .elements import SurfaceShape, faces_of, points_of
 from .files import PathLike, extension, reading, replacing, unknown_extension
-from .vtk_xml import _Writer
+from .ply import read_ply, read_ply_values
+from .vtk_xml import _Writer, read_vtp, read_vtp_values
 
 NAME = "signed_distance"
 
@@ -47,7 +48,9 @@ def on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
 
 
 def load_vertex_field(path: PathLike) -> VertexField:
-    """Read what `save_vertex_field` wrote to an ``.npz`` file."""
+    """Read what `save_vertex_field` wrote, except as ``.obj``."""
+    if extension(path) in _READERS:
+        return _shape_with_values(path)
     arrays = read_npz(path, ("vertices", "values", "faces", "offsets", "normals"))
     with reading(path):
         vertices, values = arrays["vertices"], arrays["values"]
@@ -66,8 +69,20 @@ def load_vertex_field(path: PathLike) -> VertexField:
     return VertexField(domain, values)
 
 
+def _shape_with_values(path: PathLike) -> VertexField:
+    """A mesh or points, with φ at the vertices."""
+    read_shape, read_values = _READERS[extension(path)]
+    with reading(path):
+        values = read_values(path, NAME)
+        if values is None:
+            raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, and no field", path=path)
+        return VertexField(read_shape(path), values)
+
+
 def is_vertex_field(path: PathLike) -> bool:
-    """Whether `load_vertex_field` can read a file."""
+    """Whether `load_vertex_field` is to read a file."""
+    if extension(path) in _READERS:
+        return True
     return extension(path) == ".npz" and {"values", "vertices"} <= names_in_npz(path)
 
 
@@ -145,4 +160,5 @@ WRITERS: dict[str, Callable[[VertexField[SurfaceShape]], bytes]] = {
     ".ply": write_ply,
     ".vtp": write_vtp,
 }
+_READERS = {".ply": (read_ply, read_ply_values), ".vtp": (read_vtp, read_vtp_values)}
 VERTEX_FIELD_FORMATS = frozenset(WRITERS)

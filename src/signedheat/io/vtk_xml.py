@@ -197,6 +197,19 @@ def read_vtp(path: PathLike) -> SurfaceShape:
     return PointCloud(positions, directions, np.concatenate(areas) if areas else None)
 
 
+def read_vtp_values(path: PathLike, name: str) -> NDArray[np.float64] | None:
+    """An array of the points of all pieces, or None where one lacks it."""
+    root, arrays = parse(path, "PolyData")
+    found = []
+    for piece in root.iterfind("PolyData/Piece"):
+        data = piece.iterfind("PointData/DataArray")
+        element = next((element for element in data if element.get("Name") == name), None)
+        if element is None:
+            return None
+        found.append(arrays.of(element, arrays.count(piece, "NumberOfPoints")))
+    return np.concatenate(found).astype(np.float64) if found else None
+
+
 def _words(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
 

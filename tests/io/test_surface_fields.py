@@ -1,0 +1,50 @@
+"""Fields on surfaces come back from files as they were written."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from signedheat import samples
+from signedheat.cli import main
+
+SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 0]]
+DOMAINS = {
+    "triangles": samples.sphere(1),
+    "polygons": sh.PolygonMesh(SQUARE, [[0, 1, 2, 3], [1, 4, 2]]),
+    "points": sh.PointCloud(SQUARE),
+}
+
+
+@pytest.mark.parametrize("ending", ["npz", "ply", "vtp"])
+@pytest.mark.parametrize("name", DOMAINS)
+def test_values_and_vertices_come_back(tmp_path, name, ending):
+    domain = DOMAINS[name]
+    n = len(domain.points if name == "points" else domain.vertices)
+    field = sh.VertexField(domain, np.random.default_rng(0).normal(size=n))
+    field.save(tmp_path / f"phi.{ending}")
+    back = sh.load_field(tmp_path / f"phi.{ending}")
+    assert type(back.domain) is type(domain) and np.array_equal(back.values, field.values)
+
+
+@pytest.mark.parametrize("ending", ["ply", "vtp"])
+def test_shapes_without_values_are_no_fields_but_are_looked_at(tmp_path, ending):
+    path = tmp_path / f"ball.{ending}"
+    samples.sphere(1).save(path)
+    with refused(sh.FileFormatError):
+        sh.load_field(path)
+    assert main(["view", str(path), "-o", str(tmp_path / "ball.html")]) == 0
+
+
+def test_pages_of_fields_on_surfaces_have_a_level(tmp_path):
+    ball = samples.sphere(2)
+    sh.VertexField(ball, ball.vertices[:, 2]).save(tmp_path / "phi.vtp")
+    assert main(["view", str(tmp_path / "phi.vtp"), "-o", str(tmp_path / "phi.html")]) == 0
+    ball.save(tmp_path / "ball.vtp")
+    assert main(["view", str(tmp_path / "ball.vtp"), "-o", str(tmp_path / "ball.html")]) == 0
+    assert "VertexField" in (tmp_path / "phi.html").read_text(encoding="utf-8")
+    assert "VertexField" not in (tmp_path / "ball.html").read_text(encoding="utf-8")
+    assert main(["contour", str(tmp_path / "phi.vtp"), "0.5", "-o", str(tmp_path / "line.json")]) == 0
+    (line,) = sh.read_curves(tmp_path / "line.json", ball)
+    at = np.einsum("nk,nkd->nd", line.barycentric, ball.vertices[ball.faces[line.faces]])
+    assert at[:, 2] == pytest.approx(0.5)
