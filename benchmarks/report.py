@@ -41,14 +41,14 @@ COMPARISONS = {
         ("grid.py", "64", "128", "256"),
         """Seconds per step of the method alone on a closed sphere of 20,000 faces, beside one cosine transform of that
         size (dctn), the least that any solver of Poisson's equation on grids takes; memory; error before and after
-        sharpening. Times are the least of six runs.""",
+        sharpening. Wall-clock times, the least of six runs.""",
     ),
     "spheres": Comparison(
         "Solids in space: spheres",
         ("grid.py", "--peers"),
         """Spheres, whole and damaged, at 128³: `sh.solid_distance` and its offset; unsigned distance × sign of fast
         winding numbers by libigl, each tree built once; offsets by MeshLib. Both do less, and are as exact or more
-        where the whole surface is there or little of it is missing. Times are the least of three runs; in brackets,
+        where the whole surface is there or little of it is missing. CPU seconds, the least of three runs; in brackets,
         how much longer the slowest took.""",
     ),
     "solids-turned": Comparison(
@@ -73,7 +73,7 @@ COMPARISONS = {
         "Triangle meshes",
         ("surface.py", "--levels", "6", "--repeats", "3"),
         """First, next and batched distances beside potpourri3d, which is the authors' own C++, and beside the two
-        sparse solves that the method cannot do without (bare). Times are the least of three rounds, in which the
+        sparse solves that the method cannot do without (bare). CPU seconds, the least of three rounds, in which the
         programs take turns.""",
     ),
     "broken-curves": Comparison(
@@ -85,7 +85,8 @@ COMPARISONS = {
     "polygons": Comparison(
         "Polygons, points, voxels",
         ("domains.py", "polygons", "points", "voxels", "--sizes", "4000", "16000", "--repeats", "2"),
-        """Every other surface beside potpourri3d or, for voxels, beside the same without smoothing ("peer").""",
+        """Every other surface beside potpourri3d or, for voxels, beside the same without smoothing ("peer"). CPU
+        seconds, the least of two runs.""",
     ),
     "volumes": Comparison(
         "Grids with walls, and tets",
@@ -113,9 +114,10 @@ take turns where there are repeats. A peer is called as its documentation says; 
 run that was disturbed.
 
 **How far to trust the times.** Errors are the same in every run. Times are not: the machine is shared. Its load, the
-mean number of processes that wanted to run in the last minute, is given with each comparison; up to the number of cores
-it hardly matters. Where repeats are told, their spread is too. Ratios within one comparison hold better than seconds,
-and one of less than 1.3 means little.
+mean number of processes that wanted to run in the last minute, is given with each comparison: beyond the number of
+cores wall-clock times mean little, and all but the first comparison therefore give CPU seconds of all threads, which
+grow by a fifth or so under load. Where repeats are told, their spread is too. Ratios within one comparison hold better
+than seconds, and one of less than 1.3 means little. Libraries are loaded and kernels compiled before any clock starts.
 
 **Peers.** libigl, MeshLib and potpourri3d (`pip install libigl meshlib potpourri3d`). signedheat3d, the authors'
 program for volumes, has no wheel, and its source distribution downloads other libraries while it is built, which was

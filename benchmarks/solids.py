@@ -9,8 +9,9 @@ libigl's exact distance to the whole shape. Two jobs, by the calls of `peers/cal
 * the surface 0.1 outside, at 96 nodes along the longest side. Error: root mean square of what the exact distance of its
   vertices misses 0.1 by, in per cent of the diagonal. "not closed": how many of the four are not watertight or refused.
 
-Errors are the median and the worst of the four shapes. Seconds are those of each job for all four: the least of the
-repeats, in which the programs take turns, and how far above it the slowest was. We compute a grid for either job.
+Errors are the median and the worst of the four shapes. Seconds are CPU seconds of all threads, for each job and all
+four shapes: the least of the repeats, in which the programs take turns, and how far above it the slowest was. We
+compute a grid for either job.
 """
 
 from __future__ import annotations
@@ -104,9 +105,9 @@ def surface_outside(program: str, broken: Mesh) -> tuple[np.ndarray, np.ndarray]
 
 
 def timed(job: Callable[[], Any]) -> tuple[Any, float]:
-    begin = time.perf_counter()
+    begin = time.process_time()
     result = job()
-    return result, time.perf_counter() - begin
+    return result, time.process_time() - begin
 
 
 def measured(program: str, damage: str) -> dict[str, list[float]]:

@@ -3,8 +3,8 @@
     python benchmarks/surface.py [--levels 5 6 7 8] [--peer-up-to 7]
 
 Each program runs in a process of its own, one after the other, on the same mesh and curves: a bumpy sphere and level
-sets that cross its faces, nothing imposed but where said. Times in seconds, memory in megabytes above what imports
-and input take.
+sets that cross its faces, nothing imposed but where said. CPU seconds of all threads; memory in megabytes above what
+imports and input take.
 """
 
 from __future__ import annotations
@@ -195,10 +195,10 @@ class Clock:
     """Seconds since the last lap."""
 
     def __init__(self) -> None:
-        self.begin = time.perf_counter()
+        self.begin = time.process_time()
 
     def lap(self) -> float:
-        begin, self.begin = self.begin, time.perf_counter()
+        begin, self.begin = self.begin, time.process_time()
         return self.begin - begin
 
 
