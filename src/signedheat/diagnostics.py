@@ -68,13 +68,13 @@ class ShapeOriented(Note):
 
     def __str__(self) -> str:
         told = [
-            (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.3g} of the area"),
+            (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.1%} of the area"),
             (self.merged_faces, f"duplicate faces merged: {self.merged_faces}"),
             (self.nonorientable_parts, f"parts that cannot be oriented: {self.nonorientable_parts}"),
             (self.doubled_walls, f"doubled walls: {self.doubled_walls}"),
             (self.nested_bodies, f"bodies hidden in others: {self.nested_bodies}"),
             (self.cavities, f"cavities: {self.cavities}"),
-            (self.undecided_area, f"sheets without an inside: {self.undecided_area:.3g} of the area"),
+            (self.undecided_area, f"sheets without an inside: {self.undecided_area:.1%} of the area"),
         ]
         return "; ".join(text for value, text in told if value) or "faces are oriented as they were given"
 

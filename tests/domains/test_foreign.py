@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 
 BALL = samples.sphere(2)
@@ -159,3 +160,11 @@ def test_wrong_arrays_are_told():
 def test_meshes_of_meshio_without_faces_are_points():
     points = meshio.Mesh(BALL.vertices, [("vertex", np.arange(BALL.n_vertices)[:, None])])
     assert sh.as_shape(points).n_points == BALL.n_vertices
+
+
+@pytest.mark.parametrize(("thing", "named"), [("part.stl", "sh.read"), (np.zeros((4, 3)), "PointCloud")])
+def test_paths_and_bare_points_are_told_what_to_pass(thing, named):
+    for take in (sh.solid_distance, sh.as_shape):
+        with refused(sh.SignedHeatError) as caught:
+            take(thing)
+        assert named in caught.value.remedy

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from os import PathLike, fspath
 from typing import Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -80,6 +81,21 @@ TAKEN = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (v
 """What is taken for a shape, for messages."""
 
 
+def what_to_pass(thing: object) -> str:
+    """The remedy where something is no shape: files are read first, and bare points are a cloud.
+
+    Examples
+    --------
+    >>> what_to_pass("part.stl")
+    'pass sh.read("part.stl")'
+    """
+    if isinstance(thing, str | PathLike):
+        return f'pass sh.read("{fspath(thing)!s}")'
+    if isinstance(thing, np.ndarray) and thing.ndim == 2:
+        return f"for points alone pass sh.PointCloud(points), otherwise {TAKEN}"
+    return f"pass {TAKEN}"
+
+
 def package_of(thing: object) -> str | None:
     """The package that made an object, among those whose objects are taken; classes derived from theirs count.
 
@@ -143,7 +159,7 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
     """
     shape = converted(thing)
     if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh):
-        raise UnsupportedTypeError(f"a {type(thing).__name__} is no shape", remedy=f"pass {TAKEN}")
+        raise UnsupportedTypeError(f"a {type(thing).__name__} is no shape", remedy=what_to_pass(thing))
     return shape
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..domains.foreign import TAKEN
+from ..domains.foreign import what_to_pass
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -102,7 +102,7 @@ def area_elements(shape: Any) -> AreaElements:
     raise SourceError(
         f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
         f"Polyline, not to a {type(shape).__name__}",
-        remedy=f"pass {TAKEN}",
+        remedy=what_to_pass(shape),
         element="source",
     )
 
