@@ -65,19 +65,23 @@ def voronoi_fans(
                 here = corner[c, 0] * px + corner[c, 1] * py - half
                 there = corner[d, 0] * px + corner[d, 1] * py - half
                 if here <= slack:
-                    new_corner[new], new_beyond[new] = corner[c], beyond[c]
+                    new_corner[new, 0], new_corner[new, 1] = corner[c, 0], corner[c, 1]
+                    new_beyond[new] = beyond[c]
                     new += 1
                 if (here <= slack) != (there <= slack):
                     s = min(max(here / (here - there), 0.0), 1.0)
-                    new_corner[new] = corner[c] + s * (corner[d] - corner[c])
+                    for axis in range(2):
+                        new_corner[new, axis] = corner[c, axis] + s * (corner[d, axis] - corner[c, axis])
                     new_beyond[new] = j if here <= slack else beyond[c]
                     new += 1
             m, farthest = new, 0.0
             for c in range(m):
-                corner[c], beyond[c] = new_corner[c], new_beyond[c]
+                corner[c, 0], corner[c, 1] = new_corner[c, 0], new_corner[c, 1]
+                beyond[c] = new_beyond[c]
                 farthest = max(farthest, corner[c, 0] ** 2 + corner[c, 1] ** 2)
         counts[i] = m
-        neighbours[i, :m] = beyond[:m]
+        for c in range(m):
+            neighbours[i, c] = beyond[c]
     return neighbours, counts
 
 

@@ -387,12 +387,15 @@ def _measure(polygon, n, normal, area_vector, center):
 @compiled
 def _longer(array, size):
     longer = np.empty(size, dtype=array.dtype)
-    longer[: len(array)] = array
+    for i in range(len(array)):
+        longer[i] = array[i]
     return longer
 
 
 @compiled
 def _taller(array, size):
     taller = np.empty((size, array.shape[1]), dtype=array.dtype)
-    taller[: len(array)] = array
+    for i in range(len(array)):
+        for axis in range(array.shape[1]):
+            taller[i, axis] = array[i, axis]
     return taller

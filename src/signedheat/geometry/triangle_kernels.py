@@ -26,7 +26,7 @@ def find_edges(faces, degrees):
                 edge = following[edge]
             if edge < 0:
                 edge = count
-                vertices[edge] = tail, head
+                vertices[edge, 0], vertices[edge, 1] = tail, head
                 following[edge] = first[keeper]
                 first[keeper] = edge
                 count += 1
@@ -72,17 +72,17 @@ def _merge(starts, columns, values):
     merged = np.zeros(n + 1, dtype=np.int32)
     for i in range(n):
         begin, end = starts[i], starts[i + 1]
-        if end - begin > 64:
-            order = np.argsort(columns[begin:end], kind="mergesort")
-            columns[begin:end] = columns[begin:end][order]
-            values[begin:end] = values[begin:end][order]
-        else:
-            for p in range(begin + 1, end):
+        gap = 1
+        while end - begin > 64 and 9 * gap < end - begin:
+            gap = 3 * gap + 1
+        while gap > 0:  # Shell's sort, on short rows by insertion alone: Numba's own sorts take a second to compile
+            for p in range(begin + gap, end):
                 column, value, q = columns[p], values[p], p
-                while q > begin and columns[q - 1] > column:
-                    columns[q], values[q] = columns[q - 1], values[q - 1]
-                    q -= 1
+                while q >= begin + gap and columns[q - gap] > column:
+                    columns[q], values[q] = columns[q - gap], values[q - gap]
+                    q -= gap
                 columns[q], values[q] = column, value
+            gap //= 3
         last = total
         for p in range(begin, end):
             if total > last and columns[p] == columns[total - 1]:

@@ -46,7 +46,8 @@ def dissect(starts, neighbors, leaf):
                     first = reached
                 if p < end and level[order[p]] < 0:
                     reached = _levels(starts, neighbors, region, here, order[p], level, queue, first)
-            order[begin:end] = queue[: end - begin]
+            for p in range(begin, end):
+                order[p] = queue[p - begin]
             continue
         last = level[queue[reached - 1]]
         if last < 2:

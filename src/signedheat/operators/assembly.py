@@ -34,5 +34,7 @@ def assemble(
            [0.+0.j, 1.+0.j, 2.+0.j],
            [0.+0.j, 0.+0.j, 1.+0.j]])
     """
-    starts, columns, values = add_up(unknowns, diagonal, coupling, n)
+    fixed = unknowns.view()
+    fixed.flags.writeable = False  # the faces of a mesh are, and kernels are compiled for one of the two alone
+    starts, columns, values = add_up(fixed, diagonal, coupling, n)
     return sparse.csr_matrix((values, columns, starts), shape=(n, n))

@@ -61,7 +61,7 @@ def transfer(steps, weights, forward, n_faces, faces, barycentric, vectors):
                 p = later[p]
             continue
         around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
-        start[:] = 0
+        start[0] = start[1] = start[2] = 0
         if kind != SPLIT_FACE:
             around[0], start[0] = steps[n, 1] // 3, steps[n, 1] % 3
         if kind == FLIP:
@@ -156,14 +156,20 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
             if slope < 0.0 and w[k] < -slope * step:
                 step, leaving = w[k] / -slope, k
         if n < len(out_faces):
-            out_faces[n], out_starts[n], out_vectors[n] = f, w, v
+            out_faces[n] = f
+            for k in range(3):
+                out_starts[n, k] = w[k]
+                for m in range(len(v)):
+                    out_vectors[n, m, k] = v[m, k]
         for k in range(3):
             w[k] = max(w[k] + sign * step * v[0, k], 0.0)
         if leaving >= 0:
             w[leaving] = 0.0
-        w /= w.sum()
-        if n < len(out_faces):
-            out_ends[n] = w
+        total = w[0] + w[1] + w[2]
+        for k in range(3):
+            w[k] /= total
+            if n < len(out_faces):
+                out_ends[n, k] = w[k]
         n += 1
         left -= step
         if leaving < 0 or left < 1e-12:
