@@ -6,11 +6,10 @@ through a halfedge, and the next one entered through another halfedge of the sam
 
 from __future__ import annotations
 
-from heapq import heappop, heappush
-
 import numpy as np
 
 from ...compiled import compiled
+from .heap_kernels import pop, push
 
 
 @compiled
@@ -36,17 +35,14 @@ def middle(corners, h):
 
 
 @compiled
-def find_sleeve(corners, edge_of, around, starts, start_points, ends, end_points, cost, leave, enter):
+def find_sleeve(corners, edge_of, begin, sides, starts, start_points, ends, end_points, cost, leave, enter, queue):
     """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
 
     Returns the halfedges through which all faces but the last are left, and those through which all but the first are
-    entered; empty if there is no path. `cost`, `leave` and `enter` are work arrays, restored before returning.
+    entered; empty if there is no path. `cost`, `leave`, `enter` and `queue` are work space, restored before returning.
     """
-    heap = [(0.0, np.int64(0))]
-    heap.pop()
     touched = [np.int64(0)]
     touched.pop()
-    begin, sides = around
     for s in range(len(starts)):
         for k in range(3):
             h = 3 * starts[s] + k
@@ -55,15 +51,15 @@ def find_sleeve(corners, edge_of, around, starts, start_points, ends, end_points
             if d < cost[e]:
                 cost[e], leave[e], enter[e] = d, h, -1
                 touched.append(e)
-                heappush(heap, (d, e))
+                push(queue, e, d)
     best, last = np.inf, np.int64(-1)
-    while len(heap) > 0:
-        d, e = heappop(heap)
+    while queue.size[0] > 0:
+        e = pop(queue)
+        d = cost[e]
         if d >= best:
             break
-        if d > cost[e]:
-            continue
-        for h in sides[begin[e] : begin[e + 1]]:
+        for k in range(begin[e], begin[e + 1]):
+            h = sides[k]
             if h == leave[e]:
                 continue
             here = middle(corners, h)
@@ -77,17 +73,19 @@ def find_sleeve(corners, edge_of, around, starts, start_points, ends, end_points
                 if there < cost[to]:
                     cost[to], leave[to], enter[to] = there, out, h
                     touched.append(to)
-                    heappush(heap, (there, to))
-    left, entered = [np.int64(0)], [np.int64(0)]
-    left.pop()
-    entered.pop()
-    while last >= 0:
-        entered.append(last)
-        left.append(leave[edge_of[last]])
+                    push(queue, to, there)
+    n, h = 0, last
+    while h >= 0:
+        n, h = n + 1, enter[edge_of[h]]
+    left, entered = np.empty(n, np.int64), np.empty(n, np.int64)
+    while n > 0:
+        n -= 1
+        entered[n], left[n] = last, leave[edge_of[last]]
         last = enter[edge_of[last]]
     for e in touched:
-        cost[e] = np.inf
-    return left[::-1], entered[::-1]
+        cost[e], queue.places[e] = np.inf, -1
+    queue.size[0] = 0
+    return left, entered
 
 
 @compiled
@@ -126,10 +124,10 @@ def turns(a, b):
 def funnel(tails, heads, over, start, end):
     """Shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
 
-    Returns the portals at which the path bends, whether it bends at their left end, and its length.
+    Returns the portals at which the path bends, whether it bends at their left end (1) or right (0), and its length.
     """
     n = len(tails)
-    bends, to_left = [np.int64(0)], [False]
+    bends, to_left = [np.int64(0)], [np.int64(0)]
     bends.pop()
     to_left.pop()
     apex = left = right = start
@@ -149,7 +147,7 @@ def funnel(tails, heads, over, start, end):
                     right, at_right = r, i
             else:
                 bends.append(at_left)
-                to_left.append(True)
+                to_left.append(1)
                 total += abs(left - apex)
                 apex = right = left
                 i = at_right = at_left
@@ -161,7 +159,7 @@ def funnel(tails, heads, over, start, end):
                     left, at_left = l, i
             else:
                 bends.append(at_right)
-                to_left.append(False)
+                to_left.append(0)
                 total += abs(right - apex)
                 apex = left = right
                 i = at_left = at_right
@@ -172,42 +170,61 @@ def funnel(tails, heads, over, start, end):
 
 
 @compiled
-def other_way(edge_of, forward, around, left, entered, tails, heads, bend, point):
+def other_way(edge_of, forward, begin, sides, left, entered, tails, heads, bend, point):
     """The sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
-    begin, sides = around
     first = last = bend
     while first > 0 and (tails[first - 1] == point or heads[first - 1] == point):
         first -= 1
     while last + 1 < len(left) and (tails[last + 1] == point or heads[last + 1] == point):
         last += 1
-    goal, h, at_tail = entered[last] // 3, left[first], tails[first] == point
+    goal, at_tail = entered[last] // 3, tails[first] == point
     # walk around the vertex in all directions, breadth first: halfedges through which faces are left, and entered
-    out, into, before = [turned(h, at_tail)], [h], [-1]
-    tail_there = [not at_tail]
+    out, into, before = [turned(left[first], at_tail)], [left[first]], [np.int64(-1)]
+    tail_there = [np.int64(not at_tail)]
     k = 0
     while k < len(out):
         h = out[k]
         e = edge_of[h]
-        for across in sides[begin[e] : begin[e + 1]]:
-            if across // 3 == h // 3 or across in into or across in left[first : last + 1]:
+        for c in range(begin[e], begin[e + 1]):
+            across = sides[c]
+            if across // 3 == h // 3 or is_among(into, across, 0, len(into)) or is_among(left, across, first, last + 1):
                 continue
             if across // 3 == goal:
-                new_left, new_entered = [h], [across]
-                while before[k] >= 0:
-                    new_entered.append(into[k])
-                    k = before[k]
-                    new_left.append(out[k])
-                return (
-                    left[:first] + new_left[::-1] + left[last + 1 :],
-                    entered[:first] + new_entered[::-1] + entered[last + 1 :],
-                )
-            at_tail = tail_there[k] == (forward[h] == forward[across])
+                return spliced(left, entered, first, last, out, into, before, k, across)
+            at_tail = (tail_there[k] == 1) == (forward[h] == forward[across])
             out.append(turned(across, at_tail))
             into.append(across)
             before.append(k)
-            tail_there.append(not at_tail)
+            tail_there.append(np.int64(not at_tail))
         k += 1
     return left[:0], entered[:0]
+
+
+@compiled
+def is_among(values, value, begin, end):
+    """Whether a value is among some of others."""
+    for k in range(begin, end):
+        if values[k] == value:
+            return True
+    return False
+
+
+@compiled
+def spliced(left, entered, first, last, out, into, before, k, across):
+    """A sleeve whose crossings `first` to `last` are exchanged for those of a walk, which ends at its entry k."""
+    n, j = 1, k
+    while before[j] >= 0:
+        n, j = n + 1, before[j]
+    size = first + n + len(left) - 1 - last
+    new_left, new_entered = np.empty(size, np.int64), np.empty(size, np.int64)
+    for i in range(first):
+        new_left[i], new_entered[i] = left[i], entered[i]
+    for i in range(last + 1, len(left)):
+        new_left[first + n + i - last - 1], new_entered[first + n + i - last - 1] = left[i], entered[i]
+    for i in range(first + n - 1, first - 1, -1):
+        new_left[i], new_entered[i] = out[k], across
+        across, k = into[k], before[k]
+    return new_left, new_entered
 
 
 @compiled
@@ -226,7 +243,7 @@ def point_in(faces, points, face):
 
 
 @compiled
-def straighten(corners, edge_of, forward, around, left, entered, starts, start_points, ends, end_points):
+def straighten(corners, edge_of, forward, begin_at, sides, left, entered, starts, start_points, ends, end_points):
     """The shortest path in a sleeve, improved as long as passing a vertex on its other side makes it shorter.
 
     Returns the halfedges crossed and the fraction along each.
@@ -238,8 +255,8 @@ def straighten(corners, edge_of, forward, around, left, entered, starts, start_p
     k = 0
     while k < len(bends):
         i = bends[k]
-        point = heads[i] if to_left[k] != over[i] else tails[i]
-        try_left, try_entered = other_way(edge_of, forward, around, left, entered, tails, heads, i, point)
+        point = heads[i] if (to_left[k] == 1) != over[i] else tails[i]
+        try_left, try_entered = other_way(edge_of, forward, begin_at, sides, left, entered, tails, heads, i, point)
         k += 1
         if len(try_left) == 0:
             continue
@@ -255,15 +272,15 @@ def straighten(corners, edge_of, forward, around, left, entered, starts, start_p
     here, k = begin, 0
     for i in range(len(left)):
         if k < len(bends) and bends[k] == i:
-            fractions[i] = 1.0 if to_left[k] != over[i] else 0.0
-            here = heads[i] if to_left[k] != over[i] else tails[i]
+            fractions[i] = 1.0 if (to_left[k] == 1) != over[i] else 0.0
+            here = heads[i] if (to_left[k] == 1) != over[i] else tails[i]
             k += 1
             continue
         if k == len(bends):
             there = end
         else:
             j = bends[k]
-            there = heads[j] if to_left[k] != over[j] else tails[j]
+            there = heads[j] if (to_left[k] == 1) != over[j] else tails[j]
         along, span = there - here, heads[i] - tails[i]
         across = turns(along, span)
         if across != 0:
@@ -288,13 +305,14 @@ def locate_end(corners, entered, placed, over, ends, end_points):
 
 
 @compiled
-def shortest_lines(corners, edge_of, forward, n_edges, starts, start_points, start_at, ends, end_points, end_at):
+def shortest_lines(corners, edge_of, forward, queue, starts, start_points, start_at, ends, end_points, end_at):
     """Shortest paths for many pairs of points: halfedges crossed, fractions along them, their number for each pair.
 
     The faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` has its position in
-    the layout of each; likewise for ends. The number is −1 where there is no path.
+    the layout of each; likewise for ends; `queue` is an empty one of edges. The number is −1 where there is no path.
     """
-    around = group(edge_of, n_edges)
+    n_edges = len(queue.places)
+    begin, around = group(edge_of, n_edges)
     cost = np.full(n_edges, np.inf)
     leave, enter = np.empty(n_edges, np.int64), np.empty(n_edges, np.int64)
     counts = np.empty(len(start_at) - 1, np.int64)
@@ -302,16 +320,30 @@ def shortest_lines(corners, edge_of, forward, n_edges, starts, start_points, sta
     sides.pop()
     fractions.pop()
     for job in range(len(counts)):
-        s = slice(start_at[job], start_at[job + 1])
-        e = slice(end_at[job], end_at[job + 1])
+        first_faces, first_points = (
+            starts[start_at[job] : start_at[job + 1]],
+            start_points[start_at[job] : start_at[job + 1]],
+        )
+        last_faces, last_points = ends[end_at[job] : end_at[job + 1]], end_points[end_at[job] : end_at[job + 1]]
         left, entered = find_sleeve(
-            corners, edge_of, around, starts[s], start_points[s], ends[e], end_points[e], cost, leave, enter
+            corners,
+            edge_of,
+            begin,
+            around,
+            first_faces,
+            first_points,
+            last_faces,
+            last_points,
+            cost,
+            leave,
+            enter,
+            queue,
         )
         if len(left) == 0:
             counts[job] = -1
             continue
         crossed, where = straighten(
-            corners, edge_of, forward, around, left, entered, starts[s], start_points[s], ends[e], end_points[e]
+            corners, edge_of, forward, begin, around, left, entered, first_faces, first_points, last_faces, last_points
         )
         counts[job] = len(crossed)
         for k in range(len(crossed)):

@@ -18,6 +18,7 @@ from ..surface_points import (
     points_at_vertices,
     shared_faces,
 )
+from .heap_kernels import Queue
 from .path_kernels import shortest_lines
 
 
@@ -98,8 +99,9 @@ def geodesic_paths(
     starts, ends = faces_at(triangles, start), faces_at(triangles, end)
     edges = triangles.edges
     sides, fractions, counts = shortest_lines(
-        triangles.corner_positions, edges.face_edges.ravel(), edges.forward.ravel(), triangles.n_edges, *starts, *ends
-    )
+        triangles.corner_positions, edges.face_edges.ravel(), edges.forward.ravel(), Queue.empty(triangles.n_edges),
+        *starts, *ends,
+    )  # fmt: skip
     weights = np.zeros((len(sides), 3))
     row = np.arange(len(sides))
     weights[row, sides % 3] = 1 - fractions
