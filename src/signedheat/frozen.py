@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+
+Number = TypeVar("Number", bound=np.generic)
 
 
 class Frozen:
@@ -36,6 +40,13 @@ class Frozen:
         self.__dict__.update(held)
         for name in read_only:
             _set_read_only(held[name])
+
+
+def read_only(array: NDArray[Number]) -> NDArray[Number]:
+    """A read-only view, as arrays of frozen objects are: for what can be written, kernels would be compiled again."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def _is_read_only(value: object) -> bool:

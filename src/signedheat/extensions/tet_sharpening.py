@@ -13,6 +13,7 @@ from ..discretization import SourceTerm, discretize
 from ..fields.tet_field import TetField
 from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.any_angle import FacePlanes, any_angle_distance
+from ..geometry.geodesics.heap_kernels import Queue
 from ..geometry.marching_tets import level_triangles
 from ..geometry.nearest import nearest_on_triangles
 from ..geometry.tet_clipping import barycentric
@@ -67,7 +68,16 @@ def _(
     tets_at, triangles_at = by_element(unknowns, len(values), 4), by_element(corners, len(positions), 3)
     distance, nearest, feet, hidden = run_cancellable(
         lambda: any_angle_distance(
-            walls, points, *tets_at, triangles, corners, *triangles_at, owners, nearest, GRAZING * lowered.spacing
+            walls,
+            points,
+            *tets_at,
+            triangles,
+            corners,
+            *triangles_at,
+            owners,
+            nearest,
+            GRAZING * lowered.spacing,
+            Queue.empty(len(points)),
         ),
         report,
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
+from ..frozen import read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +82,7 @@ def pair_halfedges(
     ([0, 2, 1, 2, 3, 4], [-1, -1, 3, -1, -1])
     """
     used = np.ones(0, dtype=bool) if used is None else used
-    return HalfedgePairs(*_pair(tails, heads, n_vertices, used))
+    return HalfedgePairs(*_pair(read_only(tails), heads, n_vertices, used))
 
 
 def orient_faces(
@@ -108,7 +109,9 @@ def orient_faces(
     >>> found.turned, found.orientable, found.disagreeing
     (array([ True, False]), array([ True]), 1)
     """
-    return FaceOrientation(*_orient(pairs.edges, pairs.counts, pairs.first, pairs.second, tails, owners, weights))
+    return FaceOrientation(
+        *_orient(pairs.edges, pairs.counts, pairs.first, pairs.second, read_only(tails), owners, weights)
+    )
 
 
 def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDArray[np.integer]) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
+from ..frozen import read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +80,10 @@ def stabbing_lines(
     pixel = max(pixel, 1e-4 * float(extents.max()), np.finfo(float).tiny)  # where the box is hardly more than a line
     shapes = np.floor(extents[:, :2] / pixel).astype(np.int64) + 1
     first_lines = np.concatenate([[0], np.cumsum(shapes.prod(axis=1))])
-    found = []
+    found, fixed = [], read_only(triangles)
     for k in range(n_directions):
         shift = 0.5 * (shapes[k] - 1) + 0.5 * np.modf((k + 1) * np.array([2**0.5, 3**0.5]))[0] - 0.25
-        found.append(_draw(vertices, triangles, frames[k], center, pixel, shift, shapes[k], int(first_lines[k])))
+        found.append(_draw(vertices, fixed, frames[k], center, pixel, shift, shapes[k], int(first_lines[k])))
     return _in_order(found, int(first_lines[-1]))
 
 

@@ -229,12 +229,14 @@ def _clip(triangles, bounds, items, center, tet_faces, normals, offsets, toleran
     polygon = np.empty((8, 3))
     other = np.empty((8, 3))
     heights = np.empty(8)
+    normal = np.empty(3)
     stack = np.empty(128, dtype=np.int64)
     leaves = len(bounds) // 2
     for p in range(len(triangles)):
         a, b, c = triangles[p, 0], triangles[p, 1], triangles[p, 2]
-        normal = np.cross(b - a, c - a)
-        whole = 0.5 * np.sqrt((normal * normal).sum())
+        u0, u1, u2, v0, v1, v2 = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        normal[0], normal[1], normal[2] = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
+        whole = 0.5 * np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
         if whole == 0.0:
             continue
         lower = np.minimum(np.minimum(a, b), c) + center
@@ -295,7 +297,8 @@ def _clip(triangles, bounds, items, center, tet_faces, normals, offsets, toleran
                 if on >= 0:
                     share = shares[tet_faces[t, on]]
                     area *= share
-                    area_vectors[count] *= share
+                    for axis in range(3):
+                        area_vectors[count, axis] *= share
                 tets[count] = t
                 parents[count] = p
                 areas[count] = area

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..frozen import read_only
 from ..geometry.triangle_kernels import add_up
 
 
@@ -34,7 +35,5 @@ def assemble(
            [0.+0.j, 1.+0.j, 2.+0.j],
            [0.+0.j, 0.+0.j, 1.+0.j]])
     """
-    fixed = unknowns.view()
-    fixed.flags.writeable = False  # the faces of a mesh are, and kernels are compiled for one of the two alone
-    starts, columns, values = add_up(fixed, diagonal, coupling, n)
+    starts, columns, values = add_up(read_only(unknowns), diagonal, coupling, n)
     return sparse.csr_matrix((values, columns, starts), shape=(n, n))

@@ -170,7 +170,8 @@ def _pattern(ids, n):
     for t in range(len(ids)):
         for a in range(4):
             starts[ids[t, a] + 1] += 1
-    starts = np.cumsum(starts)
+    for i in range(n):
+        starts[i + 1] += starts[i]
     tets_at = np.empty(starts[n], dtype=np.int32)
     filled = starts[:-1].copy()
     for t in range(len(ids)):
@@ -188,17 +189,16 @@ def _pattern(ids, n):
                     seen[j] = i
                     indptr[i + 1] += 1
     columns = np.empty(indptr[n], dtype=np.int32)
+    ends = indptr.copy()
     seen[:] = -1
-    for i in range(n):
-        end = indptr[i]
+    for i in range(n):  # the pattern is symmetric: by row, each goes to the end of its columns, which are then in order
         for k in range(starts[i], starts[i + 1]):
             for a in range(4):
                 j = ids[tets_at[k], a]
                 if seen[j] != i:
                     seen[j] = i
-                    columns[end] = j
-                    end += 1
-        columns[indptr[i] : end].sort()
+                    columns[ends[j]] = i
+                    ends[j] += 1
     return indptr, columns
 
 

@@ -9,7 +9,6 @@ anywhere on an edge, costs a length of second order.
 
 from __future__ import annotations
 
-import heapq
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 from ..nearest import place_on_triangle
+from .heap_kernels import pop, push
 
 
 class FacePlanes(NamedTuple):
@@ -90,7 +90,7 @@ def _length(point, x, y, z):
 
 @compiled(nogil=True)
 def any_angle_distance(
-    planes, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, owners, nearest, slack
+    planes, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, owners, nearest, slack, queue
 ):
     """Distance of every vertex from triangles in the mesh.
 
@@ -116,6 +116,8 @@ def any_angle_distance(
         The triangle nearest to each vertex, regardless of visibility; −1 for vertices that have no distance.
     slack : float
         Length by which a line may lie outside the mesh.
+    queue : Queue
+        An empty one of the vertices.
 
     Returns
     -------
@@ -141,8 +143,6 @@ def any_angle_distance(
                 feet[v, d] = a * t[0, d] + b * t[1, d] + g * t[2, d]
             if _seen(planes, points, first_tet, tets_at, v, feet[v], slack):
                 distance[v], known[v] = np.sqrt(square), True
-    heap = [(0.0, 0)]
-    heap.pop()
     for i in range(len(triangles)):  # a triangle in a tet is visible from the tet's corners, if not the nearest to them
         for k in range(4):
             v = planes.tets[owners[i], k]
@@ -153,7 +153,7 @@ def any_angle_distance(
                     distance[v], nearest[v] = np.sqrt(square), i
                     for d in range(3):
                         feet[v, d] = a * triangles[i, 0, d] + b * triangles[i, 1, d] + g * triangles[i, 2, d]
-                    heapq.heappush(heap, (distance[v], v))
+                    push(queue, v, distance[v])
     hidden = 0
     for v in range(n):
         if not known[v] and nearest[v] >= 0:
@@ -162,12 +162,10 @@ def any_angle_distance(
                 for k in range(4):
                     u = planes.tets[tets_at[i], k]
                     if known[u]:
-                        heapq.heappush(heap, (distance[u], u))
+                        push(queue, u, distance[u])
     done = np.zeros(n, dtype=np.bool_)
-    while len(heap) > 0:
-        key, u = heapq.heappop(heap)
-        if done[u] or key > distance[u]:
-            continue
+    while queue.size[0] > 0:
+        u = pop(queue)
         done[u] = True
         for i in range(first_tet[u], first_tet[u + 1]):
             for k in range(4):
@@ -190,5 +188,5 @@ def any_angle_distance(
                     distance[v], bend[v], nearest[v] = length, via, near
                     for d in range(3):
                         feet[v, d] = foot[d]
-                    heapq.heappush(heap, (length, v))
+                    push(queue, v, length)
     return distance, nearest, feet, hidden
