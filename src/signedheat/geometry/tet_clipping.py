@@ -219,17 +219,12 @@ def _locate(points, bounds, items, center, tet_faces, normals, offsets, toleranc
 @compiled
 def _clip(triangles, bounds, items, center, tet_faces, normals, offsets, tolerances, signs, shares, solid):
     size = 64 + 4 * len(triangles)
-    tets = np.empty(size, dtype=np.int64)
-    parents = np.empty(size, dtype=np.int64)
-    area_vectors = np.empty((size, 3))
-    areas = np.empty(size)
-    centers = np.empty((size, 3))
-    in_face = np.empty(size, dtype=np.int64)
+    tets, parents = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
+    area_vectors, centers = np.empty((size, 3)), np.empty((size, 3))
+    areas, in_face = np.empty(size), np.empty(size, dtype=np.int64)
     count = 0
-    polygon = np.empty((8, 3))
-    other = np.empty((8, 3))
-    heights = np.empty(8)
-    normal = np.empty(3)
+    polygon, other = np.empty((8, 3)), np.empty((8, 3))
+    heights, normal = np.empty(8), np.empty(3)
     stack = np.empty(128, dtype=np.int64)
     leaves = len(bounds) // 2
     for p in range(len(triangles)):
