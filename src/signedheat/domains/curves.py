@@ -19,8 +19,9 @@ class Curve(Frozen):
     """A polyline on a surface; φ > 0 to its left if it is oriented.
 
     Left is the direction of the curve turned by 90° counter-clockwise, as seen with the face normal towards you. For a
-    segment along an edge it is left in the first face at that edge. Points on an edge or at a vertex are recognised as
-    such whichever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive points
+    segment along an edge it is left in the first face at that edge. Where faces are not consistently oriented, the face
+    of the first segment tells, and that side is kept along the curve. Points on an edge or at a vertex are recognised
+    as such whichever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive points
     that share no face are joined by a geodesic path; consecutive points may coincide.
 
     Parameters
@@ -34,8 +35,9 @@ class Curve(Frozen):
     oriented : bool
         Whether the curve has a positive and a negative side; distance to an unoriented curve is unsigned.
     normals : (segments, 3) float, optional
-        Direction in space in which φ grows across each segment. Needed where left has no meaning: on surfaces whose
-        faces are not consistently oriented. Normals are projected on the surface; their lengths are ignored.
+        Direction in space in which φ grows across each segment. Needed where left has no meaning: for curves along
+        which a surface that is not orientable loses its orientation, and for pieces on faces that are not consistently
+        oriented, to agree. Normals are projected on the surface; their lengths are ignored.
 
     Raises
     ------

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SourceError
-from ..geometry.curve_segments import CurveSegments, given_directions
+from ..geometry.curve_segments import CurveSegments, carried_left, given_directions
 from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import barycentric_in, locate_points, shared_faces, unique_points
@@ -116,7 +116,9 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
     of_edge = triangles.edge_vectors[faces, sides]
     ahead = np.sign((np.conj(of_edge) * steps).real) * forward
     vectors = np.where(along, 1j * ahead * np.abs(steps), vectors)
-    if source.normals is not None and source.oriented:
+    if source.normals is None and not triangles.is_consistently_oriented:
+        vectors = vectors * carried_left(triangles, faces, edges)
+    elif source.normals is not None and source.oriented:
         if positions is None:
             raise SourceError(
                 f"{name} has normals in space, but this surface has no positions",

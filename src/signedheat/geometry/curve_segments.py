@@ -11,8 +11,10 @@ from scipy.sparse import csr_matrix
 
 from ..errors import SourceError
 from .directions import unit
+from .face_pairs import face_pairs
 from .intrinsic_mesh import IntrinsicMesh
 from .surface_points import EDGE, VERTEX, LocatedPoints, incident_faces
+from .synchronization import synchronize_signs
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,40 @@ def given_directions(
             element=f"face {faces[flat[0]]}",
         )
     return directions / length
+
+
+def carried_left(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k,) −1 where the face that tells a segment's left is turned against that of the first segment, else 1.
+
+    Faces are compared across the edges around the curve, so left stays on one side of it however faces are turned. On a
+    curve along which orientation is lost, left changes sides somewhere.
+
+    Parameters
+    ----------
+    triangles : IntrinsicMesh
+        The surface.
+    faces, edges : (k,) int
+        Face of each segment, and the edge that it runs along or −1: there the first face at the edge tells left.
+    """
+    first = triangles.first_halfedges
+    first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
+    first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3
+    telling = np.where(edges < 0, faces, first_faces[edges])
+    corners = triangles.corner_vertices
+    touched = np.zeros(triangles.n_vertices, dtype=bool)
+    touched[corners[faces]] = True
+    touched[corners[telling]] = True
+    around = touched[corners].any(axis=1)
+    number = np.cumsum(around) - 1
+    pairs = face_pairs(triangles)
+    (one, other), sides = pairs.faces.T, pairs.sides
+    forward = triangles.edges.forward
+    agree = np.where(forward[one, sides[:, 0]] != forward[other, sides[:, 1]], 1.0, -1.0)
+    near = around[one] & around[other]
+    signs = synchronize_signs(number[one[near]], number[other[near]], (agree * pairs.shares)[near], int(around.sum()))[
+        number[telling]
+    ]
+    return signs * signs[0]
 
 
 def in_layout(

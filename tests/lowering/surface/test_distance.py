@@ -92,6 +92,22 @@ def test_flipped_faces_do_not_matter_where_normals_are_given(constraint):
     np.testing.assert_allclose(same, phi, atol=1e-10)
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("along_edges", [False, True])
+def test_left_is_carried_along_a_curve_where_faces_are_turned(along_edges, seed):
+    """Without normals the first segment tells the side, and the turned faces along the curve do not change it."""
+    mesh = bumpy()
+    turned = np.random.default_rng(seed).random(mesh.n_faces) < 0.4
+    faces = np.where(turned[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces)
+    curve = mesh.path([0, 40, 90]) if along_edges else loops(mesh)[0]
+    barycentric = np.where(turned[curve.faces][:, None], curve.barycentric[:, [0, 2, 1]], curve.barycentric)
+    phi = distance(mesh, curve, sh.ZeroSet())
+    other = distance(
+        sh.TriangleMesh(mesh.vertices, faces), sh.Curve(curve.faces, barycentric, curve.closed), sh.ZeroSet()
+    )
+    np.testing.assert_allclose(other * np.sign(phi @ other), phi, atol=1e-10)
+
+
 @pytest.mark.parametrize("closed", [False, True], ids=["Möbius strip", "Klein bottle"])
 def test_nonorientable_surfaces_equal_their_double_cover(closed):
     gluing = FlatGluing(14, 5, closed)
