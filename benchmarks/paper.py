@@ -33,19 +33,18 @@ def main() -> None:
     if unknown:
         sys.exit(f"there is no figure {', '.join(sorted(unknown))} here; there are {', '.join(FIGURES)}")
     FOLDER.mkdir(parents=True, exist_ok=True)
-    numbers = load_numbers(FOLDER)
     for number in chosen:
         begin = time.perf_counter()
         page = Page(FOLDER, number)
         FIGURES[number].make(page)
-        numbers[number] = page.rows
+        numbers = {**load_numbers(FOLDER), number: page.rows}  # read anew: several may run at once
         save_numbers(FOLDER, numbers)
         print(f"Fig. {number}: {time.perf_counter() - begin:.1f} s", flush=True)
         for row in page.rows:
             print("   ", "  ".join(f"{key}: {value}" for key, value in row.items()), flush=True)
     packages = f"signedheat {sh.__version__}, NumPy {np.__version__}, SciPy {scipy.__version__}"
     versions = f"{packages}, Python {platform.python_version()}"
-    write_chapter(FOLDER, numbers, versions)
+    write_chapter(FOLDER, load_numbers(FOLDER), versions)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ import time
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 KEPT = HERE.parent / "docs" / "benchmarks.json"
@@ -130,7 +131,6 @@ def main(names: list[str]) -> int:
     if unknown:
         print(f"no such comparison: {', '.join(sorted(unknown))}; there are {', '.join(COMPARISONS)}", file=sys.stderr)
         return 2
-    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
     for name in names or COMPARISONS:
         print(f"== {name}", flush=True)
         begin, load = time.perf_counter(), os.getloadavg()[0]
@@ -141,11 +141,17 @@ def main(names: list[str]) -> int:
             return run.returncode
         load = f"{load:.1f} before, {os.getloadavg()[0]:.1f} after"
         seconds = round(time.perf_counter() - begin)
+        kept = so_far()
         kept[name] = {"printed": run.stdout.rstrip(), "seconds": seconds, "load": load, **circumstances()}
         KEPT.write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
         print(run.stdout, flush=True)
-    PAGE.write_text(page(kept), encoding="utf-8")
+    PAGE.write_text(page(so_far()), encoding="utf-8")
     return 0
+
+
+def so_far() -> dict[str, dict[str, Any]]:
+    """What the last run of each comparison printed; read anew each time, since several may run at once."""
+    return json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
 
 
 def circumstances() -> dict[str, str]:
@@ -160,7 +166,7 @@ def circumstances() -> dict[str, str]:
     return {"machine": machine, "versions": ", ".join(found)}
 
 
-def page(kept: dict[str, dict[str, str]]) -> str:
+def page(kept: dict[str, dict[str, Any]]) -> str:
     lines = [ABOUT]
     for name, comparison in COMPARISONS.items():
         lines += ["", f"## {comparison.title}", "", inspect.cleandoc(comparison.about), ""]
