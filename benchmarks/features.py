@@ -209,9 +209,8 @@ What the numbers do not show:
 
 * **Exact distance to whole meshes** is what libigl, MeshLib and gpytoolbox do, faster than this library, which computes
   a grid first. If your meshes are closed and oriented, take one of them.
-* **Three quarters missing**: `solid_distance` takes what is left for open sheets, and says so (note `BoundsNothing`).
-  `sh.sharpen(sh.signed_distance(shape))`, which always has two sides, has an error of 0.42 % there. The signs of
-  PyVista and of libigl's offset are those of the nearest face, right where faces are dense and all face the same way.
+* **Three quarters missing**: the signs of PyVista and of libigl's offset are those of the nearest face, right where
+  faces are dense and all face the same way, as here; the winding numbers of the others fall with what is left.
 * **Booleans of closed meshes** are exact with manifold3d (which trimesh calls) and MeshLib. Ours are those of fields on
   a grid: they round edges by part of a cell, and take broken meshes.
 * **Mesh processing at large** (decimation, remeshing, registration, parametrisation) is in libigl, MeshLib, PyVista and

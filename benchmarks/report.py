@@ -60,15 +60,15 @@ COMPARISONS = {
     ),
     "solids-missing": Comparison(
         "Solids in space: missing faces",
-        ("solids.py", "15 % of the faces missing", "six holes", "half of it missing", "--repeats", "2"),
+        ("solids.py", "15 % of the faces missing", "six holes", "half of it missing", "--repeats", "1"),
         """The same shapes. Where single faces are missing, all are as good. Heat completes holes better than winding
-        numbers. With half of the shape gone, nothing tells where the rest was.""",
+        numbers. With half of the shape gone, nothing tells where the rest was. One run.""",
     ),
     "solids-noise": Comparison(
         "Solids in space: noise and doubled faces",
-        ("solids.py", "noise", "loose faces with noise", "every face twice, shifted", "--repeats", "2"),
+        ("solids.py", "noise", "loose faces with noise", "every face twice, shifted", "--repeats", "1"),
         """The same shapes: vertices moved by 0.01 along each axis; loose faces, each moved by as much; every face
-        twice.""",
+        twice. One run.""",
     ),
     "surfaces": Comparison(
         "Triangle meshes",
