@@ -1,4 +1,4 @@
-"""Kernels: the nearest face of points, through a tree of boxes and discs.
+"""The nearest face of points, through a tree of boxes and discs.
 
 A disc is flat: its plane is that of the faces below a node, its thickness what they deviate from it. Far from a surface
 the boxes of many faces are as near as the nearest one's, since boxes stand askew to it; few discs are.
@@ -14,12 +14,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
 from ..parallel import n_threads
 from .box_tree import LEAF, BoxTree
 from .face_features import FaceFeatures
+from .nearest import descend
 from .nearest_faces import NearestFaces, search_from
-from .point_triangle import foot_on_triangle
 
 RUN = 512
 """Points after which a search starts anew."""
@@ -81,7 +80,7 @@ class FaceTree:
         return search_from(self.features, points, faces[:, None])
 
     def _nearest(self, points: NDArray[np.float64], faces: NDArray[np.int32], squares: NDArray[np.float64]) -> None:
-        _nearest(self.features.rows, self.tree.bounds, self.discs, self.tree.items, points, RUN, faces, squares)
+        descend(self.features.rows, self.tree.bounds, self.discs, self.tree.items, points, RUN, faces, squares)
 
 
 def _on_threads(part: Callable[[int], None], starts: range) -> None:
@@ -130,93 +129,3 @@ def _discs(triangles: NDArray[np.float64], tree: BoxTree) -> NDArray[np.float64]
         if level == 0:
             break
     return discs
-
-
-@compiled(nogil=True, error_model="numpy")
-def _nearest(
-    rows: NDArray[np.float64],
-    bounds: NDArray[np.float64],
-    discs: NDArray[np.float64],
-    items: NDArray[np.int64],
-    points: NDArray[np.float64],
-    run: int,
-    out_faces: NDArray[np.int32],
-    out_squares: NDArray[np.float64],
-) -> None:
-    """Nearest face of each point. Every `run` points the search starts anew, in between from the face before."""
-    leaves = len(bounds) // 2
-    stack, gaps = np.empty(64, dtype=np.int64), np.empty(64)
-    before = 0
-    for p in range(len(points)):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        if p % run == 0:
-            before = _leaf_near(bounds, items, x, y, z)
-        face = before
-        best, _, _, _, _ = foot_on_triangle(rows, face, x, y, z)
-        depth, stack[0], gaps[0] = 1, 1, 0.0
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if gaps[depth] >= best:
-                continue
-            while node < leaves:
-                near = 2 * node
-                gap = _gap(bounds, discs, near, x, y, z, best)
-                other = _gap(bounds, discs, near + 1, x, y, z, best)
-                far = near + 1
-                if other < gap:
-                    near, far, gap, other = far, near, other, gap
-                if gap >= best:
-                    break
-                if other < best:
-                    stack[depth], gaps[depth] = far, other
-                    depth += 1
-                node = near
-            if node >= leaves:
-                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
-                    if items[k] >= 0:
-                        square, _, _, _, _ = foot_on_triangle(rows, items[k], x, y, z)
-                        if square < best:
-                            best, face = square, items[k]
-        before = face
-        out_faces[p], out_squares[p] = face, best
-
-
-@compiled(nogil=True, error_model="numpy")
-def _leaf_near(bounds: NDArray[np.float64], items: NDArray[np.int64], x: float, y: float, z: float) -> np.int64:
-    """Some face near a point: the way down the tree along the nearer box."""
-    node, leaves = 1, len(bounds) // 2
-    while node < leaves:
-        node *= 2
-        if _box_gap(bounds, node + 1, x, y, z) < _box_gap(bounds, node, x, y, z):
-            node += 1
-    first: np.int64 = max(items[(node - leaves) * LEAF], np.int64(0))
-    return first
-
-
-@compiled(nogil=True, error_model="numpy")
-def _box_gap(bounds: NDArray[np.float64], node: int, x: float, y: float, z: float) -> float:
-    """Squared distance of a point to a box; infinite if there is nothing in it."""
-    a = max(bounds[node, 0] - x, x - bounds[node, 3], 0.0)
-    b = max(bounds[node, 1] - y, y - bounds[node, 4], 0.0)
-    c = max(bounds[node, 2] - z, z - bounds[node, 5], 0.0)
-    return float(a * a + b * b + c * c)
-
-
-@compiled(nogil=True, error_model="numpy")
-def _gap(
-    bounds: NDArray[np.float64], discs: NDArray[np.float64], node: int, x: float, y: float, z: float, best: float
-) -> float:
-    """Squared distance to a box, or to the disc in it where that is farther and the box is nearer than the best."""
-    gap: float = _box_gap(bounds, node, x, y, z)
-    if gap >= best or discs[node, 7] < 0.0:
-        return gap
-    px, py, pz = x - discs[node, 0], y - discs[node, 1], z - discs[node, 2]
-    along = px * discs[node, 3] + py * discs[node, 4] + pz * discs[node, 5]
-    height = max(abs(along) - discs[node, 7], 0.0)
-    beside = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0)) - discs[node, 6]
-    flat = height * height
-    if beside > 0.0:
-        flat += beside * beside
-    larger: float = max(gap, flat)
-    return larger

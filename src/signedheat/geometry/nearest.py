@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import LEAF, BoxTree
+from .point_triangle import foot_on_triangle, triangle_rows
 
 
 def nearest_on_triangles(
@@ -22,54 +23,103 @@ def nearest_on_triangles(
     (array([0, 0]), array([[0.5, 0.5, 0. ],
            [0. , 0.5, 0.5]]))
     """
-    return _nearest(np.ascontiguousarray(triangles), tree.bounds, tree.items, points)
+    corners = np.ascontiguousarray(triangles, dtype=np.float64)
+    found, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
+    no_discs = np.full((len(tree.bounds), 8), -1.0)
+    descend(
+        triangle_rows(corners.reshape(-1, 9)), tree.bounds, no_discs, tree.items, points, len(points), found, squares
+    )
+    return found.astype(np.int64), _weights(corners, found, points)
+
+
+@compiled(nogil=True, error_model="numpy")
+def descend(
+    rows: NDArray[np.float64],
+    bounds: NDArray[np.float64],
+    discs: NDArray[np.float64],
+    items: NDArray[np.int64],
+    points: NDArray[np.float64],
+    run: int,
+    out_faces: NDArray[np.int32],
+    out_squares: NDArray[np.float64],
+) -> None:
+    """Nearest face of each point, and the square of its distance, down a tree of boxes.
+
+    Every `run` points the search starts anew, in between from the face before. Where a node has a disc
+    (`FaceTree.discs`) that is farther than its box, it counts. All in one function, since calls cost as much as boxes.
+
+    Parameters
+    ----------
+    rows : (m, 16) float
+        The faces, as `triangle_rows` gives them; there is at least one.
+    bounds, items : arrays
+        Of a `BoxTree`.
+    discs : (2 · leaves, 8) float
+        See `FaceTree.discs`.
+    points : (n, 3) float
+        Positions.
+    run : int
+        See above.
+    out_faces, out_squares : (n,)
+        What is found.
+    """
+    leaves = len(bounds) // 2
+    stack, gaps = np.empty(64, dtype=np.int64), np.empty(64)
+    face = np.int64(0)
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        best, depth, node = np.inf, 0, np.int64(1)
+        if p % run != 0:
+            best, _, _, _, _ = foot_on_triangle(rows, face, x, y, z)
+        while node > 0:
+            while 0 < node < leaves:
+                near, gap, other = np.int64(0), np.inf, np.inf
+                for child in range(2 * node, 2 * node + 2):
+                    a = max(bounds[child, 0] - x, x - bounds[child, 3], 0.0)
+                    b = max(bounds[child, 1] - y, y - bounds[child, 4], 0.0)
+                    c = max(bounds[child, 2] - z, z - bounds[child, 5], 0.0)
+                    square = a * a + b * b + c * c
+                    if square < best and discs[child, 7] >= 0.0:
+                        px, py, pz = x - discs[child, 0], y - discs[child, 1], z - discs[child, 2]
+                        along = px * discs[child, 3] + py * discs[child, 4] + pz * discs[child, 5]
+                        height = max(abs(along) - discs[child, 7], 0.0)
+                        beside = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0)) - discs[child, 6]
+                        flat = height * height + (beside * beside if beside > 0.0 else 0.0)
+                        square = max(square, flat)
+                    if square < gap:
+                        near, gap, other = child, square, gap
+                    else:
+                        other = square
+                if not gap < best:
+                    node = np.int64(0)
+                    break
+                if other < best:
+                    stack[depth], gaps[depth] = near ^ 1, other
+                    depth += 1
+                node = near
+            if node >= leaves:
+                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                    if items[k] >= 0:
+                        square, _, _, _, _ = foot_on_triangle(rows, items[k], x, y, z)
+                        if square < best:
+                            best, face = square, items[k]
+            node = np.int64(0)
+            while depth > 0 and node == 0:
+                depth -= 1
+                if gaps[depth] < best:
+                    node = stack[depth]
+        out_faces[p], out_squares[p] = face, best
 
 
 @compiled(nogil=True)
-def _nearest(triangles, bounds, items, points):
-    found = np.zeros(len(points), dtype=np.int64)
-    weights = np.zeros((len(points), 3))
-    stack, gaps = np.empty(128, dtype=np.int64), np.empty(128)
-    leaves = len(bounds) // 2
+def _weights(
+    triangles: NDArray[np.float64], faces: NDArray[np.int32], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    weights = np.empty((len(points), 3))
     for p in range(len(points)):
-        x, y, z = points[p]
-        near = found[p - 1] if p else 0  # a first guess: consecutive points are often close to each other
-        best, u, v, w = place_on_triangle(triangles[near], x, y, z)
-        found[p] = near
-        depth, stack[0], gaps[0] = 1, 1, 0.0
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if gaps[depth] >= best:
-                continue
-            if node < leaves:
-                near, far = 2 * node, 2 * node + 1
-                gap, other = _box_distance(bounds[near], x, y, z), _box_distance(bounds[far], x, y, z)
-                if gap > other:
-                    near, far, gap, other = far, near, other, gap
-                if other < best:
-                    stack[depth], gaps[depth] = far, other
-                    depth += 1
-                if gap < best:
-                    stack[depth], gaps[depth] = near, gap
-                    depth += 1
-                continue
-            for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
-                if items[k] >= 0:
-                    distance, a, b, c = place_on_triangle(triangles[items[k]], x, y, z)
-                    if distance < best:
-                        best, u, v, w = distance, a, b, c
-                        found[p] = items[k]
+        _, u, v, w = place_on_triangle(triangles[faces[p]], points[p, 0], points[p, 1], points[p, 2])
         weights[p, 0], weights[p, 1], weights[p, 2] = u, v, w
-    return found, weights
-
-
-@compiled
-def _box_distance(box, x, y, z):
-    a = max(box[0] - x, x - box[3], 0.0)
-    b = max(box[1] - y, y - box[4], 0.0)
-    c = max(box[2] - z, z - box[5], 0.0)
-    return a * a + b * b + c * c
+    return weights
 
 
 @compiled
