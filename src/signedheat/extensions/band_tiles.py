@@ -156,15 +156,20 @@ def _completed(
     rows = np.flatnonzero(gap - radius < np.minimum(distances.max(axis=1), plan.reach + 2 * radius))
     trusted = _trusted(plan, crossings)
     reach = float(np.linalg.norm(plan.steps))
+    inner = np.linalg.norm(
+        block_points(np.zeros((1, 3), dtype=np.int32), plan.steps) - 0.5 * (SIDE - 1) * plan.steps, axis=1
+    )
     for begin in range(0, len(rows), TOGETHER):
         some = rows[begin : begin + TOGETHER]
-        points = block_points(places[some], plan.steps)
+        block, node = np.nonzero(gap[some, None] - inner < distances[some])  # the others are nearer to faces
+        points = block_points(places[some], plan.steps).reshape(-1, NODES, 3)[block, node]
         _, nearest = tree.query(points)
         other = np.empty(len(points))
         distances_to_crossings(points, nearest.astype(np.int32), crossings, reach, other)
-        nearer = (other < distances[some].ravel()).reshape(len(some), -1)
-        distances[some] = np.where(nearer, other.reshape(nearer.shape), distances[some])
-        confidence[some] = np.where(nearer, trusted[nearest].reshape(nearer.shape), confidence[some])
+        block = some[block]
+        nearer = other < distances[block, node]
+        taken = block[nearer], node[nearer]
+        distances[taken], confidence[taken] = other[nearer], trusted[nearest[nearer]]
 
 
 def _trusted(plan: BandPlan, crossings: NDArray[np.float64]) -> NDArray[np.float32]:

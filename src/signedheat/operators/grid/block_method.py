@@ -235,15 +235,25 @@ def _neighbors(
     nodes: NDArray[np.int32],
     limit: NDArray[np.int64],
 ) -> NDArray[np.int32]:
-    result = np.empty((len(nodes), 6), dtype=np.int32)
+    """Looked up in the node's own block, and in others only beyond its rim."""
+    result = np.full((len(nodes), 6), np.int32(-1))
+    at, other = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for p in range(len(nodes)):
-        i, j, k = np.int64(nodes[p, 0]), np.int64(nodes[p, 1]), np.int64(nodes[p, 2])
-        result[p, 0] = _number(cubes, rows, numbers, limit, i - 1, j, k)
-        result[p, 1] = _number(cubes, rows, numbers, limit, i + 1, j, k)
-        result[p, 2] = _number(cubes, rows, numbers, limit, i, j - 1, k)
-        result[p, 3] = _number(cubes, rows, numbers, limit, i, j + 1, k)
-        result[p, 4] = _number(cubes, rows, numbers, limit, i, j, k - 1)
-        result[p, 5] = _number(cubes, rows, numbers, limit, i, j, k + 1)
+        for d in range(3):
+            at[d] = nodes[p, d]
+        own = row_of_node(cubes, rows, at[0], at[1], at[2])
+        for side in range(6):
+            axis = side // 2
+            for d in range(3):
+                other[d] = at[d]
+            other[axis] += 1 if side % 2 else -1
+            if not 0 <= other[axis] < limit[axis]:
+                continue
+            row = own
+            if other[axis] // SIDE != at[axis] // SIDE:
+                row = row_of_node(cubes, rows, other[0], other[1], other[2])
+            if row >= 0:
+                result[p, side] = numbers[row, other[0] % SIDE, other[1] % SIDE, other[2] % SIDE]
     return result
 
 
