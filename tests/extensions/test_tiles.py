@@ -78,7 +78,9 @@ def test_processes_give_the_same_bits(tmp_path, single):
     assert band.diagnostics.note(TilesComputed).peak_memory > 1e7
 
 
-def test_a_cluster_whose_worker_is_killed_gives_the_same_bits(tmp_path, single):
+@pytest.fixture
+def cluster(tmp_path):
+    """Address of a scheduler in a process of its own, and its two workers, each with 2 GB."""
     pytest.importorskip("distributed")
     environment = {**os.environ, "NUMBA_NUM_THREADS": "1", "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "5"}
     address = tmp_path / "scheduler.json"
@@ -88,29 +90,81 @@ def test_a_cluster_whose_worker_is_killed_gives_the_same_bits(tmp_path, single):
         command = [sys.executable, "-W", "ignore", "-m", f"distributed.cli.dask_{kind}", *options]
         with open(os.devnull, "w") as nowhere:
             processes.append(subprocess.Popen(command, env=environment, stdout=nowhere, stderr=nowhere, cwd=tmp_path))
-        return processes[-1]
 
     try:
         start("scheduler", "--scheduler-file", str(address), "--port", "0", "--no-dashboard")
-        one = start("worker", "--scheduler-file", str(address), "--nthreads", "1", "--no-nanny", "--no-dashboard")
-        start("worker", "--scheduler-file", str(address), "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        for _ in range(2):
+            options = "--nthreads", "1", "--memory-limit", "2GB", "--no-nanny", "--no-dashboard"
+            start("worker", "--scheduler-file", str(address), *options)
         deadline = time.monotonic() + 90
         while not address.exists():
             assert time.monotonic() < deadline
             time.sleep(0.2)
-        where = json.loads(address.read_text())["address"]
-        killed = []
-
-        def kill(fraction, step):
-            if step == "tiles" and not killed:
-                killed.append(fraction)
-                one.send_signal(signal.SIGKILL)
-
-        store = Path(tmp_path) / "store"
-        band = sh.tiled_distance(holed(), store, resolution=RESOLUTION, band=BAND, scheduler=where, progress=kill)
-        assert killed
-        assert_same(band, single)
+        yield json.loads(address.read_text())["address"], processes[1:]
     finally:
         for process in processes:
             process.kill()
             process.wait()
+
+
+def test_a_cluster_whose_worker_is_killed_gives_the_same_bits(tmp_path, single, cluster):
+    where, workers = cluster
+    killed = []
+
+    def kill(fraction, step):
+        if step == "tiles" and not killed:
+            killed.append(fraction)
+            workers[0].send_signal(signal.SIGKILL)
+
+    store = Path(tmp_path) / "store"
+    band = sh.tiled_distance(holed(), store, resolution=RESOLUTION, band=BAND, scheduler=where, progress=kill)
+    assert killed
+    assert_same(band, single)
+
+
+CLIENT = """
+import numpy as np, sys, signedheat as sh
+mesh = np.load(sys.argv[1])
+sh.tiled_distance(
+    sh.TriangleMesh(mesh["vertices"], mesh["faces"]), sys.argv[2], resolution=int(sys.argv[3]), band=float(sys.argv[4]),
+    scheduler=sys.argv[5],
+)
+"""
+
+
+def killed_in_between(folder, mesh, resolution, band, where, tiles):
+    """Run a client in a process of its own, which is killed when so many tiles are done; then go on in this one."""
+    store = folder / "store"
+    np.savez(folder / "mesh.npz", vertices=mesh.vertices, faces=mesh.faces)
+    arguments = [str(folder / "mesh.npz"), str(store), str(resolution), str(band), where]
+    client = subprocess.Popen([sys.executable, "-W", "ignore", "-c", CLIENT, *arguments])
+    try:
+        while client.poll() is None and len(list(store.glob("tiles/*/zarr.json"))) < tiles:
+            time.sleep(0.05)
+    finally:
+        client.send_signal(signal.SIGKILL)
+        client.wait()
+    return sh.tiled_distance(mesh, store, resolution=resolution, band=band, scheduler=where)
+
+
+@pytest.mark.slow
+def test_a_client_that_is_killed_goes_on_when_it_is_started_again(tmp_path, single, cluster):
+    band = killed_in_between(tmp_path, holed(), RESOLUTION, BAND, cluster[0], 2)
+    assert_same(band, single)
+    assert band.diagnostics.note(TilesComputed).reused >= 2
+
+
+@pytest.mark.slow
+def test_workers_of_2_gb_compute_what_would_take_8_on_a_whole_grid(tmp_path, cluster):
+    """512³ nodes of a broken shape at 64 bytes each; the client is killed and started again on the way."""
+    whole = sphere(20_000)
+    centres = whole.vertices[whole.faces].mean(axis=1)
+    mesh = sh.TriangleMesh(whole.vertices, whole.faces[(centres @ np.array([0.6, 0.0, 0.8])) < 0.97])
+    band = killed_in_between(tmp_path, mesh, 512, 0.02, cluster[0], 8)
+    note = band.diagnostics.note(TilesComputed)
+    assert note.reused >= 8
+    assert 1e8 < note.peak_memory < 2e9
+    points = np.random.default_rng(0).normal(size=(2000, 3))
+    points *= 1.01 / np.linalg.norm(points, axis=1, keepdims=True)
+    points = points[points @ np.array([0.6, 0.0, 0.8]) < 0.9]
+    np.testing.assert_allclose(band(points), 0.01, atol=3e-4)  # 20,000 points: faces lie up to 2e-4 within the sphere
