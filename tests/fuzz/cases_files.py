@@ -8,6 +8,7 @@ import tempfile
 import zlib
 from base64 import b64encode
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -200,6 +201,37 @@ def volumes() -> list[Files]:
 
 
 @cache
+def labels() -> list[Files]:
+    """Images of labels: NRRD with turned axes, raw and packed, NIfTI of both versions, VTI and NPY."""
+    head = "NRRD0005\ntype: uint8\ndimension: 3\nspace: LPS\nsizes: 3 2 4\nencoding: {}\n"
+    head += "space directions: (0,2,0) (-0.5,0,0) (0,0,-1)\nspace origin: (1,-2,3)\n\n"
+    values = np.array([0, 1, 3, 3, 0, 1] * 4, dtype=np.uint8)
+    image = values.reshape((3, 2, 4), order="F")
+    affine = np.array([[0, -0.5, 0, 1], [2, 0, 0, -2], [0, 0, -1, 3], [0, 0, 0, 1.0]])
+    found = [
+        {"labels.nrrd": head.format("raw").encode() + values.tobytes()},
+        {"labels.nrrd": head.format("gzip").encode() + gzip.compress(values.tobytes(), mtime=0)},
+        written(lambda path: np.save(path, image), "labels.npy"),
+        written(sh.GridField(sh.Grid([0, 0, 0], 1, image.shape), image.astype(float)).save, "labels.vti"),
+    ]
+    with suppress(ImportError):
+        import nibabel
+
+        for kind in (nibabel.Nifti1Image, nibabel.Nifti2Image):
+            packed = kind(image, affine).to_bytes()
+            found += [{"labels.nii": packed}, {"labels.nii.gz": gzip.compress(packed, mtime=0)}]
+    return found
+
+
+def read_labelled(path: Path) -> sh.LabelImage:
+    """An image of labels, which has a place."""
+    image = sh.read_labels(path)
+    if not (np.isfinite(image.matrix).all() and (image.spacing > 0).all() and image.labels.ndim == 3):
+        raise Wrong("not finite", repr(image))
+    return image
+
+
+@cache
 def masks() -> list[Files]:
     """Pictures."""
     from PIL import Image
@@ -244,6 +276,7 @@ KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
     "fields": (sh.load_field, fields),
     "volumes": (sh.read, volumes),
     "masks": (sh.read_mask, masks),
+    "labels": (read_labelled, labels),
     "lines": (sh.read_polylines, lines),
     "curves": (lambda path: sh.read_curves(path, BALL), curves),
     "line elements": (read_obj_lines, lambda: [f for f in curves() if "curves.obj" in f]),

@@ -10,7 +10,7 @@ import numpy as np
 import signedheat as sh
 from fuzz.cases_space import shape, size_of
 from fuzz.cases_surfaces import constraint, embedded, source, surface
-from fuzz.frame import family
+from fuzz.frame import Wrong, family
 from fuzz.inputs import chance, one_of, spoiled
 from fuzz.judging import Subject, announced, judge, length_of_edges, subject
 
@@ -54,5 +54,34 @@ def check_queries(given: Subject) -> str:
     return "samples"
 
 
+def check_labels(given: Subject) -> str:
+    """Images of labels with turned axes: distance of one of them, at its place in the world, and read again."""
+    random = given.random
+    counts = random.integers(1, 8, 3)
+    labels = one_of(random, (np.zeros, np.ones, random.random))(tuple(counts)) * one_of(random, (1, 2, 300, -3))
+    with np.errstate(invalid="ignore", over="ignore"):
+        labels = spoiled(random, labels).astype(one_of(random, (float, np.float32, np.int16, np.uint8)))
+    turned = np.linalg.qr(random.normal(size=(3, 3)))[0] if chance(random, 0.7) else np.eye(3)
+    steps = one_of(random, (1.0, 1e-12, 1e12, 10.0 ** random.uniform(-2, 2, 3)))
+    image = sh.LabelImage(labels, turned * steps, spoiled(random, random.normal(size=3)), None)
+    label = one_of(random, (None, 0, 1, *labels.ravel()[:2].tolist()))
+    own = image.surface(label)
+    grid = image.grid if chance(random, 0.5) else sh.Grid.around(own.bounds, int(random.integers(4, 12)))
+    phi, warned = announced(lambda: sh.solid_distance(own, grid))
+    size = size_of(np.concatenate([own.bounds, [grid.origin, grid.upper]]), None)
+    judge(phi.values, warned, size, "distance to a label")
+    world, _ = announced(lambda: image.to_world(phi.contour()))
+    judge(world.vertices, False, np.inf, "contour in the world")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / one_of(random, ("phi.nrrd", "phi.nii", "phi.nii.gz", "phi.vti"))
+        image.save(phi, path)
+        again = sh.read_labels(path)
+    if not (np.array_equal(again.labels, phi.values) and np.allclose(np.abs(again.axes), np.abs(turned * steps
+            * (grid.spacing / image.spacing)), rtol=1e-5, atol=1e-5 * float(grid.spacing.max()))):  # fmt: skip
+        raise Wrong("other values or axes when read again", path.name)
+    return "labels"
+
+
 family("surface curves", subject, check_curves)
 family("space queries", subject, check_queries)
+family("space labels", subject, check_labels)

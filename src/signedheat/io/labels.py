@@ -272,6 +272,15 @@ def _read_nifti(path: PathLike) -> Parts:
     head = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), 540) if packed else data[:540]
     second = 540 in (int.from_bytes(head[:4], "little"), int.from_bytes(head[:4], "big"))
     kind = nibabel.Nifti2Image if second else nibabel.Nifti1Image
+    logger = nibabel.imageglobals.logger
+    was, logger.disabled = logger.disabled, True  # what it mends in headers it would tell on standard error
+    try:
+        return _parts_of_nifti(kind, head, data, packed, path)
+    finally:
+        logger.disabled = was
+
+
+def _parts_of_nifti(kind: Any, head: bytes, data: bytes, packed: bool, path: PathLike) -> Parts:
     header = kind.header_class.from_fileobj(io.BytesIO(head), check=False)
     size = int(header["vox_offset"]) + int(np.prod(header.get_data_shape())) * header.get_data_dtype().itemsize
     ensure_fits(size, path)

@@ -19,6 +19,7 @@ from ..linear.conjugate_gradients import conjugate_gradients
 
 _MAX_ROUNDS = 12
 _MAX_INNER = 30
+_MOST_GROWTH = 10.0
 SOFTEST, STIFFEST = 1e-10, 1e10
 """Strengths of springs, relative to C, below and above which their strength makes no difference beyond rounding."""
 BATCH = 32
@@ -123,7 +124,8 @@ class DirectIntegration(Frozen):
         An augmented Lagrangian: its matrix ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and with stiff
         springs ρ two or three rounds suffice. Every round starts from the true residuals, which also corrects rounding
         errors due to ρ. Along nearly dependent rows convergence is slow; there, conjugate gradients find the
-        displacements of the springs that close the remaining gaps.
+        displacements of the springs that close the remaining gaps. Where rows that depend on each other to rounding
+        contradict each other, no φ of this size closes the gap: it is left as it is.
         """
         stiffness = whole(self.stiffness)
         spring = self.spring * self.stiffness.diagonal().max()
@@ -139,6 +141,8 @@ class DirectIntegration(Frozen):
             if slow:  # roughly: what remains is left to the next round
                 displacements = conjugate_gradients(lambda d: rows @ pull(d), gap, tolerance=1e-3, limit=_MAX_INNER)
             step = factor.solve(forces - stiffness @ values - rows.T @ multipliers) + pull(displacements)
+            if worst < np.inf and np.abs(step).max() > _MOST_GROWTH * np.abs(values).max():
+                break
             values += step
             multipliers -= spring * (displacements - rows @ step)
             gap = levels - rows @ values
