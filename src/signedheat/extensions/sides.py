@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..diagnostics import BoundsNothing, CompletedArea, ReachesBox
 from ..operators.grid.boundary_areas import boundary_areas, completion_areas
 from ..operators.grid.face_values import values_at
+from .rims import Rims
 
 LEVEL = 0.4
 """Winding number that φ < 0 needs; from 1 less this on, nodes are inside whatever φ says."""
@@ -36,19 +37,27 @@ OPENING = 0.01
 """The same of the flattest way to close it, across the opening: a small hole, too, may be filled to no end."""
 BOUNDING = 0.12
 """Mean winding number of both sides from which a face counts as bounding something: ½ on a solid, 0 on a sheet."""
-FILM = 0.7
+FILM = 0.85
 """Area without faces, over that of the faces, from which a region is a mere film on one side of a sheet."""
-OPEN = 0.55
+OPEN = 0.72
 """Completed area, over that of the faces, up to which a region is a solid, if (nearly) all faces bound something."""
 CLOSED = 0.02
 """The same if many faces bound nothing: then open regions are taken for open."""
 ALL, MANY = 0.95, 0.92
 """Shares of the area of faces that bound something: nearly all, and less than which many do not."""
-HALF, LESS = 0.58, 0.55
-"""Mean of twice the winding number at the faces, 1 on whole shapes: on half a sphere, .61, and on what encloses less,
-such as three sides of a box, .5."""
+HALF, LESS = 0.52, 0.48
+"""Mean of twice the winding number at the faces, 1 on whole shapes: on half a sphere, .61, on four sides of a box .55,
+and on what encloses less, such as three sides of a box, .44."""
 MOST = 5
 """Parts of the completed surface that are told of."""
+MIDDLE = 0.25
+"""Distance of winding numbers from ½ up to which rims are asked."""
+CURVED = 0.12
+"""Sine of a quarter of the angle of a cap from which on φ tells the side between `LEVEL` and 1 less that."""
+MOSTLY, PARTLY = 0.7, 0.4
+"""How far faces around a missing side go on at least, and where φ < 0 beyond it has more area than all faces."""
+BESIDE = 2.5
+"""Cells from faces within which a hole is beside them."""
 SLOPE = 4.0
 """Cells that a winding number of one is worth beside φ."""
 
@@ -95,6 +104,7 @@ class _Scene:
     areas: NDArray[np.float64]
     bounding: NDArray[np.bool_]
     enclosure: float
+    doubt: NDArray[np.float32]
 
     @property
     def cell(self) -> float:
@@ -108,11 +118,11 @@ class _Scene:
         ramps = (share - MANY) / (ALL - MANY), (self.enclosure - LESS) / (HALF - LESS)
         return float(np.clip(min(ramps), 0.0, 1.0))
 
-    def guarded(self, level: float, box: tuple[slice, ...] = ()) -> NDArray[np.float64]:
-        """Negative where φ < 0 and w > level, or w > 1 − LEVEL."""
-        worth, winding = SLOPE * self.cell, self.winding[box]
-        result = np.maximum(self.phi[box], worth * (level - winding))
-        return np.minimum(result, worth * (1 - LEVEL - winding), out=result)
+    def guarded(self, level: float | None = None, box: tuple[slice, ...] = ()) -> NDArray[np.float64]:
+        """Negative where φ < 0 and w > level, by default ½ less the doubt, or where w is above ½ by more than that."""
+        worth, winding, doubt = SLOPE * self.cell, self.winding[box], self.doubt[box]
+        result = np.maximum(self.phi[box], worth * ((0.5 - doubt if level is None else level) - winding))
+        return np.minimum(result, worth * (0.5 + doubt - winding), out=result)
 
 
 def choose_sides(
@@ -123,6 +133,7 @@ def choose_sides(
     vectors: NDArray[np.float64],
     spacing: NDArray[np.float64],
     origin: NDArray[np.float64],
+    rims: Rims | None = None,
 ) -> Sides:
     """Decide which nodes of a grid are inside a broken shape.
 
@@ -140,6 +151,8 @@ def choose_sides(
         Distance between nodes along each axis; two or three axes.
     origin : (d,) float
         Position of the first node, for reports.
+    rims : Rims, optional
+        Those of the shape, if it is a mesh: how its faces go on beyond them.
 
     Returns
     -------
@@ -147,7 +160,8 @@ def choose_sides(
 
     Notes
     -----
-    Regions where φ < 0 and w > .4, or w > .6, are solids if the completed part of their boundary is small beside the
+    Regions where φ < 0 and w > .4, or w > .6 (both nearer ½ the flatter a hole's surroundings are: ½ is flat across)
+    are solids if the completed part of their boundary is small beside the
     faces on it: at most .55 where nearly all faces of the shape bound something, so that what is open must be missing;
     next to nothing where many faces are open sheets. Other regions are looked at again above w = .6, .75, .9, so that
     closed legs stay solid below an open board.
@@ -155,9 +169,9 @@ def choose_sides(
     shape = (1,) * (3 - phi.ndim) + phi.shape
     steps = np.ones(3)
     steps[3 - phi.ndim :] = spacing
-    scene = _scene(phi, winding, distance, positions, vectors, shape, steps)
+    scene = _scene(phi, winding, distance, positions, vectors, rims, shape, steps)
     bodies, function, present = _bodies(scene)
-    _fill_missing_sides(scene, bodies, present, function)
+    _fill_missing_sides(scene, rims, bodies, present, function)
     inside = function < 0
     sides = inside.ravel()
     bounding = sides[scene.back] != sides[scene.front]
@@ -167,7 +181,7 @@ def choose_sides(
     return Sides(
         inside.reshape(phi.shape),
         function.reshape(phi.shape),
-        ((scene.guarded(LEVEL) < 0) & ~inside).reshape(phi.shape),
+        ((scene.guarded() < 0) & ~inside).reshape(phi.shape),
         scene.trust == 0.0,
         _completed(scene, inside, function, np.asarray(origin)),
         ReachesBox(float(on_walls.mean())) if on_walls.any() else None,
@@ -198,6 +212,7 @@ def _scene(
     distance: NDArray[np.floating],
     positions: NDArray[np.float64],
     vectors: NDArray[np.float64],
+    rims: Rims | None,
     shape: tuple[int, ...],
     steps: NDArray[np.float64],
 ) -> _Scene:
@@ -216,14 +231,30 @@ def _scene(
     at_faces = values_at(three[1], places)
     enclosure = 2 * float(np.average(np.clip(at_faces, 0.0, 0.5), weights=areas)) if areas.any() else 0.0
     bounding = at_faces > BOUNDING
-    scene = _Scene(*three, steps, front, back, areas, bounding, enclosure)
-    sides = scene.guarded(LEVEL).ravel() < 0
+    scene = _Scene(*three, steps, front, back, areas, bounding, enclosure, _doubt(*three[1:], steps, rims))
+    sides = scene.guarded().ravel() < 0
     return replace(scene, bounding=bounding | (sides[back] & ~sides[front]))
+
+
+def _doubt(
+    winding: NDArray[np.float64], distance: NDArray[np.floating], steps: NDArray[np.float64], rims: Rims | None
+) -> NDArray[np.float32]:
+    """What a winding number must differ from ½ by to tell the side alone: less where a hole is in a flat face.
+
+    In the middle of a missing spherical cap with half the angle θ it is ``½ (1 − sin ½θ)``.
+    """
+    doubt = np.full(winding.shape, 0.5 - LEVEL, dtype=np.float32)
+    if rims is not None:
+        nodes = np.argwhere((np.abs(winding - 0.5) < MIDDLE) & (distance > float(steps.max())))
+        if len(nodes):
+            bend = np.sin(0.5 * np.arcsin(rims.going_on_at(nodes * steps)))
+            doubt[tuple(nodes.T)] *= np.minimum((bend / CURVED) ** 2, 1.0)
+    return doubt
 
 
 def _bodies(scene: _Scene) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
     """Labels of the solids, a function that is negative in them alone, and the area of the faces on each."""
-    function = scene.guarded(LEVEL)
+    function = scene.guarded()
     candidates = function
     bodies = np.zeros(function.shape, dtype=np.int32)
     present = np.zeros(1)
@@ -256,7 +287,11 @@ def _faces_on(scene: _Scene, labels: NDArray[np.int32], n: int) -> NDArray[np.fl
 
 
 def _fill_missing_sides(
-    scene: _Scene, bodies: NDArray[np.int32], present: NDArray[np.float64], function: NDArray[np.float64]
+    scene: _Scene,
+    rims: Rims | None,
+    bodies: NDArray[np.int32],
+    present: NDArray[np.float64],
+    function: NDArray[np.float64],
 ) -> None:
     """Extend the function where a whole side of a solid is missing."""
     fillable = (scene.phi < 0) & (bodies == 0) & (scene.winding < LEVEL) & (scene.distance > scene.cell)
@@ -270,6 +305,9 @@ def _fill_missing_sides(
     ends = np.minimum(at_walls, len(LEVELS) - 1)  # what fills the box has no end; leave room for offsets
     large = (owners > 0) & (areas[np.arange(len(ends)), ends] > MISSING_SIDE * present[owners])
     large &= areas.min(axis=1) > OPENING * present[owners]
+    if rims is not None and large.any():
+        endless = areas.max(axis=1) > present[owners]
+        large &= _going_on(scene, rims, holes, n) > np.where(endless, PARTLY, MOSTLY)
     boxes = scipy.ndimage.find_objects(holes)
     for body in np.unique(owners[large]):
         own = np.flatnonzero(large & (owners == body))
@@ -280,8 +318,18 @@ def _fill_missing_sides(
         for hole in own:
             box = tuple(slice(max(0, part.start - 2), part.stop + 2) for part in boxes[hole - 1])
             near = scipy.ndimage.binary_dilation(holes[box] == hole, np.ones((3, 3, 3)), iterations=2)
-            refused = (scene.guarded(LEVEL, box) < 0) & (function[box] >= 0)
+            refused = (scene.guarded(None, box) < 0) & (function[box] >= 0)
             np.copyto(function[box], scene.guarded(level, box), where=near & ~refused)
+
+
+def _going_on(scene: _Scene, rims: Rims, holes: NDArray[np.int32], n: int) -> NDArray[np.float64]:
+    """(n + 1,) how far the faces around each hole go on, at its nodes beside them."""
+    beside = np.argwhere((holes > 0) & (scene.distance < BESIDE * scene.cell))
+    of_hole = holes[tuple(beside.T)]
+    going_on = rims.going_on_at(beside * scene.steps) if len(beside) else np.zeros(0)
+    counts = np.bincount(of_hole, minlength=n + 1)
+    result: NDArray[np.float64] = np.bincount(of_hole, going_on, minlength=n + 1) / np.maximum(counts, 1)
+    return np.where(counts > 0, result, 1.0)
 
 
 def _completed(

@@ -27,7 +27,6 @@ from ..lowering.area_elements import AreaSamples, bounds_around, sample_on_grid
 from ..lowering.grid.discretization import refuse_beyond_memory
 from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
-from ..operators.grid.boundary_areas import distances_to_samples
 from ..operators.grid.face_values import values_at
 from ..operators.grid.fitted_points import mean_gap
 from ..operators.grid.line_winding import closed_winding_numbers
@@ -40,8 +39,9 @@ from .joining import Shape, joined_shape
 from .orientation import orientation
 from .point_orientation import orient_points
 from .shape_sharpening import Assembled, Fit, assemble, triangles_of
+from .shape_sides import sides_of_shape
 from .sharpening import sharpen
-from .sides import FAR, Sides, choose_sides, closed_sides, nothing_inside
+from .sides import FAR, Sides, closed_sides
 from .steps import Steps
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
 
@@ -257,7 +257,8 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     with stopwatch("sides"):
         if samples is not None and not closed:
             winding, samples = as_if_whole(winding, samples)
-        sides = closed_sides(winding, float(grid.spacing.max())) if closed else _sides(phi, winding, samples, grid)
+        cell = float(grid.spacing.max())
+        sides = closed_sides(winding, cell) if closed else sides_of_shape(shape, phi, winding, samples, grid)
     with stopwatch("sharpen"):
         sharpened = _sharpened(shape, phi, sides, closed, winding, grid, steps.closed)
     notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
@@ -381,14 +382,3 @@ def _wound(shape: Shape, grid: Grid) -> tuple[AreaSamples | None, NDArray[np.flo
     except CancellingNormalsError:
         return None, np.zeros(grid.shape)
     return samples, winding_of(samples, grid)
-
-
-def _sides(
-    phi: NDArray[np.float64] | None, winding: NDArray[np.float64], samples: AreaSamples | None, grid: Grid
-) -> Sides:
-    if phi is None or samples is None:
-        return nothing_inside(grid.shape)
-    reach = (FAR + 1) * float(grid.spacing.max())
-    shape = (grid.shape[0], grid.shape[1], grid.shape[2])
-    distance = distances_to_samples(samples.positions, samples.vectors, shape, grid.spacing, reach)
-    return choose_sides(phi, winding, distance, samples.positions, samples.vectors, grid.spacing, grid.origin)

@@ -290,8 +290,9 @@ def circle_distance(
             at += 1
         bend /= side
         root = np.sqrt(max(0.0, 1.0 + 2.0 * bend * s + bend * bend * square))
-        circle = abs(2.0 * s + bend * square) / (1.0 + root)
-        distance = min(distance, max(circle, distance - reach))
+        if 1.0 + bend * s > 0.0:  # beyond its centre the other side of the circle is nearer, which is no surface
+            circle = abs(2.0 * s + bend * square) / (1.0 + root)
+            distance = min(distance, max(circle, distance - reach))
     return float(distance)
 
 

@@ -182,9 +182,11 @@ class ExactSurface(Frozen):
             other = np.empty(len(near))
             distances_to_crossings(there, which.astype(np.int32), self.crossings, reach, other)
             touched = there - other[:, None] * away_from_circles(there, rows)
+            straight = np.linalg.norm(there - rows[:, 1:4], axis=1)
             strayed = np.linalg.norm(touched - rows[:, 1:4], axis=1) > 0.5 * reach  # off the end of the zero set
+            strayed |= other >= straight
             touched[strayed] = rows[strayed, 1:4]
-            other = np.where(strayed, np.linalg.norm(there - rows[:, 1:4], axis=1), other)
+            other = np.where(strayed, straight, other)
             nearer = other < distances[near]
             taken = near[nearer]
             completed[taken], sides[taken] = True, 0.0
