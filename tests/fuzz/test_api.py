@@ -18,4 +18,4 @@ def test_a_short_run(name):
 
 
 def test_every_domain_and_extension_has_a_family():
-    assert len(FAMILIES) == 11
+    assert len(FAMILIES) == 12
