@@ -72,10 +72,9 @@ COMPARISONS = {
     ),
     "surfaces": Comparison(
         "Triangle meshes",
-        ("surface.py", "--levels", "6", "--repeats", "3"),
+        ("surface.py", "--levels", "6", "--repeats", "1"),
         """First, next and batched distances beside potpourri3d, which is the authors' own C++, and beside the two
-        sparse solves that the method cannot do without (bare). CPU seconds, the least of three rounds, in which the
-        programs take turns.""",
+        sparse solves that the method cannot do without (bare). CPU seconds, one run.""",
     ),
     "broken-curves": Comparison(
         "Broken curves on surfaces",
@@ -91,7 +90,7 @@ COMPARISONS = {
     ),
     "volumes": Comparison(
         "Grids with walls, and tets",
-        ("domains.py", "volumes", "--volumes", "70000", "--repeats", "2"),
+        ("domains.py", "volumes", "--volumes", "70000", "--repeats", "1"),
         """There is no peer in Python: "peer" is our own field without sharpening.""",
     ),
     "tets": Comparison(
