@@ -185,7 +185,9 @@ def broken_curves_on_surfaces(page: Page) -> None:
     exact polyhedral distance to what is left the rest. Here five surfaces, ten seeds each, a closed curve in
     about twelve pieces, damaged in seven ways (`benchmarks/broken_curves.py`; all but the first three with 25 % gone).
     ε as median / worst over the fifty cases; in brackets, how often a program failed. `sh.curve_distance` also turns
-    pieces and leaves out what belongs to no other; heat is the method alone, zero set the same sharpened.
+    pieces and leaves out what belongs to no other; heat is the method alone, zero set the same sharpened. Where there
+    is no table below, [an earlier one](extensions.md#broken-curves-whose-pieces-disagree) holds: with 50 % gone its
+    medians are .88 % for `sh.curve_distance`, 1.9 % for heat, 3.3 % for SWN × exact and 2.7 % for potpourri3d.
     """
     names = {"one call": "curve_distance", "nearest": "nearest side × exact", "winding": "SWN × exact"}
     errors = broken_curves.study(10)
