@@ -31,7 +31,7 @@ FOUND = [
     # levels far from zero, interpolated
     ("surface use", 300, 927), ("surface use", 300, 1913),
     # paths through edges that are a rounding shorter than none
-    ("surface use", 202, 43),
+    ("surface use", 202, 43), ("surface curves", 300, 4876),
     # arguments that are quoted, compared or counted
     ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
     ("arguments", 206, 22), ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),
