@@ -44,7 +44,7 @@ class Frozen:
 
 def read_only(array: NDArray[Number]) -> NDArray[Number]:
     """A read-only view, as arrays of frozen objects are: for what can be written, kernels would be compiled again."""
-    view = array.view()
+    view: NDArray[Number] = array.view()
     view.flags.writeable = False
     return view
 

@@ -123,17 +123,17 @@ def carried_left(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDAr
     touched = np.zeros(triangles.n_vertices, dtype=bool)
     touched[corners[faces]] = True
     touched[corners[telling]] = True
-    around = touched[corners].any(axis=1)
+    around = np.asarray(touched[corners].any(axis=1))
     number = np.cumsum(around) - 1
     pairs = face_pairs(triangles)
     (one, other), sides = pairs.faces.T, pairs.sides
     forward = triangles.edges.forward
     agree = np.where(forward[one, sides[:, 0]] != forward[other, sides[:, 1]], 1.0, -1.0)
     near = around[one] & around[other]
-    signs = synchronize_signs(number[one[near]], number[other[near]], (agree * pairs.shares)[near], int(around.sum()))[
-        number[telling]
-    ]
-    return signs * signs[0]
+    votes = agree[near] * pairs.shares[near]
+    signs = synchronize_signs(number[one[near]], number[other[near]], votes, int(around.sum()))[number[telling]]
+    relative: NDArray[np.float64] = signs * signs[0]
+    return relative
 
 
 def in_layout(

@@ -7,13 +7,14 @@ through a halfedge, and the next one entered through another halfedge of the sam
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiled import compiled
 from .heap_kernels import pop, push
 
 
 @compiled
-def group(members, n):
+def group(members: NDArray[np.int64], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Inverse index of `members` (values 0 … n−1): where the entries of each value begin, and the positions."""
     begin = np.zeros(n + 1, np.int64)
     for m in members:
@@ -115,7 +116,7 @@ def unfold(corners, forward, left, entered):
 
 
 @compiled
-def turns(a, b):
+def turns(a: complex, b: complex) -> float:
     """Cross product of plane vectors: positive where b is counter-clockwise of a."""
     return a.real * b.imag - a.imag * b.real
 
@@ -201,7 +202,7 @@ def other_way(edge_of, forward, begin, sides, left, entered, tails, heads, bend,
 
 
 @compiled
-def is_among(values, value, begin, end):
+def is_among(values: NDArray[np.int64], value: int, begin: int, end: int) -> bool:
     """Whether a value is among some of others."""
     for k in range(begin, end):
         if values[k] == value:
@@ -228,13 +229,13 @@ def spliced(left, entered, first, last, out, into, before, k, across):
 
 
 @compiled
-def turned(h, at_tail):
+def turned(h: int, at_tail: bool) -> int:
     """The other halfedge of the face at the tail of a halfedge, or at its head."""
     return h - h % 3 + (h + 2) % 3 if at_tail else h - h % 3 + (h + 1) % 3
 
 
 @compiled
-def point_in(faces, points, face):
+def point_in(faces: NDArray[np.int64], points: NDArray[np.complex128], face: int) -> np.complex128:
     """The point listed for a face, in its layout."""
     for s in range(len(faces)):
         if faces[s] == face:
