@@ -9,7 +9,7 @@ import trimesh
 
 import signedheat as sh
 from refusals import refused
-from signedheat import samples
+from signedheat import samples, visualization
 
 BALL = samples.sphere(2)
 CUBE = sh.PolygonMesh(
@@ -24,6 +24,15 @@ def placed_in_a_scene():
     scene = trimesh.Scene()
     scene.add_geometry(moved, transform=trimesh.transformations.translation_matrix([-5.0, -5.0, -5.0]))
     return scene
+
+
+RING = BALL.level_set(BALL.vertices[:, 2], 0.1)
+ARCS = [sh.Curve(RING[0].faces[part], RING[0].barycentric[part]) for part in (slice(20), slice(25, 44))]
+ARCS[1] = ARCS[1].reversed()
+
+
+def places_of(curve):
+    return np.einsum("nk,nkd->nd", curve.barycentric, BALL.vertices[BALL.faces[curve.faces]])
 
 
 class OwnTrimesh(trimesh.Trimesh):
@@ -69,6 +78,13 @@ TAKERS = {
     "thicken": lambda shape: sh.thicken(shape, 0.4, resolution=16).vertices,
     "tetrahedralize": lambda shape: sh.tetrahedralize(shape, resolution=2).vertices,
     "domain": lambda shape: sh.signed_distance(BALL.points_at(0), shape).values,
+    "curve_distance": lambda shape: sh.curve_distance(shape, RING).values,
+    "piecewise_distance": lambda shape: sh.piecewise_distance(shape, RING).values,
+    "close_curves": lambda shape: sh.close_curves(shape, ARCS)[0].barycentric,
+    "orient curves": lambda shape: sh.orient(ARCS, shape)[1].faces,
+    "intrinsic_delaunay": lambda shape: sh.intrinsic_delaunay(shape).triangles.edge_lengths,
+    "globe_curve": lambda shape: sh.globe_curve(shape, [[0, 0], [30, 20], [70, 0]]).barycentric,
+    "transform": lambda shape: sh.transform(shape, np.diag([2.0, 1, -1, 1])).faces,
 }
 
 
@@ -77,6 +93,30 @@ def test_they_are_taken_wherever_a_shape_is(take):
     expected = take(BALL)
     for given in (BALL.to_trimesh(), (BALL.vertices, BALL.faces)):
         assert np.array_equal(take(given), expected)
+
+
+def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
+    pictures, pages = {}, {}
+    for name, given in {"own": BALL, "trimesh": BALL.to_trimesh(), "arrays": (BALL.vertices, BALL.faces)}.items():
+        sh.save(given, tmp_path / f"{name}.ply")
+        assert np.array_equal(sh.read(tmp_path / f"{name}.ply").faces, BALL.faces)
+        sh.write_curves(tmp_path / f"{name}.txt", ARCS, given)
+        again = sh.read_curves(tmp_path / f"{name}.txt", given)
+        assert np.abs(places_of(again[1]) - places_of(ARCS[1])).max() < 1e-12
+        visualization.save_page(given, tmp_path / "page.html", title="ball")
+        pages[name] = (tmp_path / "page.html").read_text().partition('"vertices"')[2]
+        visualization.save_scene(given, tmp_path / f"{name}.png")
+        visualization.save_slices(sh.solid_distance(BALL, resolution=12), tmp_path / f"{name}-slices.png", given)
+        visualization.save_row(tmp_path / f"{name}-row.png", ("ball", given))
+        pictures[name] = [(tmp_path / f"{name}{end}.png").read_bytes() for end in ("", "-slices", "-row")]
+    assert pictures["own"] == pictures["trimesh"] == pictures["arrays"]
+    assert pages["own"] == pages["trimesh"] == pages["arrays"] and len(pages["own"]) > 4 * BALL.n_faces
+    for take in (
+        lambda: sh.save("ball", tmp_path / "ball.ply"),
+        lambda: visualization.save_scene(3, tmp_path / "3.png"),
+    ):
+        with refused(sh.UnsupportedTypeError):
+            take()
 
 
 def test_two_shapes_are_no_pair_of_arrays():
@@ -168,3 +208,13 @@ def test_paths_and_bare_points_are_told_what_to_pass(thing, named):
         with refused(sh.SignedHeatError) as caught:
             take(thing)
         assert named in caught.value.remedy
+
+
+@pytest.mark.parametrize(("kind", "corners"), [("line", 2), ("hexahedron", 8)])
+def test_lines_and_other_cells_of_meshio_are_no_points(kind, corners):
+    cells = meshio.Mesh(BALL.vertices, [(kind, np.arange(2 * corners).reshape(2, corners))])
+    for take in (sh.as_shape, sh.solid_distance, sh.TriangleMesh.from_meshio):
+        with refused(sh.UnsupportedTypeError, "Mesh") as caught:
+            take(cells)
+        assert kind in caught.value.remedy
+    assert sh.PointCloud.from_meshio(cells).n_points == BALL.n_vertices  # asked for

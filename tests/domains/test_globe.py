@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
+from shapes import domain_cases as cases
 from signedheat import samples
 from signedheat.cli import main
 from signedheat.domains.globe import directions, great_circles
@@ -96,3 +98,17 @@ def test_what_is_no_curve_on_a_globe_is_refused(globe, tmp_path):
         assert caught.value.path == str(tmp_path / name)
     west_is_east = sh.globe_curve(globe, [[170, 0], [180, 0], [-180, 0], [-170, 0]])
     assert len(west_is_east.faces) > 2
+
+
+def test_a_globe_may_be_of_quadrangles_and_of_another_package():
+    quads = sh.PolygonMesh(*cases.globe(18))
+    curve = sh.globe_curve(quads, parallel(0.0), closed=True)
+    phi = sh.curve_distance(quads, curve).values
+    latitude = np.arcsin(np.clip(quads.vertices[:, 2], -1, 1))
+    assert np.abs(phi - latitude).max() < 0.02 * np.pi / 2  # chords are shorter than arcs by (5°)² / 6, and less
+    triangles = samples.sphere(3)
+    given = sh.globe_curve(triangles.to_trimesh(), parallel(30.0), closed=True)
+    assert np.array_equal(given.barycentric, sh.globe_curve(triangles, parallel(30.0), closed=True).barycentric)
+    for no_mesh in (samples.oriented_points(triangles, 50), sh.Grid((0, 0, 0), 1.0, (3, 3, 3))):
+        with refused(sh.UnsupportedTypeError, "mesh"):
+            sh.globe_curve(no_mesh, parallel(0.0))

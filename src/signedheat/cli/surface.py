@@ -61,12 +61,6 @@ def curves_of(arguments: Namespace, surface: Any) -> list[Any]:
     """The curves; on a globe those in longitude and latitude."""
     if not arguments.globe:
         return read_curves(arguments.curves, surface)
-    if not isinstance(surface, TriangleMesh):
-        raise SourceError(
-            f"a globe is a triangle mesh, and this is a {type(surface).__name__}",
-            remedy="triangulate it",
-            path=arguments.mesh,
-        )
     return list(read_globe_curves(arguments.curves, surface))
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import SourceError
+from ..errors import SourceError, UnsupportedTypeError
 from .curves import Curve
+from .foreign import ForeignShape, converted
+from .polygon_mesh import PolygonMesh
 from .triangle_mesh import TriangleMesh
 
 ROUND = 0.1
@@ -15,12 +17,14 @@ OPPOSITE = 1e-6
 """Radians short of half a turn from which two points have no one great circle through them."""
 
 
-def globe_curve(mesh: TriangleMesh, points: ArrayLike, closed: bool = False, oriented: bool = True) -> Curve:
+def globe_curve(
+    mesh: TriangleMesh | PolygonMesh | ForeignShape, points: ArrayLike, closed: bool = False, oriented: bool = True
+) -> Curve:
     """A curve along great circles on a mesh of a globe, which may also be a little flat or rough.
 
     Parameters
     ----------
-    mesh : TriangleMesh
+    mesh : TriangleMesh or PolygonMesh
         The globe, of any size; its centre is that of the box around it, and north is up along z.
     points : (n, 2) float
         Longitude, east positive, from the x axis on, and latitude, in degrees.
@@ -39,6 +43,8 @@ def globe_curve(mesh: TriangleMesh, points: ArrayLike, closed: bool = False, ori
     SourceError
         If a latitude or a longitude is out of range, two points in succession are opposite each other, or the mesh is
         no globe.
+    UnsupportedTypeError
+        If it is no mesh.
 
     Examples
     --------
@@ -47,9 +53,15 @@ def globe_curve(mesh: TriangleMesh, points: ArrayLike, closed: bool = False, ori
     >>> circle.closed
     True
     """
+    mesh = converted(mesh)
+    if not isinstance(mesh, TriangleMesh | PolygonMesh):
+        raise UnsupportedTypeError(
+            f"a globe is a mesh, and this is a {type(mesh).__name__}", remedy="triangulate it", element="mesh"
+        )
+    triangles = mesh.triangulation
     lower, upper = mesh.bounds
     center = (lower + upper) / 2
-    radii = np.linalg.norm(mesh.vertices[np.unique(mesh.faces)] - center, axis=1)
+    radii = np.linalg.norm(triangles.vertices[np.unique(triangles.faces)] - center, axis=1)
     radius = float(radii.mean())
     if not np.abs(radii - radius).max() <= ROUND * radius:
         raise SourceError(
@@ -57,7 +69,7 @@ def globe_curve(mesh: TriangleMesh, points: ArrayLike, closed: bool = False, ori
             remedy="use a mesh of a sphere",
             element="mesh",
         )
-    ways = great_circles(directions(points), closed, step=float(np.mean(mesh.edge_lengths)) / radius)
+    ways = great_circles(directions(points), closed, step=float(np.mean(triangles.edge_lengths)) / radius)
     return mesh.polyline(center + radius * ways, closed=closed, oriented=oriented, max_distance=2 * ROUND * radius)
 
 

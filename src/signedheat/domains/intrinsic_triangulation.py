@@ -30,6 +30,7 @@ from ..geometry.mollification import MARGIN, laid_out
 from ..progress import Progress, Stopwatch
 from .curves import Curve, CurveOrPoints, CurvesAndPoints
 from .display import Displayed, to_pyvista
+from .foreign import ForeignShape, converted
 from .level_sets import is_consistent, level_set
 from .segments import segments_of, segments_of_each
 from .triangle_mesh import TriangleMesh
@@ -226,7 +227,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
 
 
 def intrinsic_delaunay(
-    mesh: TriangleMesh,
+    mesh: TriangleMesh | ForeignShape,
     keep: CurvesAndPoints = (),
     refine: bool = False,
     angle: float = 28.0,
@@ -324,6 +325,7 @@ def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
 
 def triangle_mesh(domain: object) -> TriangleMesh:
     """The domain, if it is a triangle mesh; others have no intrinsic triangulation."""
+    domain = converted(domain)
     if not isinstance(domain, TriangleMesh):
         raise GeometryError(
             f"an intrinsic triangulation is made from a TriangleMesh, not from a {type(domain).__name__}",

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, UnsupportedTypeError
 from .digital_surface import DigitalSurface
+from .foreign import ForeignShape, converted
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .tet_mesh import TetMesh
@@ -16,7 +17,7 @@ from .triangle_mesh import TriangleMesh
 
 
 def transform(
-    shape: TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh, matrix: ArrayLike
+    shape: TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh | ForeignShape, matrix: ArrayLike
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
     """A shape under an affine map. Insides stay insides: faces of what is mirrored are turned over.
 
@@ -55,7 +56,7 @@ def transform(
         )
     if abs(np.linalg.det(whole[:, :3])) <= 1e-12 * np.linalg.norm(whole[:, :3]) ** 3:
         raise GeometryError("the transform flattens the shape", remedy="check the matrix", element="matrix")
-    return _transformed(shape, whole[:, :3], whole[:, 3])
+    return _transformed(converted(shape), whole[:, :3], whole[:, 3])
 
 
 @singledispatch

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoints
+from ..domains.foreign import ForeignShape, converted
 from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, SourceError
@@ -16,7 +18,7 @@ from .curve_pieces import distance_to_pieces
 
 
 def close_curves(
-    domain: SurfaceDomain,
+    domain: SurfaceDomain | ForeignShape,
     curves: CurvesAndPoints,
     *,
     diffusion: float = 1.0,
@@ -77,7 +79,7 @@ def close_curves(
 
 
 def conforming_distance(
-    domain: SurfaceDomain,
+    domain: SurfaceDomain | ForeignShape,
     curves: CurvesAndPoints,
     constraint: Constraint | None,
     diffusion: float,
@@ -96,12 +98,13 @@ def conforming_distance(
             return solver.distance(curves, constraint)
         return distance_to_pieces(solver, curves, constraint, every_piece)[0]
 
-    if isinstance(domain, TriangleMesh):
+    surface = cast("SurfaceDomain", converted(domain))
+    if isinstance(surface, TriangleMesh):
         try:
-            return measured(SignedHeatSolver(domain, diffusion, progress, intrinsic=True))
+            return measured(SignedHeatSolver(surface, diffusion, progress, intrinsic=True))
         except GeometryError:
             pass
-    return measured(SignedHeatSolver(domain, diffusion, progress))
+    return measured(SignedHeatSolver(surface, diffusion, progress))
 
 
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:

@@ -11,6 +11,7 @@ from scipy import sparse
 
 from ..discretization import discretize
 from ..domains.curves import Curve, CurveOrPoints
+from ..domains.foreign import ForeignShape, converted
 from ..domains.kinds import SurfaceDomain
 from ..errors import UnsupportedTypeError
 from ..frozen import Frozen
@@ -51,7 +52,7 @@ class CurveOrientation(Frozen, ShortRepr):
         return [curve for curve, found in zip(self.curves, self.agreement, strict=True) if found >= least]
 
 
-def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain) -> CurveOrientation:
+def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape) -> CurveOrientation:
     """Turn the pieces of broken curves so that each begins where another ends.
 
     The boundary of a region has no ends. What its pieces lack of that is measured by ``⟨q, C⁻¹ q⟩``, where q is +1 at
@@ -89,7 +90,7 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain) ->
     >>> curve_orientation(pieces, mesh).turned
     array([False,  True, False, False])
     """
-    surface = discretize(domain)
+    surface = discretize(converted(domain))
     if not isinstance(surface, SurfaceDiscretization):
         raise UnsupportedTypeError(
             f"curves are oriented on surfaces, not on a {type(domain).__name__}", element="domain"

@@ -16,9 +16,9 @@ from .orientation import orientation
 @overload
 def orient(shape: Mesh | ForeignShape) -> Mesh: ...
 @overload
-def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain) -> list[CurveOrPoints]: ...
+def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape) -> list[CurveOrPoints]: ...
 def orient(
-    shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | None = None
+    shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape | None = None
 ) -> Mesh | list[CurveOrPoints]:
     """A mesh with its faces turned so that neighbours agree and every part points outwards; or curves that agree.
 

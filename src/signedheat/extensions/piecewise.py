@@ -18,6 +18,7 @@ from scipy import sparse
 from ..diagnostics import Diagnostics, Jumps
 from ..discretization import discretize
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
+from ..domains.foreign import ForeignShape, converted
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ..domains.kinds import SurfaceDomain
 from ..domains.polygon_mesh import PolygonMesh
@@ -43,7 +44,7 @@ SOURCE_WEIGHT = 100.0
 
 
 def piecewise_distance(
-    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation,
+    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation | ForeignShape,
     sources: CurvesAndPoints,
     *,
     diffusion: float = 1.0,
@@ -106,6 +107,7 @@ def piecewise_distance(
     >>> bool(phi.cut[0].height > 4)  # nearly the length of the way round, 2π
     True
     """
+    domain = converted(domain)
     if not isinstance(domain, TriangleMesh | PolygonMesh | IntrinsicTriangulation):
         raise UnsupportedTypeError(
             "piecewise distance needs a TriangleMesh, a PolygonMesh or an IntrinsicTriangulation, not a "

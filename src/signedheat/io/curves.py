@@ -14,9 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve, CurveOrPoints, SurfacePoints
+from ..domains.digital_surface import DigitalSurface
+from ..domains.foreign import ForeignShape, converted
 from ..domains.kinds import EmbeddedSurface
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import FileFormatError, SourceError
+from ..errors import FileFormatError, SourceError, UnsupportedTypeError
 from ..geometry.geodesics.paths import gaps
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import locate_points
@@ -36,7 +40,7 @@ from .curve_readers import (
 from .files import PathLike, extension, reading, replacing, unknown_extension
 
 
-def read_curves(path: PathLike, domain: EmbeddedSurface, strict: bool = False) -> list[CurveOrPoints]:
+def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: bool = False) -> list[CurveOrPoints]:
     """Read curves and points on a surface.
 
     Parameters
@@ -77,6 +81,7 @@ def read_curves(path: PathLike, domain: EmbeddedSurface, strict: bool = False) -
     """
     if extension(path) not in READERS:
         raise unknown_extension(path, READERS, "curves")
+    domain = surface_in_space(domain)
     with reading(path):
         found = READERS[extension(path)](path, domain)
         sources = [source if isinstance(source, Curve) else placed(source, domain) for source in found]
@@ -108,7 +113,9 @@ def refuse_gaps(sources: Sequence[CurveOrPoints], mesh: TriangleMesh) -> None:
                 )
 
 
-def write_curves(path: PathLike, curves: CurveOrPoints | Sequence[CurveOrPoints], domain: EmbeddedSurface) -> None:
+def write_curves(
+    path: PathLike, curves: CurveOrPoints | Sequence[CurveOrPoints], domain: EmbeddedSurface | ForeignShape
+) -> None:
     """Write curves and points on a surface, in the format given by the extension.
 
     ``.txt`` (the published demo's format) and ``.json`` keep everything except given normals, exactly; ``.obj`` has
@@ -131,9 +138,17 @@ def write_curves(path: PathLike, curves: CurveOrPoints | Sequence[CurveOrPoints]
     if extension(path) not in WRITERS:
         raise unknown_extension(path, WRITERS, "curves")
     listed = [curves] if isinstance(curves, (Curve, SurfacePoints)) else list(curves)
-    content = WRITERS[extension(path)](listed, domain)
+    content = WRITERS[extension(path)](listed, surface_in_space(domain))
     with replacing(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
+
+
+def surface_in_space(domain: EmbeddedSurface | ForeignShape) -> EmbeddedSurface:
+    """The surface that an object of another package stands for; a surface as it is."""
+    shape = converted(domain)
+    if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface):
+        raise UnsupportedTypeError(f"curves lie on surfaces, not on a {type(shape).__name__}", element="domain")
+    return shape
 
 
 def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve
+from ..domains.foreign import ForeignShape, converted
 from ..domains.globe import globe_curve
+from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from .files import PathLike, extension, reading, text, unknown_extension
@@ -21,7 +23,7 @@ Line = tuple[NDArray[np.float64], bool]
 """Longitudes and latitudes in degrees, and whether the last point is joined to the first."""
 
 
-def read_globe_curves(path: PathLike, mesh: TriangleMesh) -> list[Curve]:
+def read_globe_curves(path: PathLike, mesh: TriangleMesh | PolygonMesh | ForeignShape) -> list[Curve]:
     """Read curves in longitude and latitude, along great circles of a globe.
 
     Parameters
@@ -30,7 +32,7 @@ def read_globe_curves(path: PathLike, mesh: TriangleMesh) -> list[Curve]:
         ``.csv`` with longitude and latitude on each line and an empty line between curves, closed where the last point
         is the first; or GeoJSON (``.geojson``, ``.json``): lines and the rings of polygons, in whatever collection.
         What polygons enclose is left of their rings, where φ is positive.
-    mesh : TriangleMesh
+    mesh : TriangleMesh or PolygonMesh
         The globe.
 
     Returns
@@ -45,6 +47,7 @@ def read_globe_curves(path: PathLike, mesh: TriangleMesh) -> list[Curve]:
     SourceError
         If a point is out of range, two in succession are opposite each other, or the mesh is no globe.
     """
+    mesh = converted(mesh)
     if extension(path) not in GLOBE_FORMATS:
         raise unknown_extension(path, GLOBE_FORMATS, "curves on a globe")
     with reading(path):

@@ -113,6 +113,9 @@ def from_meshio(kind: type | None, thing: Any) -> Any:
     if not blocks and any(block.type == "tetra" for block in thing.cells):
         tets = TetMesh.from_meshio(thing)
         return tets if kind is None or kind is TetMesh else _of_kind(kind, tets.boundary)
+    others = [block.type for block in thing.cells if block.type != "vertex"]
+    if not blocks and others and kind is not PointCloud:
+        raise _no_shape(thing, "one of faces, tets or points", f"extract the surface of its cells of type {others[0]}")
     corners = [np.asarray(face, dtype=np.int64) for block in blocks for face in block]
     counts = np.array([len(face) for face in corners], dtype=np.int64)
     flat = np.concatenate(corners) if corners else np.empty(0, dtype=np.int64)

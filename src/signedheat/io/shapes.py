@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from ..domains.digital_surface import DigitalSurface
 from ..domains.exchange import save_shape
+from ..domains.foreign import ForeignShape, as_shape
 from ..domains.kinds import Shape
 from ..domains.tet_mesh import TetMesh
 from .elements import SurfaceShape
@@ -93,7 +94,7 @@ def read(path: PathLike) -> Shape:
         return reader(path)
 
 
-def save(shape: Shape, path: PathLike) -> None:
+def save(shape: Shape | ForeignShape, path: PathLike) -> None:
     """Write a shape, in the format given by the extension.
 
     OBJ, OFF, PLY, VTP, XYZ and PC keep every bit of the coordinates; STL has single precision. The file is written
@@ -110,7 +111,10 @@ def save(shape: Shape, path: PathLike) -> None:
     ------
     FileFormatError
         If the format is unknown, does not support this kind of shape, or the file cannot be written.
+    UnsupportedTypeError
+        If it is no shape.
     """
+    shape = as_shape(shape)
     if isinstance(shape, TetMesh):
         return write_tets(shape, path)
     writer = WRITERS.get(extension(path))

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..domains.digital_surface import DigitalSurface
 from ..domains.display import html_of
+from ..domains.foreign import converted
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -67,7 +68,8 @@ def _small_png(figure: Any) -> bytes:
 @singledispatch
 def draw(thing: Any, axes: Any, **options: Any) -> bool:
     """Draw something into axes, with the options of `save_row`; whether there was anything to draw."""
-    return False
+    shape = converted(thing)
+    return shape is not thing and draw(shape, axes, **options)
 
 
 @draw.register(TriangleMesh)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..domains.digital_surface import DigitalSurface
+from ..domains.foreign import converted
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -78,6 +79,8 @@ def save_page(thing: object, path: PathLike, title: str | None = None, up: int =
 @singledispatch
 def shown(thing: Any) -> dict[str, Any]:
     """What the page is given: a volume or a mesh, its box, its range of values."""
+    if (shape := converted(thing)) is not thing:
+        return shown(shape)
     raise UnsupportedTypeError(
         f"there is no page for a {type(thing).__name__}",
         remedy="pass a shape in space or a field",

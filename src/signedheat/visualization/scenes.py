@@ -6,8 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..domains.digital_surface import DigitalSurface
+from ..domains.foreign import ForeignShape, as_shape
+from ..domains.kinds import Shape
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
+from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..io.files import PathLike
 from .figures import ensure_picture_writable, new_figure, write_figure
@@ -21,13 +25,15 @@ MOST_POINTS = 200_000
 """Of larger clouds an even subset is drawn."""
 
 
-def save_scene(shape: TriangleMesh | PolygonMesh | PointCloud, path: PathLike, up: int = 2) -> None:
+def save_scene(shape: Shape | ForeignShape, path: PathLike, up: int = 2) -> None:
     """Write a picture of a shape seen obliquely from above, with axis `up` pointing up.
 
     Raises
     ------
     FileFormatError
         If the picture cannot be written.
+    UnsupportedTypeError
+        If it is no shape.
     """
     ensure_picture_writable(path)
     figure = new_figure(7, 6)
@@ -35,10 +41,9 @@ def save_scene(shape: TriangleMesh | PolygonMesh | PointCloud, path: PathLike, u
     write_figure(figure, path)
 
 
-def draw_shape(
-    shape: TriangleMesh | PolygonMesh | PointCloud, axes: Axes, view: tuple[float, float] = (18, -58), up: int = 2
-) -> None:
+def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float] = (18, -58), up: int = 2) -> None:
     """Draw a shape into axes, seen from an elevation and an azimuth in degrees."""
+    shape = outside_of(shape)
     direction = oblique(*view, up)
     axes.set_axis_off()
     if isinstance(shape, PointCloud):
@@ -56,6 +61,14 @@ def draw_shape(
     outwards = mesh.face_area_vectors @ camera.frame[2] > 0
     colors = np.where(outwards[:, None], OUTSIDE, INSIDE) * camera.shades(mesh.face_area_vectors)[:, None]
     axes.imshow(np.where((face >= 0)[..., None], colors[face], 1.0), origin="lower", interpolation="antialiased")
+
+
+def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | PointCloud:
+    """What is seen of a shape of any kind: of voxels and tets, the boundary."""
+    own = as_shape(shape)
+    if isinstance(own, DigitalSurface):
+        return own.squares
+    return own.boundary if isinstance(own, TetMesh) else own
 
 
 def triangulated(mesh: Any) -> TriangleMesh:

@@ -19,7 +19,7 @@ from ..io.files import PathLike
 from ..packages import lazy_module
 from .colors import add_color_bar, distance_colors, isolines_between
 from .figures import ensure_picture_writable, new_figure, write_figure
-from .scenes import triangulated
+from .scenes import outside_of, triangulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +43,7 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
         A field in two or three dimensions.
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
-    shape : TriangleMesh, PolygonMesh or PointCloud, optional
+    shape : a shape, optional
         The source of the field. In the plane, a `Polyline` or a sequence of them.
     levels : sequence of float
         Further levels to draw, with heavier lines than the isolines.
@@ -217,7 +217,8 @@ def cross_section(mesh: TriangleMesh, axis: int, position: float) -> NDArray[np.
     return np.delete(np.stack(ends, axis=1), axis, axis=2)
 
 
-def _draw_section(panel: Axes, shape: Any, axis: int, position: float, spacing: float) -> None:
+def _draw_section(panel: Axes, given: Any, axis: int, position: float, spacing: float) -> None:
+    shape = None if given is None else outside_of(given)
     if isinstance(shape, PointCloud):
         near = shape.points[np.abs(shape.points[:, axis] - position) < spacing]
         panel.scatter(*np.delete(near, axis, axis=1).T, s=3, c="#d4145a", linewidths=0, zorder=3)
