@@ -57,11 +57,11 @@ def main() -> None:
     kept = Path(arguments.errors) if arguments.errors else None
     errors = study(arguments.seeds, arguments.meshes, kept, shown)
     ways = list(dict.fromkeys(way for _, way in errors))
-    print(f"{'median / worst, %':>18}" + "".join(f"{way:>18}" for way in ways))
+    print(f"{'median / worst, %':>18}" + "".join(f"{way:>22}" for way in ways))
     for damage in DAMAGES:
         row = ""
         for way in ways:
-            row += f"{told(errors[damage, way]):>18}"
+            row += f"{told(errors[damage, way]):>22}"
         print(f"{damage:>18}{row}")
     if arguments.picture:
         draw(shown, arguments.picture)
@@ -99,7 +99,8 @@ def study(
 def told(found: list[float]) -> str:
     """Median and worst, and how many failed."""
     failed = int(np.isnan(found).sum())
-    return f"{np.nanmedian(found):.2f} / {np.nanmax(found):.2f}" + (f" ({failed})" if failed else "")
+    worst = np.nanmax(found)
+    return f"{np.nanmedian(found):.2f} / {worst:,.{2 if worst < 100 else 0}f}" + (f" ({failed})" if failed else "")
 
 
 def answers(mesh, solver, peer, pieces) -> dict[str, np.ndarray]:
