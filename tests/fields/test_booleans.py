@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 
 GRID = sh.Grid((-2, -1.5, -1.5), 0.1, (41, 31, 31))
@@ -113,3 +114,11 @@ def test_fields_of_different_domains_are_refused():
 def test_equal_grids_made_twice_are_one_domain():
     again = sh.GridField(sh.Grid((-2, -1.5, -1.5), 0.1, (41, 31, 31)), B.values)
     assert np.array_equal((A | again).values, (A | B).values)
+
+
+def test_bands_and_whole_grids_are_not_combined_and_the_remedy_works():
+    band = sh.solid_distance(samples.sphere(2), GRID, band=0.2)
+    for wrong in (lambda: band | band, lambda: ~band, lambda: band - A, lambda: A & band):
+        with refused(sh.UnsupportedTypeError, "BandField"):
+            wrong()
+    assert (sh.solid_distance(samples.sphere(2), GRID) | A)([[-1.4, 0.0, 0.0]])[0] < 0

@@ -112,6 +112,16 @@ def test_fields_go_to_pyvista_with_their_values(name):
     assert len(values) == thing.n_points
 
 
+def test_confidence_goes_to_pyvista():
+    pyvista = pytest.importorskip("pyvista")
+    sdf = sh.solid_distance(samples.without_patches(BALL, 1, 0.8), GRID)
+    image = sdf.to_pyvista()
+    places = np.array([[-1.1, 0.1, 0.3], [0.5, 0.9, 0.1], [0.1, -0.3, 0.9]])
+    sampled = pyvista.PolyData(places).sample(image)
+    np.testing.assert_allclose(sampled["confidence"], sdf.confidence_at(places), atol=1e-5)
+    assert image.active_scalars_name == "signed_distance" and sdf.confidence.min() < 1
+
+
 def test_grids_go_to_pyvista_with_their_walls():
     pytest.importorskip("pyvista")
     walls = BARE["walls"]()

@@ -19,6 +19,7 @@ from ..operators.grid.block_contours import block_contour
 from ..operators.grid.blocks import NODES, SIDE, Blocks
 from ..operators.grid.exact_surface import ExactSurface
 from ..parallel import in_chunks
+from .booleans import Combinable
 from .closest_points import ClosestPoints, closest_points
 from .files import save_field
 from .grid_field import GridField
@@ -31,11 +32,11 @@ TOGETHER = 4096
 
 
 @dataclass(frozen=True, eq=False)
-class BandField(Displayed):
+class BandField(Displayed, Combinable):
     """Signed distance at the nodes of a fine grid that are near a surface, and at those of a coarse grid elsewhere.
 
-    Nodes come in blocks of 8³, where at least one node is within the band. Everything a `GridField` does works alike:
-    fine in the band, coarse beyond.
+    Nodes come in blocks of 8³, where at least one node is within the band. Everything a `GridField` does works alike,
+    fine in the band, coarse beyond; but bands are not combined by ``|``, ``&``, ``-`` and ``~``.
 
     Parameters
     ----------

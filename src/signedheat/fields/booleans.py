@@ -62,7 +62,7 @@ class Combinable:
 
     def __invert__(self: Solid) -> Solid:
         """Complement: inside and outside exchanged."""
-        return complement(self)
+        return complement(_checked(self, self))
 
 
 def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
@@ -145,9 +145,15 @@ def combined(
 
 def _checked(a: Solid, b: Solid) -> Solid:
     """The second field, if it can be combined with the first."""
+    if not (hasattr(a, "with_values") and hasattr(a, "domain")):
+        raise UnsupportedTypeError(
+            f"fields of type {type(a).__name__} are not combined",
+            remedy="compute both on one whole grid, without a band",
+            element=type(a).__name__,
+        )
     if type(a) is not type(b):
         raise UnsupportedTypeError(
-            f"a {type(a).__name__} cannot be combined with a {type(b).__name__}",
+            f"a field of type {type(a).__name__} cannot be combined with {type(b).__name__}",
             remedy="combine fields on one domain",
             element=type(b).__name__,
         )

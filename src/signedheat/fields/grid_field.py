@@ -255,7 +255,10 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return GridField(self.grid, values)
 
     def to_pyvista(self) -> pyvista.ImageData:
-        """As a `pyvista.ImageData` with point data ``signed_distance``; a field in the plane has z = 0."""
+        """As a `pyvista.ImageData` with point data ``signed_distance``, and ``confidence`` where there is one.
+
+        A field in the plane has z = 0.
+        """
         made: pyvista.ImageData = to_pyvista(self)
         return made
 

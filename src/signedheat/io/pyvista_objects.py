@@ -80,7 +80,10 @@ def _(grid: Grid) -> Any:
 
 @as_pyvista.register
 def _(field: GridField) -> Any:
-    return _with_values(as_pyvista(field.grid), field.values.ravel(order="F"))
+    image = as_pyvista(field.grid)
+    if field.confidence is not None:
+        image.point_data["confidence"] = field.confidence.ravel(order="F")
+    return _with_values(image, field.values.ravel(order="F"))
 
 
 @as_pyvista.register
