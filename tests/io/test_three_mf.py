@@ -86,6 +86,8 @@ def test_units_on_the_command_line(tmp_path, ball, capsys):
     output = tmp_path / "grown.ply"
     assert main(["offset", str(path), "5", "-o", str(output), "--units", "mm", "--resolution", "32", "--quiet"]) == 0
     assert np.linalg.norm(sh.read(output).vertices, axis=1).mean() == pytest.approx(25.4 + 5, rel=0.01)
+    assert main(["info", str(path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["units"] == "inch"
     ball.save(tmp_path / "ball.stl")
     arguments = ["offset", str(tmp_path / "ball.stl"), "5", "-o", str(output), "--resolution", "32"]
     assert main([*arguments, "--units", "mm"]) == 1

@@ -56,12 +56,12 @@ def _run(argv: Sequence[str] | None) -> int:
         arguments.check(arguments)
     import_module("signedheat.public")
     import_module("signedheat.compiled").announce.is_wanted = not (arguments.quiet or arguments.json)
-    with import_module(f"{__name__}.standard").standard_files(arguments) as is_taken:
+    with import_module(f"{__name__}.standard").standard_files(arguments) as standard:
         summary, text = import_module(f"{__name__}.{arguments.command}").run(arguments)
-    if arguments.json and not is_taken:
-        tell(json.dumps(summary))
-    elif text and not (arguments.quiet or is_taken):
-        tell(text)
+    if arguments.json and not standard.takes_output:
+        tell(standard.named(json.dumps(summary)))
+    elif text and not (arguments.quiet or standard.takes_output):
+        tell(standard.named(text))
     return FAILED if summary.get("failed") else 0  # of many, some
 
 

@@ -18,6 +18,7 @@ from ..io import read, read_curves, read_polylines
 from ..io.files import extension
 from ..io.labels import LabelImage
 from ..io.obj import read_obj_lines
+from ..io.three_mf import unit_of
 from ..lowering.area_elements import bounds_around
 from ..lowering.grid.discretization import fitting_spacing, memory_estimate
 from ..memory import available_memory
@@ -59,6 +60,8 @@ def report(file: str, arguments: Namespace) -> Summary:
         return lines_report(file)
     shape = read(file)
     summary = {"file": file, "kind": type(shape).__name__, **asdict(inspect(shape))}
+    if (unit := unit_of(file)) is not None:
+        summary["units"] = unit
     if extension(file) == ".obj":
         summary["line_elements"] = len(read_obj_lines(file)[1])
     rows = dict(summary)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 import tempfile
 from argparse import Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +26,31 @@ STARTS: tuple[tuple[bytes, str], ...] = (
 """What files of a format begin with."""
 
 
+@dataclass(frozen=True)
+class StandardFiles:
+    """What became of ``-`` among the arguments.
+
+    Attributes
+    ----------
+    takes_output : bool
+        Whether standard output is for what is made.
+    names : dict
+        By the path of a file that stands for it, what to call it.
+    """
+
+    takes_output: bool = False
+    names: Mapping[str, str] = field(default_factory=dict)
+
+    def named(self, text: str) -> str:
+        """A text that calls standard input what it is."""
+        for path, name in self.names.items():
+            text = text.replace(path, name)
+        return text
+
+
 @contextmanager
-def standard_files(arguments: Namespace) -> Iterator[bool]:
-    """Put files in place of ``-`` among the arguments, and write what was made; yields whether that takes the output.
+def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
+    """Put files in place of ``-`` among the arguments, and write what was made.
 
     Raises
     ------
@@ -38,7 +61,7 @@ def standard_files(arguments: Namespace) -> Iterator[bool]:
     output = getattr(arguments, "output", None) == "-"
     listed = getattr(arguments, "files", []) == ["-"]
     if not (inputs or listed or output):
-        yield False
+        yield StandardFiles()
         return
     with tempfile.TemporaryDirectory(prefix="signedheat-") as folder:
         names = {}
@@ -55,7 +78,7 @@ def standard_files(arguments: Namespace) -> Iterator[bool]:
         if target is not None:
             arguments.output = str(target)
         try:
-            yield output
+            yield StandardFiles(output, names)
         except SignedHeatError as error:
             if error.path in names:
                 raise error.at(names[error.path]) from error
