@@ -130,12 +130,14 @@ def assemble(
         edges, crossings = np.concatenate([edges, nodes]), np.concatenate([crossings, rows])
     nearby = sampled_surface(features, band, edges, crossings, steps)
     telling, telling_faces = (None, None) if tells is None else _telling(tells, features, band, len(crossings), steps)
-    trees = [FaceTree.of(whole)] if len(crossings) and n_faces else []
+    surface = ExactSurface(features, crossings, np.array(grid.origin), steps, telling_faces, nearby.nearest)
+    trees = []
+    if len(crossings) and n_faces:
+        trees = [surface.tree if whole is features else FaceTree.of(whole)]
     points = [cloud.points - grid.origin for cloud in clouds]
     trusted = confidence_at(np.ascontiguousarray(crossings[:, 1:4]), trees, points, gaps)
     inside = sides < 0
     values, confidence = signed_distances(nearby, inside, trusted, telling)
-    surface = ExactSurface(features, crossings, np.array(grid.origin), steps, telling_faces, nearby.nearest)
     _unfold(values, inside, surface)
     share = float(left_out.mean()) if n_faces else 0.0
     return Assembled(values, confidence, surface, share, completed)

@@ -60,6 +60,8 @@ BESIDE = 2.5
 """Cells from faces within which a hole is beside them."""
 SLOPE = 4.0
 """Cells that a winding number of one is worth beside φ."""
+ROOM = 6
+"""Nodes around all that may be inside that what is computed there can depend on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,10 +168,13 @@ def choose_sides(
     next to nothing where many faces are open sheets. Other regions are looked at again above w = .6, .75, .9, so that
     closed legs stay solid below an open board.
     """
-    shape = (1,) * (3 - phi.ndim) + phi.shape
-    steps = np.ones(3)
+    box, first = _box_of_sides(phi, winding, positions)
+    steps, part = np.ones(3), phi[box]
     steps[3 - phi.ndim :] = spacing
-    scene = _scene(phi, winding, distance, positions, vectors, rims, shape, steps)
+    shape = (1,) * (3 - phi.ndim) + part.shape
+    if rims is not None:
+        rims = replace(rims, places=rims.places - first * spacing)
+    scene = _scene(part, winding[box], distance[box], positions - first, vectors, rims, shape, steps)
     bodies, function, present = _bodies(scene)
     _fill_missing_sides(scene, rims, bodies, present, function)
     inside = function < 0
@@ -177,16 +182,36 @@ def choose_sides(
     bounding = sides[scene.back] != sides[scene.front]
     total = float(scene.areas.sum())
     loose = 1.0 - float(scene.areas[bounding].sum()) / total if total > 0 else 1.0
-    on_walls = np.concatenate([side.ravel() for side in walls(inside.reshape(phi.shape))])
+    completed = _completed(scene, inside, function, np.asarray(origin) + first * spacing)
+    nowhere = np.zeros(phi.shape, dtype=bool)
+    everywhere = nowhere.copy(), np.array(phi), nowhere
+    everywhere[0][box] = inside.reshape(part.shape)
+    everywhere[1][box] = function.reshape(part.shape)
+    everywhere[2][box] = ((scene.guarded() < 0) & ~inside).reshape(part.shape)
+    on_walls = np.concatenate([side.ravel() for side in walls(everywhere[0])])
     return Sides(
-        inside.reshape(phi.shape),
-        function.reshape(phi.shape),
-        ((scene.guarded() < 0) & ~inside).reshape(phi.shape),
+        *everywhere,
         scene.trust == 0.0,
-        _completed(scene, inside, function, np.asarray(origin)),
+        completed,
         ReachesBox(float(on_walls.mean())) if on_walls.any() else None,
         BoundsNothing(loose) if loose > 0.5 else None,
     )
+
+
+def _box_of_sides(
+    phi: NDArray[np.float64], winding: NDArray[np.float64], positions: NDArray[np.float64]
+) -> tuple[tuple[slice, ...], NDArray[np.int64]]:
+    """The part of a grid that holds all faces and all that may be inside, with room around it; and its first node."""
+    upper = np.array(phi.shape) - 1
+    low, high = (np.clip(f(positions, axis=0), 0, upper) for f in (np.min, np.max))
+    candidates = (phi < 0) | (winding > 0.5)
+    for axis, n in enumerate(phi.shape):
+        layers = np.flatnonzero(candidates.reshape(int(np.prod(phi.shape[:axis])), n, -1).any(axis=(0, 2)))
+        if len(layers):
+            low[axis], high[axis] = min(low[axis], layers[0]), max(high[axis], layers[-1])
+    first = np.maximum(np.floor(low).astype(np.int64) - ROOM, 0)
+    last = np.minimum(np.ceil(high).astype(np.int64) + ROOM, upper)
+    return tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True)), first
 
 
 def nothing_inside(shape: tuple[int, ...]) -> Sides:

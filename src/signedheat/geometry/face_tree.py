@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import compiled
 from ..parallel import n_threads
 from .box_tree import LEAF, BoxTree
 from .face_features import FaceFeatures
@@ -47,9 +48,10 @@ class FaceTree:
 
     @classmethod
     def of(cls, features: FaceFeatures) -> FaceTree:
-        """The tree of some faces, of which there is at least one."""
+        """The tree of some faces, of which there is at least one; their order is one along a curve through space."""
         triangles = features.corners.reshape(-1, 3, 3)
-        return cls(features, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
+        lower, upper = triangles.min(axis=1), triangles.max(axis=1)
+        return cls(features, BoxTree.in_order(lower, upper, np.arange(len(triangles))))
 
     @cached_property
     def discs(self) -> NDArray[np.float64]:
@@ -57,7 +59,8 @@ class FaceTree:
 
         Thickness is negative where there is no disc, or none that is flat.
         """
-        return _discs(self.features.corners.reshape(-1, 3, 3), self.tree)
+        discs: NDArray[np.float64] = _discs(self.features.corners, self.tree.bounds, self.tree.items)
+        return discs
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) distance of each of (n, 3) points to the nearest face."""
@@ -89,43 +92,42 @@ def _on_threads(part: Callable[[int], None], starts: range) -> None:
             job.result()
 
 
-def _discs(triangles: NDArray[np.float64], tree: BoxTree) -> NDArray[np.float64]:
+@compiled(nogil=True, error_model="numpy")
+def _discs(corners: NDArray[np.float64], bounds: NDArray[np.float64], items: NDArray[np.int64]) -> NDArray[np.float64]:
     """See `FaceTree.discs`; corners of faces stand for them, which is enough, since discs are convex."""
-    leaves = len(tree.bounds) // 2
+    leaves = len(bounds) // 2
     discs = np.full((2 * leaves, 8), -1.0)
-    grouped = tree.items.reshape(leaves, LEAF)
-    filled = np.where(grouped < 0, np.maximum(grouped[:, :1], 0), grouped)  # an empty place repeats the first
-    sides = triangles[:, 1:] - triangles[:, :1]
-    areas = np.cross(sides[:, 0], sides[:, 1])
-    areas = np.where((grouped < 0)[..., None], 0.0, areas[filled])
-    level = leaves
-    for _ in range(DISC_LEVELS):
-        below = len(filled) // level
-        normals = areas.reshape(level, -1, 3).sum(axis=1)
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        normals /= np.where(lengths > 0, lengths, 1.0)
-        with np.errstate(invalid="ignore"):  # of nothing
-            centres = 0.5 * (tree.bounds[level : 2 * level, :3] + tree.bounds[level : 2 * level, 3:])
-        some = np.isfinite(centres).all(axis=1)
-        radius, low, high = np.zeros(level), np.full(level, np.inf), np.full(level, -np.inf)
-        for k in range(below):
-            for each in range(LEAF):
-                for corner in range(3):
-                    away = triangles[filled.reshape(level, below, LEAF)[:, k, each], corner] - centres
-                    along = np.einsum("ij,ij->i", away, normals)
-                    np.maximum(high, along, out=high)
-                    np.minimum(low, along, out=low)
-                    square = np.einsum("ij,ij->i", away, away) - along**2
-                    np.maximum(radius, square, out=radius, where=some)
-        radius, thickness = np.sqrt(np.maximum(radius, 0.0)), 0.5 * (high - low)
-        centres += 0.5 * (high + low)[:, None] * normals
-        flat = some & (lengths[:, 0] > 0) & (thickness < FLAT * radius)
-        rows = level + np.flatnonzero(flat)
-        slack = 1.0 + 1e-9  # lest rounding makes a disc too small
-        discs[rows, :3], discs[rows, 3:6] = centres[flat], normals[flat]
-        discs[rows, 6] = radius[flat] * slack
-        discs[rows, 7] = thickness[flat] * slack + 1e-12 * radius[flat]
-        level //= 2
-        if level == 0:
-            break
+    first = max(1, leaves >> (DISC_LEVELS - 1))
+    below = LEAF * leaves // first
+    for node in range(first, 2 * leaves):
+        if node == 2 * first:
+            first, below = node, below // 2
+        begin = (node - first) * below
+        nx, ny, nz = 0.0, 0.0, 0.0
+        for at in range(begin, begin + below):
+            if items[at] >= 0:
+                f = items[at]
+                ax, ay, az = corners[f, 3] - corners[f, 0], corners[f, 4] - corners[f, 1], corners[f, 5] - corners[f, 2]
+                bx, by, bz = corners[f, 6] - corners[f, 0], corners[f, 7] - corners[f, 1], corners[f, 8] - corners[f, 2]
+                nx, ny, nz = nx + ay * bz - az * by, ny + az * bx - ax * bz, nz + ax * by - ay * bx
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        if not length > 0.0:
+            continue
+        nx, ny, nz = nx / length, ny / length, nz / length
+        x, y = 0.5 * (bounds[node, 0] + bounds[node, 3]), 0.5 * (bounds[node, 1] + bounds[node, 4])
+        z = 0.5 * (bounds[node, 2] + bounds[node, 5])
+        square, low, high = 0.0, np.inf, -np.inf
+        for at in range(begin, begin + below):
+            if items[at] >= 0:
+                for c in range(0, 9, 3):
+                    ax, ay, az = corners[items[at], c] - x, corners[items[at], c + 1] - y, corners[items[at], c + 2] - z
+                    along = ax * nx + ay * ny + az * nz
+                    low, high = min(low, along), max(high, along)
+                    square = max(square, ax * ax + ay * ay + az * az - along * along)
+        radius, thickness, middle = np.sqrt(square), 0.5 * (high - low), 0.5 * (high + low)
+        if thickness < FLAT * radius:
+            slack = 1.0 + 1e-9  # lest rounding makes a disc too small
+            discs[node, 0], discs[node, 1], discs[node, 2] = x + middle * nx, y + middle * ny, z + middle * nz
+            discs[node, 3], discs[node, 4], discs[node, 5] = nx, ny, nz
+            discs[node, 6], discs[node, 7] = radius * slack, thickness * slack + 1e-12 * radius
     return discs
