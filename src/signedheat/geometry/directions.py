@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..parallel import n_threads
 
 
 def unit(vectors: NDArray[Any]) -> NDArray[Any]:
@@ -25,12 +28,20 @@ def unit(vectors: NDArray[Any]) -> NDArray[Any]:
         length = np.abs(vectors)  # np.abs of complex numbers neither overflows nor underflows
         return vectors / np.where(length > 0, length, 1)
     result = np.empty_like(vectors)
-    for block in _blocks(vectors.shape):
+
+    def scale(block: Any) -> None:
         part = vectors[block]
         largest = np.abs(part).max(axis=-1, keepdims=True)
         scaled = part / np.where(largest > 0, largest, 1)
         length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
         np.divide(scaled, np.where(length > 0, length, 1), out=result[block])
+
+    blocks = _blocks(vectors.shape)
+    if len(blocks) == 1:
+        scale(blocks[0])
+    else:
+        with ThreadPoolExecutor(n_threads()) as pool:
+            list(pool.map(scale, blocks))
     return result
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from .stencil import by_slabs
 
 DISK = 0.6
 """Radius, in cells, of the disk that a sample stands for."""
@@ -256,7 +257,7 @@ def distances_to_samples(
     A sample stands for a disk of `DISK` cells around its place, (s, 3) in cells, across its vector.
     """
     result = np.full(shape, reach, dtype=np.float32)
-    _distances_to_samples(positions, vectors, steps, reach, DISK * float(steps.max()), result)
+    by_slabs(shape, _distances_to_samples, positions, vectors, steps, reach, DISK * float(steps.max()), result)
     return result
 
 
@@ -268,7 +269,11 @@ def _distances_to_samples(
     reach: float,
     disk: float,
     result: NDArray[np.float32],
+    axis: int,
+    start: int,
+    stop: int,
 ) -> None:
+    """To the nodes from `start` to `stop` along an axis."""
     low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for s in range(len(positions)):
         length = 0.0
@@ -278,6 +283,7 @@ def _distances_to_samples(
             low[d] = max(0, int(np.ceil(positions[s, d] - span)))
             high[d] = min(result.shape[d] - 1, int(np.floor(positions[s, d] + span)))
         length = np.sqrt(length)
+        low[axis], high[axis] = max(low[axis], start), min(high[axis], stop - 1)
         for i in range(low[0], high[0] + 1):
             x = (i - positions[s, 0]) * steps[0]
             for j in range(low[1], high[1] + 1):

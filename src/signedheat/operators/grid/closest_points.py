@@ -7,13 +7,16 @@ components, of which the first ones are unused in fewer dimensions.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
 from ...errors import OutsideError
-from .stencil import by_slabs
-from .wavefront import padded_shape, sweep_lines
+from ...parallel import n_threads
+from .stencil import SLAB, by_slabs
+from .wavefront import SMALL, padded_shape, sweep_lines
 
 
 def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -52,17 +55,38 @@ def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float6
     return result.reshape(values.shape)
 
 
-@compiled(nogil=True)
-def crossed_edges(field):
+def crossed_edges(field: NDArray[np.float64]) -> NDArray[np.int32]:
     """(e, 5) node (4 indices) and axis of each edge whose two ends have different signs; zero counts as positive."""
+    axis = 0 if field.shape[0] > 1 else 1
+    n = field.shape[axis]
+    if field.size < SMALL:
+        edges: NDArray[np.int32] = _crossed_edges(field, axis, 0, n)
+        return edges
+    with ThreadPoolExecutor(n_threads()) as pool:
+        starts = range(0, n, SLAB)
+        jobs = [pool.submit(_crossed_edges, field, axis, start, min(start + SLAB, n)) for start in starts]
+    return np.concatenate([job.result() for job in jobs])
+
+
+@compiled(nogil=True)
+def _crossed_edges(field, axis, start, stop):
+    """Those of the nodes from `start` to `stop` along an axis, to nodes behind them."""
     n0, n1, n2, n3 = field.shape
-    capacity, count = 4096, 0
+    capacity, count = 1024, 0
     edges = np.empty((capacity, 5), dtype=np.int32)
-    for i in range(n0):
-        for j in range(n1):
+    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
+        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
             for k in range(n2):
+                line = field[i, j, k]
+                next0 = field[min(i + 1, n0 - 1), j, k]
+                next1 = field[i, min(j + 1, n1 - 1), k]
+                next2 = field[i, j, min(k + 1, n2 - 1)]
                 for m in range(n3):
-                    sign = field[i, j, k, m] >= 0
+                    sign = line[m] >= 0
+                    same0, same1, same2 = (next0[m] >= 0) == sign, (next1[m] >= 0) == sign, (next2[m] >= 0) == sign
+                    same3 = (line[min(m + 1, n3 - 1)] >= 0) == sign
+                    if same0 and same1 and same2 and same3:
+                        continue
                     if count + 4 > capacity:
                         grown = np.empty((2 * capacity, 5), dtype=np.int32)
                         for e in range(count):
@@ -70,19 +94,10 @@ def crossed_edges(field):
                                 grown[e, d] = edges[e, d]
                         edges = grown
                         capacity *= 2
-                    for axis in range(4):
-                        a, b, c, d = i, j, k, m
-                        if axis == 0:
-                            a += 1
-                        elif axis == 1:
-                            b += 1
-                        elif axis == 2:
-                            c += 1
-                        else:
-                            d += 1
-                        if a < n0 and b < n1 and c < n2 and d < n3 and (field[a, b, c, d] >= 0) != sign:
+                    for across, same in enumerate((same0, same1, same2, same3)):
+                        if not same:
                             edges[count, 0], edges[count, 1], edges[count, 2], edges[count, 3] = i, j, k, m
-                            edges[count, 4] = axis
+                            edges[count, 4] = across
                             count += 1
     return edges[:count]
 

@@ -7,10 +7,13 @@ walls of the box, the far field of its area vectors tells.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from ...parallel import n_threads
 from .node_sources import STRETCH, NodeSources
 from .stencil import divergence, solve_poisson
 
@@ -49,21 +52,25 @@ def winding_numbers(
     dimension = len(shape)
     spacing = nodes.steps[4 - dimension :]
     volume = float(np.prod(spacing))
-    dense = dense_vectors(nodes)[..., :dimension].reshape(*shape, dimension)
-    room = _room(dense)
+    room = _room(nodes, dimension)
     inner = tuple(slice(below, below + n) for (below, _), n in zip(room, shape, strict=True))
+    dense = dense_vectors(nodes, dimension, room)
     if any(sum(room, ())):
-        dense = np.pad(dense, [*room, (0, 0)])
-        shape, positions = dense.shape[:-1], positions + [below for below, _ in room]
-    right = divergence(dense, spacing)
+        shape, positions = dense.shape[1:], positions + [below for below, _ in room]
+    right = divergence(np.moveaxis(dense, 0, -1), spacing)
     del dense
     right *= -(volume ** ((dimension - 1) / dimension)) / volume
     dipoles, strengths = blocks_of_dipoles(positions, vectors, dimension)
     walls = [_wall(axis, end, shape) for axis in range(dimension) for end in (0, 1)]
+    core = CORE * float(spacing.max())
+    with ThreadPoolExecutor(n_threads()) as pool:
+        jobs = [
+            pool.submit(_far_field, lattice.reshape(-1, dimension) * spacing, dipoles * spacing, strengths, axis, core)
+            for axis, _, lattice in walls
+        ]
     fields = []
-    for axis, end, lattice in walls:
-        at = lattice.reshape(-1, dimension) * spacing
-        w, flux = _far_field(at, dipoles * spacing, strengths, axis, CORE * float(spacing.max()))
+    for (axis, end, lattice), job in zip(walls, jobs, strict=True):
+        w, flux = job.result()
         flux = _refined(flux.reshape(lattice.shape[:-1]), shape, axis) / spacing[axis]
         layer = np.moveaxis(right, axis, 0)[-1 if end else 0]
         layer += flux if end else -flux
@@ -76,13 +83,17 @@ def winding_numbers(
     return result[inner]
 
 
-def _room(vectors: NDArray[np.float32]) -> list[tuple[int, int]]:
+def _room(nodes: NodeSources, dimension: int) -> list[tuple[int, int]]:
     """Layers of nodes to add before and behind along each axis, so that no vectors are close to the walls."""
-    touched = np.logical_or.reduce(vectors != 0, axis=-1)
+    taken = np.argwhere(nodes.places >= 0)
+    touched = (nodes.sums[nodes.places[tuple(taken.T)]] != 0).any(axis=2)
+    rows, m = np.nonzero(touched)
+    taken = taken[rows]
+    taken[:, 3] = STRETCH * taken[:, 3] + m
     result = []
-    for axis, n in enumerate(touched.shape):
-        lines = np.flatnonzero(np.moveaxis(touched, axis, 0).reshape(n, -1).any(axis=1))
-        result.append((max(0, CLEARANCE - int(lines[0])), max(0, CLEARANCE - (n - 1 - int(lines[-1])))))
+    for axis in range(4 - dimension, 4):
+        first, last = int(taken[:, axis].min()), int(taken[:, axis].max())
+        result.append((max(0, CLEARANCE - first), max(0, CLEARANCE - (nodes.shape[axis] - 1 - last))))
     return result
 
 
@@ -105,13 +116,18 @@ def blocks_of_dipoles(
     return means.astype(np.float64), sums.astype(np.float64)
 
 
-def dense_vectors(nodes: NodeSources) -> NDArray[np.float32]:
-    """(l₀, l₁, l₂, n, 4) the vectors at all nodes."""
-    l0, l1, l2, stretches = nodes.places.shape
-    result = np.zeros((l0, l1, l2, stretches, STRETCH, 4), dtype=np.float32)
-    taken = nodes.places >= 0
-    result[taken] = nodes.sums[nodes.places[taken]]
-    return result.reshape(l0, l1, l2, stretches * STRETCH, 4)[:, :, :, : nodes.shape[3]]
+def dense_vectors(nodes: NodeSources, dimension: int, room: list[tuple[int, int]]) -> NDArray[np.float32]:
+    """(d, *shape) the vectors at all nodes, with room around them."""
+    padded = [(0, 0)] * (4 - dimension) + room
+    result = np.zeros((dimension, *(n + sum(pair) for n, pair in zip(nodes.shape, padded, strict=True))), np.float32)
+    places, rows = np.argwhere(nodes.places >= 0), nodes.places[nodes.places >= 0]
+    i, j, k = (places[:, axis, None] + padded[axis][0] for axis in range(3))
+    m = STRETCH * places[:, 3, None] + np.arange(STRETCH)
+    there = m < nodes.shape[3]
+    at = tuple(np.broadcast_to(index, there.shape)[there] for index in (i, j, k, m + padded[3][0]))
+    for component in range(dimension):
+        result[component][at] = nodes.sums[rows, :, component][there]
+    return result.reshape(dimension, *result.shape[5 - dimension :])
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, NDArray[np.float64]]:
