@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from ..diagnostics import BoundsNothing, CompletedArea, ReachesBox
 from ..operators.grid.boundary_areas import boundary_areas, completion_areas
 from ..operators.grid.face_values import values_at
+from ..parallel import over_slabs
+from .completed_area import completed_area
 from .rims import Rims
 
 LEVEL = 0.4
@@ -48,8 +50,6 @@ ALL, MANY = 0.95, 0.92
 HALF, LESS = 0.52, 0.48
 """Mean of twice the winding number at the faces, 1 on whole shapes: on half a sphere, .61, on four sides of a box .55,
 and on what encloses less, such as three sides of a box, .44."""
-MOST = 5
-"""Parts of the completed surface that are told of."""
 MIDDLE = 0.25
 """Distance of winding numbers from ½ up to which rims are asked."""
 CURVED = 0.12
@@ -122,8 +122,28 @@ class _Scene:
 
     def guarded(self, level: float | None = None, box: tuple[slice, ...] = ()) -> NDArray[np.float64]:
         """Negative where φ < 0 and w > level, by default ½ less the doubt, or where w is above ½ by more than that."""
-        worth, winding, doubt = SLOPE * self.cell, self.winding[box], self.doubt[box]
-        result = np.maximum(self.phi[box], worth * ((0.5 - doubt if level is None else level) - winding))
+        phi, winding, doubt = self.phi[box], self.winding[box], self.doubt[box]
+        result = np.empty(phi.shape)
+
+        def planes(here: slice) -> None:
+            result[here] = self._guarded(phi[here], winding[here], doubt[here], level)
+
+        over_slabs(planes, phi.shape)
+        return result
+
+    def guarded_at(self, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
+        """The same at some nodes."""
+        return self._guarded(*(part.ravel()[nodes] for part in (self.phi, self.winding, self.doubt)))
+
+    def _guarded(
+        self,
+        phi: NDArray[np.float64],
+        winding: NDArray[np.float64],
+        doubt: NDArray[np.float32],
+        level: float | None = None,
+    ) -> NDArray[np.float64]:
+        worth = SLOPE * self.cell
+        result = np.maximum(phi, worth * ((0.5 - doubt if level is None else level) - winding))
         return np.minimum(result, worth * (0.5 + doubt - winding), out=result)
 
 
@@ -175,19 +195,21 @@ def choose_sides(
     if rims is not None:
         rims = replace(rims, places=rims.places - first * spacing)
     scene = _scene(part, winding[box], distance[box], positions - first, vectors, rims, shape, steps)
-    bodies, function, present = _bodies(scene)
+    function = scene.guarded()
+    candidates = function < 0
+    bodies, present = _bodies(scene, function)
     _fill_missing_sides(scene, rims, bodies, present, function)
     inside = function < 0
     sides = inside.ravel()
     bounding = sides[scene.back] != sides[scene.front]
     total = float(scene.areas.sum())
     loose = 1.0 - float(scene.areas[bounding].sum()) / total if total > 0 else 1.0
-    completed = _completed(scene, inside, function, np.asarray(origin) + first * spacing)
+    completed = completed_area(inside, function, scene.distance, steps, FAR * scene.cell, origin + first * spacing)
     nowhere = np.zeros(phi.shape, dtype=bool)
     everywhere = nowhere.copy(), np.array(phi), nowhere
     everywhere[0][box] = inside.reshape(part.shape)
     everywhere[1][box] = function.reshape(part.shape)
-    everywhere[2][box] = ((scene.guarded() < 0) & ~inside).reshape(part.shape)
+    everywhere[2][box] = (candidates & ~inside).reshape(part.shape)
     on_walls = np.concatenate([side.ravel() for side in walls(everywhere[0])])
     return Sides(
         *everywhere,
@@ -250,15 +272,15 @@ def _scene(
         np.ravel_multi_index(tuple(np.clip(np.rint(at).astype(np.int64), 0, np.array(phi.shape) - 1).T), phi.shape)
         for at in (positions + away, positions - away)
     )
-    three = phi.reshape(shape), np.ascontiguousarray(winding).reshape(shape), distance.reshape(shape)
+    three = [np.ascontiguousarray(part).reshape(shape) for part in (phi, winding, distance)]
     places = np.zeros((len(positions), 3))
     places[:, 3 - dimension :] = positions
     at_faces = values_at(three[1], places)
     enclosure = 2 * float(np.average(np.clip(at_faces, 0.0, 0.5), weights=areas)) if areas.any() else 0.0
     bounding = at_faces > BOUNDING
     scene = _Scene(*three, steps, front, back, areas, bounding, enclosure, _doubt(*three[1:], steps, rims))
-    sides = scene.guarded().ravel() < 0
-    return replace(scene, bounding=bounding | (sides[back] & ~sides[front]))
+    between = (scene.guarded_at(back) < 0) & ~(scene.guarded_at(front) < 0)
+    return replace(scene, bounding=bounding | between)
 
 
 def _doubt(
@@ -277,9 +299,8 @@ def _doubt(
     return doubt
 
 
-def _bodies(scene: _Scene) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]:
-    """Labels of the solids, a function that is negative in them alone, and the area of the faces on each."""
-    function = scene.guarded()
+def _bodies(scene: _Scene, function: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Labels of the solids, and the area of the faces on each; the function is made negative in them alone."""
     candidates = function
     bodies = np.zeros(function.shape, dtype=np.int32)
     present = np.zeros(1)
@@ -292,15 +313,15 @@ def _bodies(scene: _Scene) -> tuple[NDArray[np.int32], NDArray[np.float64], NDAr
         solid[0] = False
         bodies += np.where(solid, len(present) - 1 + np.cumsum(solid), 0).astype(np.int32)[labels]
         present = np.concatenate([present, faces[solid]])
-        doubtful = ~solid[labels] & (labels > 0)
-        if not doubtful.any():
+        if solid[1:].all():
             break
+        doubtful = ~solid[labels] & (labels > 0)
         if core is None:
             np.abs(function, out=function, where=doubtful)
             break
         candidates = np.where(doubtful, SLOPE * scene.cell * (core - scene.winding), SLOPE * scene.cell)
         np.copyto(function, candidates, where=doubtful)
-    return bodies, function, present
+    return bodies, present
 
 
 def _faces_on(scene: _Scene, labels: NDArray[np.int32], n: int) -> NDArray[np.float64]:
@@ -355,22 +376,3 @@ def _going_on(scene: _Scene, rims: Rims, holes: NDArray[np.int32], n: int) -> ND
     counts = np.bincount(of_hole, minlength=n + 1)
     result: NDArray[np.float64] = np.bincount(of_hole, going_on, minlength=n + 1) / np.maximum(counts, 1)
     return np.where(counts > 0, result, 1.0)
-
-
-def _completed(
-    scene: _Scene, inside: NDArray[np.bool_], function: NDArray[np.float64], origin: NDArray[np.float64]
-) -> CompletedArea | None:
-    """What of the zero set is farther than `FAR` cells from any face."""
-    far = FAR * scene.cell
-    total, completed = boundary_areas(inside.astype(np.int32), function, scene.distance, scene.steps, far)
-    if completed.sum() == 0:
-        return None
-    rim = inside & ~scipy.ndimage.binary_erosion(inside, border_value=1) & (scene.distance > far)
-    patches, _ = scipy.ndimage.label(rim, np.ones((3, 3, 3)), output=np.int32)
-    areas = np.bincount(patches.ravel())[1:]
-    boxes = scipy.ndimage.find_objects(patches)
-    largest = np.argsort(-areas, kind="stable")[:MOST]
-    where = np.array([[[part.start, part.stop - 1] for part in boxes[k]] for k in largest], dtype=float)
-    where = where.reshape(-1, 3, 2).transpose(0, 2, 1)[..., 3 - len(origin) :]
-    where = origin + where * scene.steps[3 - len(origin) :]
-    return CompletedArea(float(completed.sum()), float(completed.sum() / total.sum()), where)

@@ -7,11 +7,14 @@ axes, those in front of one node in fewer dimensions.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from .stencil import by_slabs
+from ...parallel import n_threads
+from .stencil import SLAB, by_slabs
 
 DISK = 0.6
 """Radius, in cells, of the disk that a sample stands for."""
@@ -49,7 +52,15 @@ def boundary_areas(
         By label.
     """
     n_labels = int(labels.max(initial=0)) + 1
-    total, completed = _boundary_areas(labels, function, distance, steps, far, n_labels)
+    axis = 0 if labels.shape[0] > 1 else 1
+    total, completed = np.zeros(n_labels), np.zeros(n_labels)
+    with ThreadPoolExecutor(n_threads()) as pool:
+        starts = range(0, labels.shape[axis], SLAB)
+        arguments = labels, function, distance, steps, far, n_labels, axis
+        for job in [pool.submit(_boundary_areas, *arguments, start, start + SLAB) for start in starts]:
+            more, completing = job.result()
+            total += more
+            completed += completing
     return total, completed
 
 
@@ -151,11 +162,15 @@ def _boundary_areas(
     steps: NDArray[np.float64],
     far: float,
     n_labels: int,
+    axis: int,
+    start: int,
+    stop: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of the nodes from `start` to `stop` along an axis."""
     n0, n1, n2 = labels.shape
     total, completed = np.zeros(n_labels), np.zeros(n_labels)
-    for i in range(n0):
-        for j in range(n1):
+    for i in range(start if axis == 0 else 0, min(stop, n0) if axis == 0 else n0):
+        for j in range(start if axis == 1 else 0, min(stop, n1) if axis == 1 else n1):
             for k in range(n2):
                 label = labels[i, j, k]
                 if label == 0:
@@ -164,12 +179,12 @@ def _boundary_areas(
                     wall = _wall_area(labels.shape, i, j, k, steps)
                     total[label] += wall
                     completed[label] += wall
-                for axis in range(3):
+                for way in range(3):
                     for side in range(-1, 2, 2):
-                        a, b, c = i + side * (axis == 0), j + side * (axis == 1), k + side * (axis == 2)
+                        a, b, c = i + side * (way == 0), j + side * (way == 1), k + side * (way == 2)
                         if a < 0 or b < 0 or c < 0 or a >= n0 or b >= n1 or c >= n2 or labels[a, b, c] != 0:
                             continue
-                        area = _edge_area(function, i, j, k, a, b, c, axis, steps)
+                        area = _edge_area(function, i, j, k, a, b, c, way, steps)
                         total[label] += area
                         if 0.5 * (distance[i, j, k] + distance[a, b, c]) > far:
                             completed[label] += area
