@@ -133,7 +133,7 @@ class _Scene:
 
     def guarded_at(self, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
         """The same at some nodes."""
-        return self._guarded(*(part.ravel()[nodes] for part in (self.phi, self.winding, self.doubt)))
+        return self._guarded(self.phi.ravel()[nodes], self.winding.ravel()[nodes], self.doubt.ravel()[nodes])
 
     def _guarded(
         self,
@@ -272,13 +272,15 @@ def _scene(
         np.ravel_multi_index(tuple(np.clip(np.rint(at).astype(np.int64), 0, np.array(phi.shape) - 1).T), phi.shape)
         for at in (positions + away, positions - away)
     )
-    three = [np.ascontiguousarray(part).reshape(shape) for part in (phi, winding, distance)]
+    phi, winding = (np.ascontiguousarray(part).reshape(shape) for part in (phi, winding))
+    distance = np.ascontiguousarray(distance).reshape(shape)
     places = np.zeros((len(positions), 3))
     places[:, 3 - dimension :] = positions
-    at_faces = values_at(three[1], places)
+    at_faces = values_at(winding, places)
     enclosure = 2 * float(np.average(np.clip(at_faces, 0.0, 0.5), weights=areas)) if areas.any() else 0.0
     bounding = at_faces > BOUNDING
-    scene = _Scene(*three, steps, front, back, areas, bounding, enclosure, _doubt(*three[1:], steps, rims))
+    doubt = _doubt(winding, distance, steps, rims)
+    scene = _Scene(phi, winding, distance, steps, front, back, areas, bounding, enclosure, doubt)
     between = (scene.guarded_at(back) < 0) & ~(scene.guarded_at(front) < 0)
     return replace(scene, bounding=bounding | between)
 
