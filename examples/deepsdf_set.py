@@ -1,7 +1,8 @@
 """Points with exact distances, to learn from
 ==========================================
 
-A whole application: a set in the form that DeepSDF reads, 250 points near the surface for every 10 in the box.
+A whole application: a set in the form that DeepSDF reads, four of five points near the surface, the rest in the box.
+:func:`signedheat.batch` makes such sets of whole folders of shapes.
 """
 
 from pathlib import Path

@@ -25,7 +25,7 @@ def main(folder: Path) -> float:
         folder / "overlapping_bodies.png",
         ("two balls, one mesh", shape),
         ("as they were given", given, {"shape": shape, "across": (1,)}),
-        ("solid_distance", united, {"shape": shape, "across": (1,)}),
+        ("solid_distance, and what sh.unite leaves", united, {"shape": sh.unite(shape), "across": (1,)}),
     )
     return float(united([0.0, 0.0, 0.0]))
 

@@ -1,7 +1,7 @@
 """Smooth blends
 =============
 
-A fillet where two solids meet, of a width that is chosen.
+A fillet where two solids meet, of a width that is chosen: in unions, common parts and differences.
 """
 
 from pathlib import Path
@@ -20,13 +20,18 @@ def main(folder: Path) -> float:
     grid = sh.Grid((-1.8, -1.4, -1.4), 0.06, (61, 48, 48))
     ball = sh.solid_distance(samples.sphere(4, 0.8, (-0.5, 0, 0)), grid)
     ring = sh.solid_distance(samples.torus(0.8, 0.25), grid)
-    blends = {width: sh.smooth_union(ball, ring, width) for width in (0.0, 0.2, 0.5)}
-
+    sharp, smooth = ball | ring, sh.smooth_union(ball, ring, 0.5)
+    shown = {
+        "union": sharp,
+        "union, width 0.5": smooth,
+        "common part, width 0.2": sh.smooth_intersection(ball, ring, 0.2),
+        "difference, width 0.2": sh.smooth_difference(ball, ring, 0.2),
+    }
     visualization.save_row(
         folder / "smooth_blends.png",
-        *((f"width {width:g}", field.contour(), {"view": (30, -60)}) for width, field in blends.items()),
+        *((title, field.contour(), {"view": (30, -60)}) for title, field in shown.items()),
     )
-    return float(np.abs(blends[0.5].values - blends[0.0].values).max())
+    return float(np.abs(smooth.values - sharp.values).max())
 
 
 if __name__ == "__main__":

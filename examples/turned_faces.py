@@ -20,10 +20,12 @@ def main(folder: Path) -> float:
     shape = samples.with_flipped_faces(samples.sphere(5), 0.5)
     grid = sh.Grid.around(shape.bounds, 64)
     plain, mended = sh.sharpen(sh.signed_distance(shape, grid)), sh.solid_distance(shape, grid)
+    turned = sh.orientation(shape).turned_faces
 
     visualization.save_row(
         folder / "turned_faces.png",
         ("half of the faces turned (red)", shape),
+        (f"sh.orient: {turned} turned back", sh.orient(shape)),
         ("as they were given", plain, {"shape": shape, "across": (1,)}),
         ("solid_distance", mended, {"shape": shape, "across": (1,)}),
     )

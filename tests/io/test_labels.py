@@ -168,3 +168,15 @@ def test_what_is_mended_in_headers_is_not_told(tmp_path, labels, caplog):
     (tmp_path / "mask.nii").write_bytes(bytes(data))
     assert np.array_equal(sh.read_labels(tmp_path / "mask.nii").labels, labels)
     assert not caplog.records  # they would go to standard error
+
+
+@pytest.mark.parametrize("kind", AXES)
+def test_the_boundary_of_voxels_goes_to_the_world(labels, kind):
+    image = sh.LabelImage(labels, AXES[kind], ORIGIN)
+    squares = image.to_world(image.surface(3))
+    assert isinstance(squares, sh.PolygonMesh)
+    middle = (squares.vertices.min(axis=0) + squares.vertices.max(axis=0)) / 2
+    if kind != "turned":
+        np.testing.assert_allclose(middle, AXES[kind] @ CENTER + ORIGIN, atol=0.51 * STEPS.max())
+    outwards = np.einsum("ij,ij->i", squares.polygon_centroids - middle, squares.polygon_area_vectors)
+    assert outwards.min() > 0  # also where axes are mirrored

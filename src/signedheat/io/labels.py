@@ -7,7 +7,7 @@ import io
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ from .files import (
 )
 from .nrrd_files import read_image, write_image
 from .vtk_xml import read_vti
+
+Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 
 NIBABEL = ("nibabel", "NIfTI files")
 nibabel = lazy_module(*NIBABEL)
@@ -124,11 +126,9 @@ class LabelImage:
             )
         return DigitalSurface(inside, self.spacing).squares
 
-    def to_world(self, surface: TriangleMesh) -> TriangleMesh:
-        """A surface along the axes of the image, moved to its place in the world; outside stays outside."""
-        moved = transform(surface, self.matrix)
-        assert isinstance(moved, TriangleMesh)
-        return moved
+    def to_world(self, surface: Mesh) -> Mesh:
+        """A mesh along the axes of the image, moved to its place in the world; outside stays outside."""
+        return cast("Mesh", transform(surface, self.matrix))
 
     def save(self, field: GridField, path: PathLike) -> None:
         """Write a field along the axes of the image into its place in the world.

@@ -1,0 +1,58 @@
+"""Files in and out
+================
+
+A shape, a mask, a drawing, curves on a surface, an image of labels: each is read from its file, and what is made of it
+is written again.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+import signedheat as sh
+from signedheat import samples, visualization
+
+EXPECTED = (25.4 * 1.1, 0.1)
+"""Mean radius of the offset by 2.54 millimetres of a ball whose radius is one inch."""
+
+
+def main(folder: Path) -> float:
+    """Write files and a picture; return the radius of the offset that was read again."""
+    samples.with_flipped_faces(samples.sphere(4), 0.3).save(folder / "ball.ply")
+    ball = sh.transform(sh.read(folder / "ball.ply"), 25.4 * np.eye(4)[:3])  # inches to millimetres
+    sdf = sh.solid_distance(ball, resolution=36)
+    sh.save(sdf.offset(2.54), folder / "grown.stl")
+    sh.write_vdb(sdf, folder / "ball.vdb")
+    visualization.save_page(sdf, folder / "ball.html")
+    visualization.save_scene(ball, folder / "ball.png")
+
+    image = np.full((60, 80), 255, dtype=np.uint8)
+    image[15:45, 30:34] = image[:10, 60:64] = 0
+    Image.fromarray(image).save(folder / "walls.png")
+    line = sh.Polyline([[5.0, 55.0], [5.0, 5.0]])
+    sh.write_polylines(folder / "line.svg", line)
+    round_walls = sh.signed_distance(sh.read_polylines(folder / "line.svg"), sh.read_mask(folder / "walls.png"))
+
+    globe = samples.sphere(3)
+    (folder / "coast.csv").write_text("longitude,latitude\n-55,-5\n-40,-25\n10,-20\n20,15\n\n10,20\n-30,30\n-60,5\n")
+    coast = sh.read_globe_curves(folder / "coast.csv", globe)
+    sh.write_curves(folder / "whole.txt", sh.close_curves(globe, coast), globe)
+    along = sh.curve_distance(globe, sh.read_curves(folder / "whole.txt", globe))
+
+    labels = np.zeros((40, 40, 40), dtype=np.uint8)
+    labels[np.linalg.norm(np.indices(labels.shape) - 20.0, axis=0) < 15] = 3
+    np.save(folder / "labels.npy", labels)
+    organ = sh.read_labels(folder / "labels.npy")
+    visualization.save_row(
+        folder / "files_in_and_out.png",
+        ("ball.ply, in millimetres", sdf, {"across": (1,), "levels": [2.54]}),
+        ("walls.png", round_walls, {"shape": line}),
+        ("coast.csv", along, {"sources": coast, "view": np.array([0.9, -0.4, 0.2])}),
+        ("labels.npy", organ.to_world(organ.surface(3))),
+    )
+    return float(np.linalg.norm(sh.read(folder / "grown.stl").vertices, axis=1).mean())
+
+
+if __name__ == "__main__":
+    print(f"{main(Path('.')):.4f}, expected {EXPECTED[0]:.4f}")
