@@ -1,6 +1,6 @@
 """The figures and numbers of the paper, remade: `python benchmarks/paper.py` writes docs/paper.md and its pictures.
 
-    python benchmarks/paper.py [NUMBER …]      (all figures by default; Sec. 9's timings are called 9)
+    python benchmarks/paper.py [NUMBER …]      (everything by default; sections are called section-9, section-9.5)
 
 Every figure is one function of the package `reproduction`: its docstring is the text of the section, the rows that it
 adds are the table, and what it draws is the picture. Figures that are not asked for keep what their last run gave

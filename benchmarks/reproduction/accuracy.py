@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import broken_curves
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import signedheat as sh
@@ -49,6 +50,21 @@ def whole_and_broken(page: Page) -> None:
             **{"whole ε %": baselines.error(solver.distance(whole, sh.Free()).values, exact)},
             **{"half gone ε %": baselines.error(broken, exact)},
         )
+    left = shapes.pieces(mesh, heights, 0.5, 3)
+    shown = {"whole": (solver.distance(whole, sh.Free()), whole), "half gone": (solver.distance(left), left)}
+    page.draw(row_of_surfaces(shown))
+
+
+def row_of_surfaces(
+    shown: Mapping[str, tuple[sh.VertexField[sh.TriangleMesh], list[sh.Curve]]], view: Array | None = None
+) -> Figure:
+    """Fields with their curves, side by side, by title."""
+    picture = new_figure(5 * len(shown), 4.4)
+    for k, (title, (field, curves)) in enumerate(shown.items()):
+        axes = picture.add_subplot(1, len(shown), k + 1)
+        draw_surface(field, axes, curves, view=view)
+        axes.set_title(title)
+    return picture
 
 
 @figure("15", "Sharpening")
@@ -95,6 +111,18 @@ def accuracy_in_the_plane(page: Page) -> None:
             mesh = domains[where](n)
             errors = planar_errors(mesh, curves[what], slow_ones=n == 5_000)
             page.add(vertices=mesh.n_vertices, domain=where, curve=what, **errors)
+    draw_planar_fields(page)
+
+
+def draw_planar_fields(page: Page) -> None:
+    """The method and the exact way for the star, on few triangles."""
+    mesh = shapes.flat_square(5_000)
+    star = [shapes.placed(mesh, shapes.star())]
+    shown = {
+        "SHM": (sh.SignedHeatSolver(mesh, intrinsic=True).distance(star).restrict(), star),
+        "sh.curve_distance": (sh.curve_distance(mesh, star).restrict(), star),
+    }
+    page.draw(row_of_surfaces(shown, FROM_ABOVE))
 
 
 def planar_errors(mesh: sh.TriangleMesh, lines: list[sh.Polyline], slow_ones: bool) -> dict[str, str]:
@@ -182,7 +210,7 @@ def convergence(page: Page) -> None:
     page.draw(picture)
 
 
-@figure("9.5", "Broken curves")
+@figure("section-9.5", "Broken curves")
 def broken_curves_on_surfaces(page: Page) -> None:
     """The paper compares with repairing a curve first: surface winding numbers (SWN, Feng et al. 2023) give the sign,
     exact polyhedral distance to what is left the rest. Here five surfaces, ten seeds each, a closed curve in
@@ -200,9 +228,21 @@ def broken_curves_on_surfaces(page: Page) -> None:
             names.get(way, way): broken_curves.told(found) for (kind, way), found in errors.items() if kind == damage
         }
         page.add(damage=damage, **ways)
+    draw_broken_curves(page)
 
 
-@figure("9", "Timings")
+def draw_broken_curves(page: Page) -> None:
+    """The five surfaces, a third of the pieces turned, and what `sh.curve_distance` makes of them."""
+    shown = {}
+    for name, (mesh, heights) in broken_curves.meshes().items():
+        curve = max(mesh.level_set(heights, 0.0), key=lambda each: each.n_points)
+        options = broken_curves.DAMAGES["30 % turned"]
+        pieces = broken_curves.damaged(mesh, heights, curve, np.random.default_rng(0), **options)
+        shown[name] = sh.curve_distance(mesh, pieces), pieces
+    page.draw(row_of_surfaces(shown), width=1500)
+
+
+@figure("section-9", "Timings")
 def timings(page: Page) -> None:
     """CPU seconds of all threads on a bumpy sphere, for a first distance (with factorisations), one more, and one of a
     batch of 16. The paper plots its times and names two (Fig. 24). `benchmarks/surface.py` compares with potpourri3d,

@@ -49,9 +49,11 @@ FIGURES: dict[str, Section] = {}
 
 
 def figure(number: str, title: str) -> Callable[[Callable[[Page], None]], Callable[[Page], None]]:
-    """Decorator: this function remakes that figure."""
+    """Decorator: this function remakes that figure, or the numbers of a section, such as ``"section-9.5"``."""
 
     def add(make: Callable[[Page], None]) -> Callable[[Page], None]:
+        if number in FIGURES:
+            raise ValueError(f"figure {number} is made twice: by {FIGURES[number].make.__name__} and {make.__name__}")
         FIGURES[number] = Section(title, make)
         return make
 
@@ -72,8 +74,21 @@ def save_numbers(folder: Path, numbers: Mapping[str, list[Row]]) -> None:
     (folder / "numbers.json").write_text(text + "\n", encoding="utf-8")
 
 
-def order(number: str) -> float:
-    return float(number.partition("-")[0])
+def order(number: str) -> tuple[bool, float]:
+    """Figures by their numbers, then sections."""
+    is_section = number.startswith("section-")
+    return is_section, float(number.removeprefix("section-").partition("-")[0])
+
+
+def heading(number: str) -> str:
+    """What a figure or a section is called.
+
+    >>> heading("4-19"), heading("section-9.5")
+    ('Figures 4 and 19', 'Section 9.5')
+    """
+    if number.startswith("section-"):
+        return f"Section {number.removeprefix('section-')}"
+    return f"Figure {number}" if "-" not in number else f"Figures {number.replace('-', ' and ')}"
 
 
 def write_chapter(folder: Path, numbers: Mapping[str, list[Row]], versions: str) -> None:
@@ -90,8 +105,7 @@ def write_chapter(folder: Path, numbers: Mapping[str, list[Row]], versions: str)
         "Errors ε are root mean squares over the domain in per cent of the range of the true distance, as in Sec. 9.1.",
     ]
     for number, section in sorted(FIGURES.items(), key=lambda item: order(item[0])):
-        name = f"Section {number}" if float(order(number)) in (9, 9.5) else f"Figure {number.replace('-', ' and ')}"
-        lines += ["", f"## {name}: {section.title}", "", inspect.getdoc(section.make) or ""]
+        lines += ["", f"## {heading(number)}: {section.title}", "", inspect.getdoc(section.make) or ""]
         if (folder / picture_name(number)).exists():
             lines += ["", f"![{section.title}](paper/{picture_name(number)})"]
         if numbers.get(number):
