@@ -28,7 +28,7 @@ def main(folder: Path) -> float:
     inlet = sh.Polyline([[0.05, 1.1], [0.05, 0.1]])
     from_inlet = sh.signed_distance(inlet, sh.Grid(grid.origin, grid.spacing, grid.shape, mask=solid), diffusion=1.0)
 
-    figure = visualization.new_figure(12.0, 5.2)
+    figure = visualization.new_figure(9.0, 7.0)
     free = sh.GridField(grid, np.where(solid, np.nan, np.abs(to_walls.values)))
     for k, (title, field) in enumerate(
         [("to the nearest wall", free), ("from the inlet, round the blocks", from_inlet)]

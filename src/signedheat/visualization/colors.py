@@ -22,6 +22,8 @@ INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9
 """From far inside to far outside: blue inside, light at the surface, orange outside."""
 TICKS = 7
 """Approximate number of labels of a colour bar."""
+CLOSEST = 0.07
+"""How near to each other they may be, over the length of the bar."""
 
 
 def distance_colors(low: float, high: float) -> ScalarMappable:
@@ -69,6 +71,27 @@ def round_step(width: float) -> float:
     return float(power * min((1, 2, 5, 10), key=lambda digit: abs(np.log(width / power / digit))))
 
 
+def legible(ticks: NDArray[np.float64], low: float, high: float) -> list[float]:
+    """Zero, and those of some ticks that are far enough from the one before, in the root of distance.
+
+    Examples
+    --------
+    >>> legible(np.array([-0.5, 0.5, 1.0, 1.5, 2.0]), -0.7, 2.2)
+    [-0.5, 0.0, 0.5, 1.0, 1.5, 2.0]
+    >>> legible(np.arange(11.0), 0.0, 10.5)
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 9.0]
+    """
+    apart = CLOSEST * float(signed_root(high) - signed_root(low))
+    kept = [0.0]
+    for outwards in (ticks[ticks > 0], ticks[ticks < 0][::-1]):
+        last = 0.0
+        for tick in outwards.tolist():
+            if abs(signed_root(tick) - signed_root(last)) >= apart:
+                kept.append(tick)
+                last = tick
+    return sorted(kept)
+
+
 def add_color_bar(
     figure: Figure, axes: Sequence[Axes], colors: ScalarMappable, isolines: NDArray[np.float64], step: float
 ) -> None:
@@ -79,6 +102,7 @@ def add_color_bar(
         apart = round_step((isolines[-1] - isolines[0]) / TICKS)
         ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
         reach = float(colors.norm.vmax or 0.0)
-        bar.ax.set_ylim(max(min(isolines[0] - step, 0.0), -reach), min(max(isolines[-1] + step, 0.0), reach))
-        bar.set_ticks(np.union1d(ticks, [0.0]).tolist())
+        low, high = max(min(isolines[0] - step, 0.0), -reach), min(max(isolines[-1] + step, 0.0), reach)
+        bar.ax.set_ylim(low, high)
+        bar.set_ticks(legible(ticks, low, high))
         bar.ax.yaxis.set_major_formatter("{x:g}")
