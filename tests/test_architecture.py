@@ -22,7 +22,7 @@ FLOORS = [
     {"discretization"},
     {"lowering"},
     {"constraints"},
-    {"method"},
+    {"method", "extrapolation"},
     {"fields"},
     {"solver"},
     {"extensions"},

@@ -47,6 +47,7 @@ from .extensions.solid_distance import solid_distance
 from .extensions.tetrahedralize import tetrahedralize
 from .extensions.tiles import tiled_distance
 from .extensions.uniting import unite
+from .extrapolation import Extrapolated
 from .fields.band_field import BandField
 from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
 from .fields.grid_field import GridField
@@ -82,6 +83,7 @@ __all__ = [
     "Diagnostics",
     "DigitalSurface",
     "EachComponent",
+    "Extrapolated",
     "FactorizationError",
     "FileFormatError",
     "Free",

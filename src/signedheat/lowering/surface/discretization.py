@@ -64,7 +64,7 @@ class SurfaceDiscretization:
     triangulation: IntrinsicTriangulation | None = None
     spacing: float = math.nan
     notes: tuple[Note, ...] = ()
-    _heats: LastUsed[float, VectorHeat] = field(default_factory=LastUsed, init=False, repr=False)
+    _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(3), init=False, repr=False)
     _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 
     def __post_init__(self) -> None:

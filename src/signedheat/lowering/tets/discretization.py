@@ -68,7 +68,7 @@ class TetDiscretization(DiffusesEach):
 
     mesh: TetMesh
     direct: bool
-    _heats: LastUsed[float, HeatSystem] = field(default_factory=LastUsed, init=False, repr=False)
+    _heats: LastUsed[float, HeatSystem] = field(default_factory=lambda: LastUsed(3), init=False, repr=False)
 
     @cached_property
     def planes(self) -> Planes:

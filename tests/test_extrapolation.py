@@ -1,0 +1,82 @@
+"""Directions extrapolated in the diffusion time, against closed forms."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from signedheat.extrapolation import EXPONENTS, blended, times_of
+
+ROUND = (1.2, 0.6)  # half axes of an ellipse
+
+
+def lattice(n, shear):
+    """A square in right triangles, or its sheared image, in which heat decays faster along some directions."""
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-2, 2, n + 1), np.linspace(-2, 2, n + 1)))
+    low = np.arange(n * (n + 1)).reshape(n, n + 1)[:, :-1].ravel()
+    up = low + n + 1
+    faces = np.concatenate([np.stack([low, low + 1, up + 1], 1), np.stack([low, up + 1, up], 1)])
+    return sh.TriangleMesh(np.stack([x + shear * y, y, 0 * x], 1), faces)
+
+
+def relative_error(n, shear, diffusion):
+    """Distance to an ellipse: root mean square error over the range."""
+    mesh = lattice(n, shear)
+    points = mesh.vertices[:, :2]
+    angle = np.linspace(0, 2 * np.pi, 3000, endpoint=False)
+    ellipse = np.stack([np.cos(angle), np.sin(angle)], 1) * ROUND
+    outside = ((points / ROUND) ** 2).sum(1) - 1
+    exact = np.sign(outside) * np.sqrt(((points[:, None] - ellipse[None]) ** 2).sum(2).min(1))
+    field = sh.SignedHeatSolver(mesh, diffusion).distance(mesh.level_set(outside, 0.0))
+    return np.sqrt(np.mean((field.values - exact) ** 2)) / np.ptp(exact)
+
+
+@pytest.mark.parametrize("shear", [0.0, 0.5])
+def test_error_falls_like_the_triangles_size(shear):
+    coarse, fine = (relative_error(n, shear, sh.Extrapolated()) for n in (12, 36))
+    assert np.log(coarse / fine) / np.log(3) > 0.7
+    assert fine < 0.5 * min(relative_error(36, shear, tau) for tau in (1.0, 4.0))
+
+
+@pytest.mark.parametrize("times", [sh.Extrapolated(), sh.Extrapolated(2.0, 2.0), sh.Extrapolated(30.0, 1.5)])
+def test_errors_of_both_kinds_cancel(times):
+    tau = np.array(times.times)
+    assert times.weights.sum() == pytest.approx(1)
+    for power in EXPONENTS:
+        assert times.weights @ tau**power == pytest.approx(0, abs=1e-9)
+    assert np.allclose(tau[1:] / tau[:-1], times.ratio)
+    angles = 0.3 + 0.02 / tau + 0.01 * np.sqrt(tau)
+    blend = blended(times, [np.exp(1j * a) for a in angles[:, None]])
+    assert np.abs(blend) == pytest.approx(1)
+    assert np.angle(blend) == pytest.approx(0.3, abs=0.3 * np.abs(angles - 0.3).max())
+
+
+def test_one_time_is_itself():
+    directions = np.array([0.6 + 0.8j])
+    assert times_of(2.0) == (2.0,)
+    assert blended(2.0, [directions]) is directions
+
+
+def test_many_sources_give_what_each_gives():
+    mesh = lattice(10, 0.3)
+    curves = [mesh.level_set(mesh.vertices[:, k], level) for k, level in ((0, 0.3), (1, -0.2))]
+    solver = sh.SignedHeatSolver(mesh, sh.Extrapolated())
+    for constraint in (sh.Free(), sh.ZeroSet()):
+        for together, curve in zip(solver.distance_many(curves, constraint), curves, strict=True):
+            assert np.allclose(together.values, solver.distance(curve, constraint).values, rtol=0, atol=1e-9)
+
+
+def test_scale_and_side():
+    mesh = lattice(10, 0.3)
+    curve = mesh.level_set(np.hypot(*mesh.vertices[:, :2].T), 0.9)
+    values = sh.SignedHeatSolver(mesh, sh.Extrapolated()).distance(curve).values
+    turned = sh.SignedHeatSolver(mesh, sh.Extrapolated()).distance([c.reversed() for c in curve]).values
+    larger = sh.SignedHeatSolver(sh.TriangleMesh(1e3 * mesh.vertices, mesh.faces), sh.Extrapolated()).distance(curve)
+    assert np.allclose(turned, -values, atol=1e-9)
+    assert np.allclose(larger.values, 1e3 * values, atol=1e-6)
+
+
+@pytest.mark.parametrize("arguments", [(0.0,), (-1.0,), (np.nan,), (4.0, 1.0), (4.0, 0.5), (4.0, np.inf)])
+def test_times_that_make_no_sense_are_refused(arguments):
+    with refused(sh.SignedHeatError, "middle" if len(arguments) == 1 else "ratio"):
+        sh.Extrapolated(*arguments)
