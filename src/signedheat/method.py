@@ -28,7 +28,7 @@ def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) 
 
 def normalize(discretization: Discretization, vectors: Any) -> NDArray[Any]:
     """Step 2: ``Y = X / |X|`` on every cell (Sec. 6). Cells that nothing reached keep Y = 0."""
-    return unit(discretization.to_cells(vectors))
+    return unit(discretization.to_cells(vectors), overwrite=True)
 
 
 def integrate(

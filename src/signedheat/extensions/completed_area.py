@@ -14,7 +14,7 @@ MOST = 5
 
 
 def completed_area(
-    inside: NDArray[np.bool_],
+    inside: NDArray[np.int32],
     function: NDArray[np.float64],
     distance: NDArray[np.floating],
     steps: NDArray[np.float64],
@@ -26,7 +26,7 @@ def completed_area(
     Parameters
     ----------
     inside, function, distance : (n₀, n₁, n₂)
-        Nodes inside, a function whose zero set their boundary is, and the distance to the faces.
+        1 at nodes inside and 0 elsewhere, a function whose zero set their boundary is, and the distance to the faces.
     steps : (3,) float
         Spacing; of axes of one node, which come first, any.
     far : float
@@ -34,10 +34,10 @@ def completed_area(
     origin : (d,) float
         Position of the first node, on the axes of more than one node.
     """
-    total, completed = boundary_areas(inside.astype(np.int32), function, distance, steps, far)
+    total, completed = boundary_areas(inside, function, distance, steps, far)
     if completed.sum() == 0:
         return None
-    rim = np.argwhere(_rim(inside) & (distance > far))
+    rim = np.argwhere(_rim(inside > 0) & (distance > far))
     where = np.zeros((0, 2, len(origin)))
     if len(rim):
         patches = _patches(rim, inside.shape)

@@ -24,6 +24,7 @@ from ..operators.grid.exact_surface import ExactSurface
 from ..operators.grid.fitted_points import REACH, fitted_to_points, mean_gap, points_as_crossings
 from ..operators.grid.layering import layered_faces
 from ..operators.grid.sampled_surface import FaceBand, sampled_surface, signed_distances
+from ..parallel import over_slabs
 
 Fit = Literal["auto", "exact", "smooth"]
 """Which faces distance is measured to: all but those that lie in layers, all, or none."""
@@ -145,7 +146,13 @@ def assemble(
 
 def _unfold(values: NDArray[np.float64], inside: NDArray[np.bool_], surface: ExactSurface) -> None:
     """Turn, in place, values with the sign of a face that is folded over: the whole shape winds the other way there."""
-    doubtful = np.argwhere((values < 0) != inside)
+    turned = np.empty(inside.shape, dtype=bool)
+
+    def planes(here: slice) -> None:
+        turned[here] = (values[here] < 0) != inside[here]
+
+    over_slabs(planes, inside.shape)
+    doubtful = np.argwhere(turned)
     if not len(doubtful):
         return
     triangles = surface.features.corners.reshape(-1, 3, 3)

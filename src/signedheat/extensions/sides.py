@@ -74,8 +74,13 @@ class Sides:
         Nodes that are inside.
     function : (*shape) float
         Negative inside; its zero set, where it is farther than 1.5 cells from any face, is the completed surface.
+        Outside the box it is φ.
     refused : (*shape) bool
         Nodes beside open sheets: φ and the winding number put them inside, and nothing solid is there.
+    box : tuple of slice
+        The part of the grid with all that may be inside.
+    given : array
+        φ in the box.
     open_sheets : bool
         Whether many faces bound nothing, so that what is open was taken for open.
     completed : CompletedArea, optional
@@ -87,10 +92,18 @@ class Sides:
     inside: NDArray[np.bool_]
     function: NDArray[np.float64]
     refused: NDArray[np.bool_]
+    box: tuple[slice, ...]
+    given: NDArray[np.float64]
     open_sheets: bool = False
     completed: CompletedArea | None = None
     reaches_box: ReachesBox | None = None
     bounds_nothing: BoundsNothing | None = None
+
+    def phi(self) -> NDArray[np.float64]:
+        """(*shape) φ as it was given."""
+        result = self.function.copy()
+        result[self.box] = self.given
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +170,7 @@ def choose_sides(
     origin: NDArray[np.float64],
     rims: Rims | None = None,
 ) -> Sides:
-    """Decide which nodes of a grid are inside a broken shape.
+    """Decide which nodes of a grid are inside a broken shape. The memory of φ is used for the result.
 
     Parameters
     ----------
@@ -204,15 +217,21 @@ def choose_sides(
     bounding = sides[scene.back] != sides[scene.front]
     total = float(scene.areas.sum())
     loose = 1.0 - float(scene.areas[bounding].sum()) / total if total > 0 else 1.0
-    completed = completed_area(inside, function, scene.distance, steps, FAR * scene.cell, origin + first * spacing)
+    np.copyto(bodies, inside)
+    completed = completed_area(bodies, function, scene.distance, steps, FAR * scene.cell, origin + first * spacing)
     nowhere = np.zeros(phi.shape, dtype=bool)
-    everywhere = nowhere.copy(), np.array(phi), nowhere
+    given = scene.phi.reshape(part.shape)
+    if np.shares_memory(given, phi):
+        given = given.copy()
+    everywhere = nowhere.copy(), phi, nowhere
     everywhere[0][box] = inside.reshape(part.shape)
     everywhere[1][box] = function.reshape(part.shape)
     everywhere[2][box] = (candidates & ~inside).reshape(part.shape)
     on_walls = np.concatenate([side.ravel() for side in walls(everywhere[0])])
     return Sides(
         *everywhere,
+        box,
+        given,
         scene.trust == 0.0,
         completed,
         ReachesBox(float(on_walls.mean())) if on_walls.any() else None,
@@ -226,7 +245,12 @@ def _box_of_sides(
     """The part of a grid that holds all faces and all that may be inside, with room around it; and its first node."""
     upper = np.array(phi.shape) - 1
     low, high = (np.clip(f(positions, axis=0), 0, upper) for f in (np.min, np.max))
-    candidates = (phi < 0) | (winding > 0.5)
+    candidates = np.empty(phi.shape, dtype=bool)
+
+    def planes(here: slice) -> None:
+        candidates[here] = (phi[here] < 0) | (winding[here] > 0.5)
+
+    over_slabs(planes, phi.shape)
     for axis, n in enumerate(phi.shape):
         layers = np.flatnonzero(candidates.reshape(int(np.prod(phi.shape[:axis])), n, -1).any(axis=(0, 2)))
         if len(layers):
@@ -239,13 +263,13 @@ def _box_of_sides(
 def nothing_inside(shape: tuple[int, ...]) -> Sides:
     """The sides of a shape that bounds nothing."""
     nowhere = np.zeros(shape, dtype=bool)
-    return Sides(nowhere, np.ones(shape), nowhere, True, bounds_nothing=BoundsNothing(1.0))
+    return Sides(nowhere, np.ones(shape), nowhere, (), np.ones(shape), True, bounds_nothing=BoundsNothing(1.0))
 
 
 def closed_sides(winding: NDArray[np.float64], cell: float) -> Sides:
     """The sides of a shape whose parts are all closed: it bounds something, however small or thin its bodies are."""
     function = (0.5 - winding) * cell
-    return Sides(function < 0, function, np.zeros(winding.shape, dtype=bool))
+    return Sides(function < 0, function, np.zeros(winding.shape, dtype=bool), (), function)
 
 
 def walls(values: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
@@ -294,7 +318,13 @@ def _doubt(
     """
     doubt = np.full(winding.shape, 0.5 - LEVEL, dtype=np.float32)
     if rims is not None:
-        nodes = np.argwhere((np.abs(winding - 0.5) < MIDDLE) & (distance > float(steps.max())))
+        chosen = np.empty(winding.shape, dtype=bool)
+
+        def planes(here: slice) -> None:
+            chosen[here] = (np.abs(winding[here] - 0.5) < MIDDLE) & (distance[here] > float(steps.max()))
+
+        over_slabs(planes, winding.shape)
+        nodes = np.argwhere(chosen)
         if len(nodes):
             bend = np.sin(0.5 * np.arcsin(rims.going_on_at(nodes * steps)))
             doubt[tuple(nodes.T)] *= np.minimum((bend / CURVED) ** 2, 1.0)
@@ -313,10 +343,11 @@ def _bodies(scene: _Scene, function: NDArray[np.float64]) -> tuple[NDArray[np.in
         total, completed = boundary_areas(labels, candidates, scene.distance, scene.steps, FAR * scene.cell)
         solid = (total - faces <= FILM * faces) & (completed <= (CLOSED + (OPEN - CLOSED) * trust) * faces)
         solid[0] = False
-        bodies += np.where(solid, len(present) - 1 + np.cumsum(solid), 0).astype(np.int32)[labels]
+        bodies_of = np.where(solid, len(present) - 1 + np.cumsum(solid), 0).astype(np.int32)
         present = np.concatenate([present, faces[solid]])
-        if solid[1:].all():
-            break
+        if solid[1:].all() and core == CORES[0]:
+            return np.take(bodies_of, labels, out=labels, mode="clip"), present
+        bodies += bodies_of[labels]
         doubtful = ~solid[labels] & (labels > 0)
         if core is None:
             np.abs(function, out=function, where=doubtful)

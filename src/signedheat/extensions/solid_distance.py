@@ -259,8 +259,10 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
             winding, samples = as_if_whole(winding, samples)
         cell = float(grid.spacing.max())
         sides = closed_sides(winding, cell) if closed else sides_of_shape(shape, phi, winding, samples, grid)
+        known = None if phi is None else _known(phi) if closed else sides.phi
+        del phi
     with stopwatch("sharpen"):
-        sharpened = _sharpened(shape, phi, sides, closed, winding, grid, steps.closed)
+        sharpened = _sharpened(shape, known, sides, closed, winding, grid, steps.closed)
     notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
     return _solid(sharpened, grid, notes, stopwatch, time)
 
@@ -313,7 +315,7 @@ def _diagnostics(notes: list[Note], stopwatch: Stopwatch, time: float) -> Diagno
 
 def _sharpened(
     shape: Shape,
-    phi: NDArray[np.float64] | None,
+    phi: Callable[[], NDArray[np.float64]] | None,
     sides: Sides,
     closed: bool,
     winding: NDArray[np.float64],
@@ -322,9 +324,9 @@ def _sharpened(
 ) -> Assembled:
     """Distance to the shape; faces beside which nothing is solid do not tell sides. The fit is for closed shapes."""
     if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
-        return assemble([shape], grid, _guarded(phi, sides, shape, grid), "auto")
+        return assemble([shape], grid, _guarded(phi(), sides, shape, grid), "auto")
     if phi is not None and closed:
-        return assemble([shape], grid, sides.function, fit, _known(phi))
+        return assemble([shape], grid, sides.function, fit, phi)
     refused = _widened(sides.refused)
     upper = np.array(grid.shape) - 1
 
@@ -333,10 +335,11 @@ def _sharpened(
         told: NDArray[np.bool_] = (values_at(winding, feet) > BOUNDING) & ~refused[nodes]
         return told
 
-    if phi is not None and refused.any():
-        phi = np.where(refused, sides.function, phi)
+    def accepted() -> NDArray[np.float64]:
+        return np.where(refused, sides.function, sides.phi())
+
     fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
-    return assemble([shape], grid, sides.function, fit, None if phi is None else _known(phi), tells)
+    return assemble([shape], grid, sides.function, fit, None if phi is None else accepted, tells)
 
 
 def _guarded(phi: NDArray[np.float64], sides: Sides, cloud: PointCloud, grid: Grid) -> NDArray[np.float64]:

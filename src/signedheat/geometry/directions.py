@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from ..parallel import n_threads
 
 
-def unit(vectors: NDArray[Any]) -> NDArray[Any]:
+def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
     """Vectors scaled to length one; complex numbers are plane vectors, rows of a real array vectors in space.
+
+    With `overwrite` the memory of a real array is used for the result.
 
     Divides by the largest component first, because X falls like exp(−r/√t) and its square underflows long before it.
 
@@ -27,7 +29,7 @@ def unit(vectors: NDArray[Any]) -> NDArray[Any]:
     if np.iscomplexobj(vectors):
         length = np.abs(vectors)  # np.abs of complex numbers neither overflows nor underflows
         return vectors / np.where(length > 0, length, 1)
-    result = np.empty_like(vectors)
+    result = vectors if overwrite else np.empty_like(vectors)
 
     def scale(block: Any) -> None:
         part = vectors[block]

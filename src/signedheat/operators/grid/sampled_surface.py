@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from threading import local
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,8 @@ class SampledSurface:
         Which face each sample lies on, or −1 minus which crossing it is.
     nearest : (*shape) int
         The sample that is nearest to each node, or nearly; see `signed_distances`.
+    squares : (*shape) float
+        Of the distances to them.
     """
 
     features: FaceFeatures
@@ -58,6 +61,7 @@ class SampledSurface:
     steps: NDArray[np.float64]
     owners: NDArray[np.int32]
     nearest: NDArray[np.int32]
+    squares: NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +136,7 @@ def sampled_surface(
     if len(crossings):
         seed_edge_ends(nearest, squares, edges, samples, padded, len(band.feet))
     sweep_lines(nearest_tiles, nearest.shape, 1, nearest, squares, samples, padded)
-    return SampledSurface(features, crossings, steps, owners, nearest[0])
+    return SampledSurface(features, crossings, steps, owners, nearest[0], squares[0])
 
 
 def signed_distances(
@@ -144,7 +148,8 @@ def signed_distances(
     """Signed distance of every node to what is nearest to it or its neighbours; and how far that can be trusted.
 
     Near a face the face tells the side, where the surface is closed and consistent around the foot; elsewhere `inside`.
-    ``surface.nearest`` then holds what is nearest itself, as `owners` name it, in place of samples.
+    ``surface.nearest`` then holds what is nearest itself, as `owners` name it, in place of samples, and
+    ``surface.squares`` the confidence.
 
     Parameters
     ----------
@@ -158,14 +163,18 @@ def signed_distances(
         Samples whose faces tell a side; those of open sheets do not.
     """
     shape, nearest, steps = surface.nearest.shape, surface.nearest, surface.steps
-    values, confidence = np.empty(shape), np.ones(shape, dtype=np.float32)
+    values, confidence = np.empty(shape), surface.squares
     cell, reach = float(steps.max()), float(np.linalg.norm(steps))
     links, normals = surface.features.links, surface.features.normals
 
+    rooms = local()  # memory for feet is taken once for each thread
+
     def planes(first: int) -> None:
         here = slice(first, first + PLANES)
+        if not hasattr(rooms, "feet"):
+            rooms.feet = np.empty((PLANES, *shape[1:], 3), dtype=np.float32)
         told = np.zeros((0, 0, 0), dtype=np.bool_) if telling is None else telling[nearest[here]]
-        places = (nearest[here], values[here], np.empty((*nearest[here].shape, 3), dtype=np.float32))
+        places = (nearest[here], values[here], rooms.feet[: len(nearest[here])])
         _nearest_to_samples(links, surface.owners, surface.crossings, steps, reach, first, *places)
         for way in (1, -1):
             _nearest_to_neighbours(links, steps, first, (APART * cell) ** 2, way, *places)
@@ -287,8 +296,8 @@ def _confidences(trusted: NDArray[np.float32], nearest: NDArray[np.int32], confi
     for i in range(planes):
         for j in range(n1):
             for k in range(n2):
-                if nearest[i, j, k] < 0:
-                    confidence[i, j, k] = trusted[-1 - np.int64(nearest[i, j, k])]
+                c = -1 - np.int64(nearest[i, j, k])
+                confidence[i, j, k] = trusted[c] if c >= 0 else 1.0
 
 
 @compiled(nogil=True, error_model="numpy")
