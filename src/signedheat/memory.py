@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import mmap
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from .errors import MemoryLimitError
 
@@ -46,6 +52,23 @@ def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float]
         f"{what} needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
         remedy=remedy(fitting_count(count, estimate, available - libraries())),
     )
+
+
+def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """An array of zeros, of which only the pages that are written to take memory.
+
+    NumPy's own asks for pages of 2 MB, of which few stay untouched where a surface runs through a grid.
+
+    Examples
+    --------
+    >>> untouched_zeros((2, 2), np.float32).tolist()
+    [[0.0, 0.0], [0.0, 0.0]]
+    """
+    count = math.prod(shape)
+    if count == 0:
+        return np.zeros(shape, dtype=dtype)
+    pages = mmap.mmap(-1, count * np.dtype(dtype).itemsize)
+    return np.frombuffer(pages, dtype=dtype, count=count).reshape(shape)
 
 
 def fitting_count(count: int, estimate: Callable[[int], float], available: float) -> int:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from ...memory import untouched_zeros
 from ...operators.grid.node_sources import STRETCH, NodeSources, with_room
 
 
@@ -36,7 +37,7 @@ def merge_in_cells(
     sources : NodeSources
         The sum of the given sources and those of the simplices; replaces the given ones, whose arrays it may reuse.
     """
-    slots = np.zeros(int(np.prod(shape - 1)), dtype=np.int32)  # memory that is never touched costs nothing
+    slots = untouched_zeros((int(np.prod(shape - 1)),), np.int32)
     dimension = corners.shape[2]
     sums, labels, nodes = _merge(
         np.ascontiguousarray(corners),

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from ...memory import untouched_zeros
 from .node_sources import STRETCH, NodeSources
 from .stencil import by_slabs
 from .sweeps import TINY, diffuse_by_sweeps
@@ -211,7 +212,7 @@ def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[
 
 def _carried(level: Level, shape: tuple[int, ...], power: float) -> CoarseGuess | None:
     """The values of a level, for the next coarser one: in stretches of which all nodes are known."""
-    vectors = np.zeros((*shape, 4), dtype=np.float32)
+    vectors = untouched_zeros((*shape, 4), np.float32)
     counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
     _carry(level.vectors, level.inside, level.factors, np.float32(power), vectors, counts)
     full = np.full(counts.shape[3], STRETCH)

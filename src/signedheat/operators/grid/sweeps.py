@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from ...memory import untouched_zeros
 from .node_sources import STRETCH, NodeSources
 from .wavefront import sweep_lines
 
@@ -46,7 +47,7 @@ def diffuse_by_sweeps(
         X; memory outside the active stretches is never touched, so that it costs nothing.
     """
     shape = sources.shape
-    vectors = np.zeros((*shape, 4), dtype=np.float32) if given is None else given
+    vectors = untouched_zeros((*shape, 4), np.float32) if given is None else given
     lines = shape[0] * shape[1] * shape[2]
     sweep_lines(
         _sweep_tiles,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...compiled import compiled
 from ...parallel import n_threads
 from .node_sources import STRETCH, NodeSources
-from .stencil import divergence, solve_poisson
+from .stencil import solve_poisson
 
 BLOCK = 4
 """Cells along the edge of the blocks whose area vectors are one dipole to the walls."""
@@ -51,15 +51,11 @@ def winding_numbers(
     """
     dimension = len(shape)
     spacing = nodes.steps[4 - dimension :]
-    volume = float(np.prod(spacing))
     room = _room(nodes, dimension)
     inner = tuple(slice(below, below + n) for (below, _), n in zip(room, shape, strict=True))
-    dense = dense_vectors(nodes, dimension, room)
-    if any(sum(room, ())):
-        shape, positions = dense.shape[1:], positions + [below for below, _ in room]
-    right = divergence(np.moveaxis(dense, 0, -1), spacing)
-    del dense
-    right *= -(volume ** ((dimension - 1) / dimension)) / volume
+    shape = tuple(n + below + above for n, (below, above) in zip(shape, room, strict=True))
+    positions = positions + [below for below, _ in room]
+    right = _sources(nodes, shape, [below for below, _ in room], spacing)
     dipoles, strengths = blocks_of_dipoles(positions, vectors, dimension)
     walls = [_wall(axis, end, shape) for axis in range(dimension) for end in (0, 1)]
     core = CORE * float(spacing.max())
@@ -116,18 +112,43 @@ def blocks_of_dipoles(
     return means.astype(np.float64), sums.astype(np.float64)
 
 
-def dense_vectors(nodes: NodeSources, dimension: int, room: list[tuple[int, int]]) -> NDArray[np.float32]:
-    """(d, *shape) the vectors at all nodes, with room around them."""
-    padded = [(0, 0)] * (4 - dimension) + room
-    result = np.zeros((dimension, *(n + sum(pair) for n, pair in zip(nodes.shape, padded, strict=True))), np.float32)
-    places, rows = np.argwhere(nodes.places >= 0), nodes.places[nodes.places >= 0]
-    i, j, k = (places[:, axis, None] + padded[axis][0] for axis in range(3))
-    m = STRETCH * places[:, 3, None] + np.arange(STRETCH)
-    there = m < nodes.shape[3]
-    at = tuple(np.broadcast_to(index, there.shape)[there] for index in (i, j, k, m + padded[3][0]))
-    for component in range(dimension):
-        result[component][at] = nodes.sums[rows, :, component][there]
-    return result.reshape(dimension, *result.shape[5 - dimension :])
+def _sources(
+    nodes: NodeSources, shape: tuple[int, ...], below: list[int], spacing: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(*shape) ∇·(n δ), with these layers of nodes before the grid's own; no vectors are at its walls."""
+    dimension = len(shape)
+    right = np.zeros((1,) * (4 - dimension) + shape)
+    first, scales = np.zeros(4, dtype=np.int64), np.zeros(4)
+    first[4 - dimension :] = below
+    volume = float(np.prod(spacing))
+    scales[4 - dimension :] = -0.5 / spacing * volume ** ((dimension - 1) / dimension) / volume
+    _add_divergence(np.argwhere(nodes.places >= 0), nodes.places, nodes.sums, first, scales, right)
+    return right.reshape(shape)
+
+
+@compiled(nogil=True)
+def _add_divergence(
+    stretches: NDArray[np.int64],
+    places: NDArray[np.int32],
+    sums: NDArray[np.float32],
+    first: NDArray[np.int64],
+    scales: NDArray[np.float64],
+    right: NDArray[np.float64],
+) -> None:
+    """Differences of the vectors in some stretches, between the nodes before and behind."""
+    skipped = 0
+    while scales[skipped] == 0.0:
+        skipped += 1
+    for s in range(len(stretches)):
+        a, b, c, d = stretches[s]
+        i, j, k = a + first[0], b + first[1], c + first[2]
+        for m in range(STRETCH):
+            n = STRETCH * d + m + first[3]
+            for axis in range(skipped, 4):
+                flow = scales[axis] * sums[places[a, b, c, d], m, axis - skipped]
+                if flow != 0.0:
+                    right[i + (axis == 0), j + (axis == 1), k + (axis == 2), n + (axis == 3)] += flow
+                    right[i - (axis == 0), j - (axis == 1), k - (axis == 2), n - (axis == 3)] -= flow
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, NDArray[np.float64]]:
