@@ -9,9 +9,10 @@ from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..lowering.area_elements import AreaSamples
 from ..operators.grid.boundary_areas import distances_to_samples
+from .inside import Sides, nothing_inside
 from .rims import rims_of
 from .shape_sharpening import Shape
-from .sides import FAR, Sides, choose_sides, nothing_inside
+from .sides import FAR, choose_sides
 
 
 def sides_of_shape(

@@ -35,13 +35,14 @@ from ..solver import SignedHeatSolver, checked
 from .band_plan import coarse_grid
 from .bands import band_around
 from .face_density import as_if_whole
+from .inside import Sides, closed_sides
 from .joining import Shape, joined_shape
 from .orientation import orientation
 from .point_orientation import orient_points
 from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .shape_sides import sides_of_shape
 from .sharpening import sharpen
-from .sides import FAR, Sides, closed_sides
+from .sides import FAR
 from .steps import Steps
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
 
