@@ -44,11 +44,12 @@ class Tile:
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Blocks with distances to faces, and functions that are negative inside."""
+    """Blocks with distances to faces, functions that are negative inside, and confidence in the nearest face."""
 
     blocks: Blocks
     distances: NDArray[np.float64]
     function: NDArray[np.float64]
+    trusted: NDArray[np.float16]
 
 
 def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
@@ -66,7 +67,7 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     own = ((blocks.places >= low) & (blocks.places < high)).all(axis=1)
     signs = np.where(sides.function[own] < 0, -1.0, 1.0)
     distances, places = sides.distances[own], blocks.places[own]
-    confidence = np.ones(distances.shape, dtype=np.float16)
+    confidence = sides.trusted[own]
     crossings = np.zeros((0, 18))
     if is_open:
         last = -(-np.array(plan.grid.shape) // SIDE)
@@ -86,7 +87,7 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
     """Distances to faces, (n, 512), and signed functions: what the nearest face tells, else the coarse field."""
     n = len(blocks)
     distances, function = np.full((n, NODES), np.inf), np.empty((n, NODES))
-    doubtful = np.zeros((n, NODES), dtype=bool)
+    doubtful, trusted = np.zeros((n, NODES), dtype=bool), np.ones((n, NODES), dtype=np.float16)
     near = min(NEAR * plan.coarse_cell, plan.open_reach)
     for begin in range(0, n, TOGETHER):
         here = slice(begin, begin + TOGETHER)
@@ -102,8 +103,9 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
         distances[here] = found.distances.reshape(-1, NODES)
         function[here] = signed.reshape(-1, NODES)
         doubtful[here] = (~told & plan.telling[found.faces]).reshape(-1, NODES)
+        trusted[here] = plan.features.trusted[found.faces].reshape(-1, NODES)
     completed_function(plan, blocks, distances, function, doubtful)
-    return _Sides(blocks, distances, function)
+    return _Sides(blocks, distances, function, trusted)
 
 
 def _crossings(plan: BandPlan, sides: _Sides, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.float64]:

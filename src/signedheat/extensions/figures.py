@@ -11,6 +11,7 @@ import numpy as np
 from ..diagnostics import (
     BoundsNothing,
     CompletedArea,
+    FacesRestored,
     LeftOut,
     OrientedPoints,
     ReachesBox,
@@ -39,6 +40,8 @@ def told(field: GridField | TetField | BandField) -> list[str]:
         if isinstance(note, ShapeOriented) and (note.turned_faces or note.merged_faces):
             lines.append(str(note))
         elif isinstance(note, OrientedPoints) and (note.normals_fitted or note.normals_turned):
+            lines.append(str(note))
+        elif isinstance(note, FacesRestored):
             lines.append(str(note))
         elif isinstance(note, LeftOut) and note.covered_faces:
             lines.append(str(note))

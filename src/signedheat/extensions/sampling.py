@@ -188,12 +188,13 @@ def surface_triangles(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """(m, 3, 3) triangles that cover the surface of a field once, and which of them only stand in for missing faces."""
     faces = surface.features.corners.reshape(-1, 3, 3) + surface.origin
+    restored = surface.features.trusted < 1.0
     try:
         contour = cast("GridField[Literal[3]] | BandField", field).contour(
             0.0
         )  # every field with a surface is in space
     except OutsideError:  # open sheets, which bound nothing
-        return faces, np.zeros(len(faces), dtype=bool)
+        return faces, restored
     triangles = contour.vertices[contour.faces]
     middles = triangles.mean(axis=1)
     inside = ((middles > field.grid.origin) & (middles < field.grid.upper)).all(axis=1)  # not the walls of the box
@@ -201,7 +202,7 @@ def surface_triangles(
     places = surface.nearest(middles[inside] - surface.origin)
     beside = (places.sides == 0) & (places.distances > BESIDE * float(surface.steps.max()))
     triangles = triangles[places.completed | beside]
-    return np.concatenate([faces, triangles]), np.arange(len(faces) + len(triangles)) >= len(faces)
+    return np.concatenate([faces, triangles]), np.concatenate([restored, np.ones(len(triangles), dtype=bool)])
 
 
 def _on_triangles(triangles: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:

@@ -89,6 +89,7 @@ def assemble(
     fit: Fit,
     phi: Callable[[], NDArray[np.float64]] | None = None,
     tells: Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None = None,
+    restored: NDArray[np.bool_] | None = None,
 ) -> Assembled:
     """Signed distance to shapes, and to the zero set of `sides` where they are missing.
 
@@ -99,7 +100,7 @@ def assemble(
 
     Around layers what `phi` returns, where given, takes the place of `sides`, which need not run in their middle; it is
     called where there are layers only. Faces tell no side where `tells`, given (s, 3) places on them in cells from the
-    first node, is False.
+    first node, is False. Those that are `restored` were not there.
     """
     steps = np.array(grid.spacing)
 
@@ -112,7 +113,8 @@ def assemble(
         if cloud.normals is None:
             raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
         sides = fitted_to_points(sides, steps, cloud.points - grid.origin, cloud.normals)
-    features = FaceFeatures.of(*_joined([part for part in parts if not isinstance(part, PointCloud)], grid.origin))
+    joined = _joined([part for part in parts if not isinstance(part, PointCloud)], grid.origin)
+    features = FaceFeatures.of(*joined, None if restored is None else _trust_in_faces(*joined, restored))
     band = FaceBand.of(features, grid.shape, steps)
     whole, n_faces = features, len(features.rows)
     left_out = np.full(n_faces, fit == "smooth")
@@ -121,7 +123,8 @@ def assemble(
     if left_out.any():
         if phi is not None:
             sides = np.where(_around_faces(left_out, band), middle(), sides)
-        features = FaceFeatures.of(features.vertices, features.faces[~left_out].astype(np.int64))
+        kept = features.faces[~left_out].astype(np.int64)
+        features = FaceFeatures.of(features.vertices, kept, features.trusted[~left_out])
         band = FaceBand.of(features, grid.shape, steps)
     edges, crossings, completed = _missing(sides, features, band, steps)
     gaps = max((REACH * mean_gap(cloud.points) for cloud in clouds), default=0.0)
@@ -222,6 +225,20 @@ def confidence_at(
     distances += [scipy.spatial.cKDTree(cloud).query(points, workers=-1)[0] for cloud in clouds]
     excess = np.maximum(np.min(distances, axis=0) - gap, 0.0)
     return np.asarray(DOUBT * diagonal / (DOUBT * diagonal + excess), dtype=np.float32)
+
+
+def _trust_in_faces(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], restored: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """(m,) 1 in faces that were there; in others as at the centre of their incircle, as far from the rim as can be."""
+    corners = vertices[faces[restored]]
+    sides = np.roll(corners, -1, axis=1) - corners
+    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    radii = areas / np.maximum(np.linalg.norm(sides, axis=2).sum(axis=1), np.finfo(float).tiny)
+    doubt = DOUBT * float(np.linalg.norm(np.ptp(vertices[faces].reshape(-1, 3), axis=0)))
+    trust = np.ones(len(faces), dtype=np.float32)
+    trust[restored] = np.minimum(doubt / (doubt + radii), np.nextafter(np.float32(1.0), np.float32(0.0)))
+    return trust
 
 
 def _joined(parts: Sequence[Shape], origin: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -39,6 +39,7 @@ from .inside import Sides, closed_sides
 from .joining import Shape, joined_shape
 from .orientation import orientation
 from .point_orientation import orient_points
+from .restoring import restored
 from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .shape_sides import sides_of_shape
 from .sharpening import sharpen
@@ -116,8 +117,9 @@ def solid_distance(
 ) -> GridField | TetField | BandField:
     """Signed distance to a solid: to the shape where it is there, to what completes it where surface is missing.
 
-    Orient the shape, unite its bodies, compute its generalized signed distance φ, decide what is inside, and measure
-    distance anew: to the faces, exactly, and to those parts of the completed surface that stand in for what is missing.
+    Orient the shape, put back faces that it lost between vertices which are there, unite its bodies, compute its
+    generalized signed distance φ, decide what is inside, and measure distance anew: to the faces, exactly, and to those
+    parts of the completed surface that stand in for what is missing.
     Around open sheets that bound nothing distance is positive on both sides.
 
     Parameters
@@ -141,7 +143,7 @@ def solid_distance(
     diffusion : float
         τ in ``t = τ h²``.
     as_oriented : bool
-        Take faces as they are, whichever way they face.
+        Take faces as they are, whichever way they face, and put back none that were lost.
     keep_overlaps : bool
         Count what lies inside other bodies as surface.
     plain : bool
@@ -153,7 +155,7 @@ def solid_distance(
     -------
     GridField or TetField; BandField with a `band`
         φ < 0 inside. ``diagnostics.notes`` tells what was done, where there is something to tell: `ShapeOriented` or
-        `OrientedPoints`, `LeftOut`, `CompletedArea`, `ReachesBox`, `BoundsNothing`.
+        `OrientedPoints`, `FacesRestored`, `LeftOut`, `CompletedArea`, `ReachesBox`, `BoundsNothing`.
 
     Raises
     ------
@@ -202,9 +204,9 @@ def _oriented(shape: Shape, notes: list[Note]) -> tuple[Merged, bool]:
         notes.append(OrientedPoints(oriented.n_fitted, oriented.n_turned))
         return merge_duplicates(oriented.cloud), False
     found = orientation(shape)
-    notes.append(found.note)
-    open_area = found.undecided_area or found.wall_area or found.nonorientable_parts
-    return Merged(found.shape, found.walls, 0), found.closed_parts == found.n_parts and not open_area
+    whole = restored(found)
+    notes += [note for note in (found.note, whole.note) if note is not None]
+    return Merged(whole.shape, whole.walls, 0, whole.restored), whole.closed
 
 
 def _elsewhere(shape: Shape, domain: Grid | TetMesh, steps: Steps, progress: Progress | None) -> GridField | TetField:
@@ -239,7 +241,7 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     refuse_beyond_memory(grid, BYTES_PER_NODE if steps.sharpen else BYTES_IF_PLAIN)
     discretization = discretize(grid)
     with stopwatch("unite"):
-        shape, samples, winding = _united(merged, grid, steps, notes)
+        merged, samples, winding = _united(merged, grid, steps, notes)
     if samples is None:  # doubled walls alone: there is no φ
         phi, time = None, float("nan")
     else:
@@ -259,11 +261,11 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
         if samples is not None and not closed:
             winding, samples = as_if_whole(winding, samples)
         cell = float(grid.spacing.max())
-        sides = closed_sides(winding, cell) if closed else sides_of_shape(shape, phi, winding, samples, grid)
+        sides = closed_sides(winding, cell) if closed else sides_of_shape(merged.shape, phi, winding, samples, grid)
         known = None if phi is None else _known(phi) if closed else sides.phi
         del phi
     with stopwatch("sharpen"):
-        sharpened = _sharpened(shape, known, sides, closed, winding, grid, steps.closed)
+        sharpened = _sharpened(merged, known, sides, closed, winding, grid, steps.closed)
     notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
     return _solid(sharpened, grid, notes, stopwatch, time)
 
@@ -300,7 +302,7 @@ def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwa
 
     stopwatch.skip(4)
     with stopwatch("sharpen"):
-        sharpened = assemble([shape], grid, function, steps.closed, phi)
+        sharpened = assemble([shape], grid, function, steps.closed, phi, restored=merged.restored)
     return _solid(sharpened, grid, notes, stopwatch, float("nan"))
 
 
@@ -315,7 +317,7 @@ def _diagnostics(notes: list[Note], stopwatch: Stopwatch, time: float) -> Diagno
 
 
 def _sharpened(
-    shape: Shape,
+    merged: Merged,
     phi: Callable[[], NDArray[np.float64]] | None,
     sides: Sides,
     closed: bool,
@@ -324,10 +326,11 @@ def _sharpened(
     fit: Fit,
 ) -> Assembled:
     """Distance to the shape; faces beside which nothing is solid do not tell sides. The fit is for closed shapes."""
+    shape = merged.shape
     if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
         return assemble([shape], grid, _guarded(phi(), sides, shape, grid), "auto")
     if phi is not None and closed:
-        return assemble([shape], grid, sides.function, fit, phi)
+        return assemble([shape], grid, sides.function, fit, phi, restored=merged.restored)
     refused = _widened(sides.refused)
     upper = np.array(grid.shape) - 1
 
@@ -340,7 +343,7 @@ def _sharpened(
         return np.where(refused, sides.function, sides.phi())
 
     fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
-    return assemble([shape], grid, sides.function, fit, None if phi is None else accepted, tells)
+    return assemble([shape], grid, sides.function, fit, None if phi is None else accepted, tells, merged.restored)
 
 
 def _guarded(phi: NDArray[np.float64], sides: Sides, cloud: PointCloud, grid: Grid) -> NDArray[np.float64]:
@@ -366,17 +369,17 @@ def _widened(nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _united(
     merged: Merged, grid: Grid, steps: Steps, notes: list[Note]
-) -> tuple[Shape, AreaSamples | None, NDArray[np.float64]]:
+) -> tuple[Merged, AreaSamples | None, NDArray[np.float64]]:
     """The shape, its samples and its winding numbers, without what lies inside other bodies."""
     samples, winding = _wound(merged.shape, grid)
     if not steps.unite:
-        return merged.shape, samples, winding
+        return merged, samples, winding
     united = without_covered(merged, winding, grid)
     if united.left_out.merged_faces or united.left_out.covered_faces:
         notes.append(united.left_out)
     if united.shape is merged.shape:
-        return merged.shape, samples, winding
-    return united.shape, *_wound(united.shape, grid)
+        return merged, samples, winding
+    return merged.without(united), *_wound(united.shape, grid)
 
 
 def _wound(shape: Shape, grid: Grid) -> tuple[AreaSamples | None, NDArray[np.float64]]:

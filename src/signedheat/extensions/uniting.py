@@ -56,10 +56,13 @@ class Union(ShortRepr):
         What is left; the shape itself where nothing was left out, or else triangles, or points.
     left_out : LeftOut
         What is not.
+    origins : (m,) int, optional
+        Triangle of the shape that each face which is left is part of, if some were left out.
     """
 
     shape: Shape
     left_out: LeftOut
+    origins: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +77,21 @@ class Merged:
         Faces of doubled walls.
     count : int
         Duplicates left out.
+    restored : (m,) bool, optional
+        Faces that it had lost.
     """
 
     shape: Shape
     walls: NDArray[np.bool_]
     count: int
+    restored: NDArray[np.bool_] | None = None
+
+    def without(self, union: Union) -> Merged:
+        """What the union with itself left of it."""
+        if union.origins is None:
+            return replace(self, shape=union.shape)
+        restored = None if self.restored is None else self.restored[union.origins]
+        return replace(self, shape=union.shape, walls=self.walls[union.origins], restored=restored)
 
 
 def unite(shape: Shape | ForeignShape, domain: Grid | None = None, *, resolution: int = 128) -> Shape:
@@ -223,7 +236,7 @@ def _faces_left(
     share = 1.0 - float(result.face_areas.sum() / mesh.face_areas.sum())
     in_part = int((left_out & kept).sum())
     told = replace(duplicates, covered_faces=int(left_out.sum()), covered_area=share, cut_faces=in_part)
-    return Union(result, told)
+    return Union(result, told, origins[~covered])
 
 
 def _cut_where_covered(

@@ -25,7 +25,7 @@ class ClosestPoints:
     gradients : (n, 3) float
         Gradients of the distance, of length 1; on the surface, its normals.
     completed : (n,) bool
-        Whether the place lies on the completed surface, which stands in for faces that are missing.
+        Whether the place lies on surface that was not there: completed, or on a face that was put back.
     """
 
     points: NDArray[np.float64]
@@ -63,5 +63,5 @@ def closest_points(
         places.feet + surface.origin,
         sides * places.distances,
         places.directions * towards[:, None],
-        places.completed,
+        places.completed | places.restored,
     )

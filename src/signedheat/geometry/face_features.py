@@ -65,6 +65,8 @@ class FaceFeatures:
         The face on the other side of each edge, and its vertex that is not on it; −1 where the edge is not regular.
     vertex_starts, vertex_corners : (n + 1,), (3 m,) int
         Corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2.
+    trusted : (m,) float
+        Confidence in each face: 1 where it was there, less where it was put back.
     """
 
     corners: NDArray[np.float64]
@@ -81,6 +83,7 @@ class FaceFeatures:
     apexes: NDArray[np.int32]
     vertex_starts: NDArray[np.int64]
     vertex_corners: NDArray[np.int32]
+    trusted: NDArray[np.float32]
 
     @property
     def links(self) -> Links:
@@ -110,7 +113,9 @@ class FaceFeatures:
         )
 
     @classmethod
-    def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceFeatures:
+    def of(
+        cls, vertices: NDArray[np.float64], faces: NDArray[np.int64], trusted: NDArray[np.float32] | None = None
+    ) -> FaceFeatures:
         """Features of (m, 3) faces. Vertices at one position are one; faces without extent and copies are left out.
 
         Examples
@@ -121,18 +126,20 @@ class FaceFeatures:
         (4, True)
         """
         faces = same_positions(vertices)[faces]
+        trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
         a, b, c = faces.T
         proper = (a != b) & (b != c) & (c != a)
         if not proper.all():
-            faces = faces[proper]
+            faces, trusted = faces[proper], trusted[proper]
         if len(faces):  # what is near in space had better be near in memory
-            faces = faces[np.argsort(morton_codes(vertices[faces].mean(axis=1)), kind="stable")]
-            order, faces = _by_first_use(faces, len(vertices))
+            order = np.argsort(morton_codes(vertices[faces].mean(axis=1)), kind="stable")
+            trusted = trusted[order]
+            order, faces = _by_first_use(faces[order], len(vertices))
             vertices = vertices[order]
         table = edge_table(faces)
         copies = _copies(faces, table)
         if copies.any():
-            faces = faces[~copies]
+            faces, trusted = faces[~copies], trusted[~copies]
             table = edge_table(faces)
         corners = np.ascontiguousarray(vertices[faces].reshape(-1, 9))
         starts = np.zeros(len(vertices) + 1, dtype=np.int64)
@@ -155,6 +162,7 @@ class FaceFeatures:
             np.where(across < 0, -1, faces[across].sum(axis=2) - faces - np.roll(faces, -1, axis=1)).astype(np.int32),
             starts,
             _corners_around(faces, starts),
+            trusted,
         )
 
 

@@ -56,6 +56,8 @@ class SurfacePlaces:
         −1 behind, 1 in front of a face that tells the side; 0 where none does within `NEAR` cells.
     completed : (n,) bool
         Whether the nearest place is on the zero set, where there are no faces.
+    restored : (n,) bool
+        Whether it is on a face that was put back.
     """
 
     distances: NDArray[np.float64]
@@ -63,6 +65,7 @@ class SurfacePlaces:
     directions: NDArray[np.float64]
     sides: NDArray[np.float64]
     completed: NDArray[np.bool_]
+    restored: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +109,14 @@ class ExactSurface(Frozen):
     def _nearest_of_chunk(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
         """The attributes of `SurfacePlaces`, for points that are not many."""
         if not len(points):
-            return np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty(0), np.empty(0, dtype=bool)
+            return (
+                np.empty(0),
+                np.empty((0, 3)),
+                np.empty((0, 3)),
+                np.empty(0),
+                np.empty(0, dtype=bool),
+                np.empty(0, dtype=bool),
+            )
         order = np.argsort(morton_codes(points), kind="stable")  # neighbours have nearly the same way through the tree
         sorted_points = points[order]
         found = self.tree.search(sorted_points) if len(self.features.corners) else None
@@ -169,10 +179,11 @@ class ExactSurface(Frozen):
         """Of the face found for each point, and of the crossings `which` for those at `near`, what is nearer."""
         n = len(points)
         distances, feet, directions = np.full(n, np.inf), points.copy(), np.zeros((n, 3))
-        sides, completed = np.zeros(n), np.zeros(n, dtype=bool)
+        sides, completed, restored = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         if found is not None:
             distances, feet = found.distances, found.feet
             directions = self.features.face_normals[found.faces]
+            restored = self.features.trusted[found.faces] < 1.0
             told = found.regular if self.telling is None else found.regular & self.telling[found.faces]
             told &= distances <= NEAR * float(self.steps.max())
             sides = np.where(told, np.where(found.cosines < 0, -1.0, 1.0), 0.0)
@@ -189,13 +200,13 @@ class ExactSurface(Frozen):
             other = np.where(strayed, straight, other)
             nearer = other < distances[near]
             taken = near[nearer]
-            completed[taken], sides[taken] = True, 0.0
+            completed[taken], restored[taken], sides[taken] = True, False, 0.0
             distances[taken], feet[taken], directions[taken] = other[nearer], touched[nearer], rows[nearer, 5:8]
         apart = points - feet
         lengths = np.linalg.norm(apart, axis=1)
         clear = lengths > 1e-12 * np.abs(points).max(initial=1e-290)
         directions = np.where(clear[:, None], apart / np.where(clear, lengths, 1.0)[:, None], directions)
-        return np.where(clear, distances, 0.0), feet, directions, sides, completed
+        return np.where(clear, distances, 0.0), feet, directions, sides, completed, restored
 
     def _nearest_crossings(
         self, points: NDArray[np.float64], limits: NDArray[np.float64]

@@ -158,7 +158,7 @@ def signed_distances(
     inside : (*shape) bool
         Sides where no face tells them.
     trusted : (c,) float
-        From 0 to 1, for each crossing; faces have 1.
+        From 0 to 1, for each crossing.
     telling : (s,) bool, optional
         Samples whose faces tell a side; those of open sheets do not.
     """
@@ -178,7 +178,7 @@ def signed_distances(
         _nearest_to_samples(links, surface.owners, surface.crossings, steps, reach, first, *places)
         for way in (1, -1):
             _nearest_to_neighbours(links, steps, first, (APART * cell) ** 2, way, *places)
-        _confidences(trusted, nearest[here], confidence[here])
+        _confidences(surface.features.trusted, trusted, nearest[here], confidence[here])
         _signs(surface.features.rows, normals, told, steps, first, NEAR * cell, inside[here], *places[:2])
 
     threads = n_threads() if nearest.size >= SMALL else 1
@@ -291,13 +291,18 @@ def _nearest_to_neighbours(
 
 
 @compiled(nogil=True)
-def _confidences(trusted: NDArray[np.float32], nearest: NDArray[np.int32], confidence: NDArray[np.float32]) -> None:
+def _confidences(
+    faces: NDArray[np.float32],
+    crossings: NDArray[np.float32],
+    nearest: NDArray[np.int32],
+    confidence: NDArray[np.float32],
+) -> None:
     planes, n1, n2 = nearest.shape
     for i in range(planes):
         for j in range(n1):
             for k in range(n2):
-                c = -1 - np.int64(nearest[i, j, k])
-                confidence[i, j, k] = trusted[c] if c >= 0 else 1.0
+                which = np.int64(nearest[i, j, k])
+                confidence[i, j, k] = crossings[-1 - which] if which < 0 else faces[which]
 
 
 @compiled(nogil=True, error_model="numpy")

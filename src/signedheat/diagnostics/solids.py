@@ -1,0 +1,176 @@
+"""Notes on shapes in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .note import Note
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SampledSource(Note):
+    """The source on a grid, merged in its cells: number of samples, fractions of the area outside and cancelled."""
+
+    samples: int
+    area_outside: float
+    area_cancelled: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.samples} samples of the source; {self.area_outside:.3g} of its area lies outside the grid, "
+            f"{self.area_cancelled:.3g} cancels"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OutsideMesh(Note):
+    """Sources that leave the tet mesh: their indices, and the fraction of the area of each that is dropped."""
+
+    sources_outside: NDArray[np.int64]
+    area_left_out: NDArray[np.float64]
+
+    def __str__(self) -> str:
+        told = zip(self.sources_outside, self.area_left_out, strict=True)
+        return "; ".join(f"source {k} outside the mesh: {100 * part:.3g} % of its area, left out" for k, part in told)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShapeOriented(Note):
+    """How the faces of a shape were oriented; fractions are of its area. The values are those of `Orientation`."""
+
+    turned_faces: int
+    turned_area: float
+    turned_parts: int
+    merged_faces: int
+    nonorientable_parts: int
+    undecided_area: float
+    doubled_walls: int
+    nested_bodies: int
+    cavities: int
+
+    def __str__(self) -> str:
+        told = [
+            (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.1%} of the area"),
+            (self.merged_faces, f"duplicate faces merged: {self.merged_faces}"),
+            (self.nonorientable_parts, f"parts that cannot be oriented: {self.nonorientable_parts}"),
+            (self.doubled_walls, f"doubled walls: {self.doubled_walls}"),
+            (self.nested_bodies, f"bodies hidden in others: {self.nested_bodies}"),
+            (self.cavities, f"cavities: {self.cavities}"),
+            (self.undecided_area, f"sheets without an inside: {self.undecided_area:.1%} of the area"),
+        ]
+        return "; ".join(text for value, text in told if value) or "faces are oriented as they were given"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OrientedPoints(Note):
+    """Number of normals of a point cloud that were fitted, and that were turned."""
+
+    normals_fitted: int
+    normals_turned: int
+
+    def __str__(self) -> str:
+        return f"{self.normals_fitted} normals fitted, {self.normals_turned} turned"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LeftOut(Note):
+    """What a union leaves out of a shape.
+
+    Attributes
+    ----------
+    covered_faces : int
+        Faces, or points, that lie inside other bodies, wholly or in part.
+    covered_area : float
+        Their fraction of the area, as far as they do.
+    cut_faces : int
+        Those that lie inside in part, and were cut.
+    merged_faces : int
+        Duplicates.
+    doubled_walls : int
+        Faces that are there twice, once facing each way; they stay, unless they lie inside a body.
+    """
+
+    covered_faces: int = 0
+    covered_area: float = 0.0
+    cut_faces: int = 0
+    merged_faces: int = 0
+    doubled_walls: int = 0
+
+    def __str__(self) -> str:
+        return (
+            f"left out: {self.covered_faces} faces, {self.covered_area:.1%} of the area, that lie inside other bodies "
+            f"({self.cut_faces} of them in part), and {self.merged_faces} duplicates"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FacesRestored(Note):
+    """Number of faces that were lost between vertices which are there, and are put back; their share of the area."""
+
+    restored_faces: int
+    restored_area: float
+
+    def __str__(self) -> str:
+        return f"lost faces restored: {self.restored_faces}, {self.restored_area:.1%} of the area"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SharpenedToShape(Note):
+    """Fraction of the faces left out because they lie in layers, and of the zero set that stands in for faces."""
+
+    layered_faces: float
+    completed_zero_set: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.completed_zero_set:.1%} of the zero set completed, {self.layered_faces:.1%} of the faces in layers"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompletedArea(Note):
+    """How much of the zero set stands in for missing surface.
+
+    Attributes
+    ----------
+    completed_area : float
+        Area of the zero set farther than 1.5 cells from any face, in squared units of length.
+    completed_share : float
+        The same, over the area of the whole zero set.
+    where : (k, 2, d) float
+        Lower and upper corners of boxes around its largest connected parts, largest first; at most five.
+    """
+
+    completed_area: float
+    completed_share: float
+    where: NDArray[np.float64]
+
+    def __str__(self) -> str:
+        told = f"{self.completed_share:.1%} of the surface is completed"
+        if not len(self.where):
+            return told
+        lower, upper = ("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in self.where[0])
+        return f"{told}, most of it between {lower} and {upper}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReachesBox(Note):
+    """The zero set leaves the grid, where it is cut off: fraction of the nodes on the walls that are inside."""
+
+    inside_on_walls: float
+
+    def __str__(self) -> str:
+        return f"the surface reaches the walls of the grid, of which {self.inside_on_walls:.1%} are inside"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BoundsNothing(Note):
+    """Fraction of the area that has the same side on both sides: distance to it is positive all around."""
+
+    open_area: float
+
+    def __str__(self) -> str:
+        return f"{self.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"

@@ -1,0 +1,243 @@
+"""Faces that are lost while their vertices are there: small holes, closed by the triangles that bend least.
+
+The surface across a hole that lost no vertices is known but for its diagonals. Of all triangulations of the hole's
+loop, the one whose edges bend least, ``Σ length · angle`` with the rim's edges included (twice the total absolute mean
+curvature), goes on as the faces around it do; dynamic programming over the loop finds it (Barequet and Sharir 1995,
+Liepa 2003), each part of a loop keeping the triangle at its end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .edges import edge_table
+from .hole_filling import next_around_gap
+
+MOST_SIDES = 16
+"""Sides of a hole from which on vertices, too, may be lost."""
+BENT = np.deg2rad(70.0)
+"""Root mean square of the angles at the rim from which on a lid does not go on as the surface around it: at the end of
+a tube it is 90°."""
+FOLDED = np.deg2rad(120.0)
+"""The same for one triangle, and for holes of few sides beside others: a tetrahedron bends by 109°, the back of a face
+by 180°."""
+FEW = 6
+"""Most sides of such a hole: one that is alone may be where half a body ends."""
+BACK = -0.5
+"""Cosine with the mean normal at the rim from which on down a triangle looks back, and is folded over what is there."""
+CRACK = 1e-4
+"""Twice the area of a lid over its squared rim up to which it only sews up a crack, however it bends."""
+TOGETHER = 4096
+"""Holes that are triangulated at once."""
+
+
+def lost_faces(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], sheets: NDArray[np.bool_] | None = None
+) -> NDArray[np.int64]:
+    """(k, 3) triangles that close the small holes of a surface whose faces agree with their neighbours.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions, each there once.
+    faces : (m, 3) int
+        Triangles on three vertices each.
+    sheets : (m,) bool, optional
+        Those that bound nothing. Larger holes in them may be meant: only such of three sides are closed.
+
+    Returns
+    -------
+    (k, 3) int
+        Triangles between the same vertices, oriented as the others. They close holes of at most `MOST_SIDES` sides
+        across which the surface goes on, and holes of three sides unless the face would be folded over another; where
+        there are such, also holes of up to `FEW` sides across which it bends, as where a box lost a side.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> lost_faces(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])).tolist()
+    [[3, 2, 1]]
+    """
+    holes = _small_holes(vertices, faces, sheets)
+    lids = [_lids(some, FOLDED if some.sides == 3 else BENT) for some in holes]
+    if any(map(len, lids)):
+        lids = [_lids(some, FOLDED) if 3 < some.sides <= FEW else lid for some, lid in zip(holes, lids, strict=True)]
+    return np.concatenate([np.empty((0, 3), dtype=np.int64), *lids])
+
+
+def _small_holes(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], sheets: NDArray[np.bool_] | None
+) -> list[_Holes]:
+    """Holes of at most `MOST_SIDES` sides, by how many; in sheets only those of three."""
+    table = edge_table(faces)
+    is_open = table.face_counts[table.face_edges] == 1
+    is_open &= (np.bincount(faces.ravel(), minlength=len(vertices)) > 1)[faces].any(axis=1)[:, None]  # not alone
+    owners, sides = np.nonzero(is_open)
+    if not len(owners):
+        return []
+    tails, heads = faces[owners, sides], faces[owners, (sides + 1) % 3]
+    face_normals = _unit(_area_vectors(vertices[faces]))
+    sums = [np.bincount(faces.ravel(), np.repeat(column, 3), len(vertices)) for column in face_normals.T]
+    following = next_around_gap(vertices, _unit(np.stack(sums, axis=1)), tails, heads)
+    touching = np.zeros(len(vertices), dtype=bool)
+    touching[tails] = True
+    known = table.vertices[touching[table.vertices].all(axis=1)]
+    taken = np.sort(_keys(known[:, 0], known[:, 1]))
+    found = []
+    for loops in _simple_loops(tails.tolist(), following.tolist()):
+        for begin in range(0, len(loops), TOGETHER):
+            edges = loops[begin : begin + TOGETHER, ::-1]  # around the hole, against the faces
+            if sheets is not None and loops.shape[1] > 3:
+                edges = edges[sheets[owners[edges]].mean(axis=1) <= 0.5]
+            found.append(_Holes(vertices, heads[edges], face_normals[owners[edges]], taken))
+    return found
+
+
+def _simple_loops(tails: list[int], following: list[int]) -> list[NDArray[np.int64]]:
+    """Edges of loops that pass no vertex twice, (l, n) for each n; loops that touch themselves come apart there."""
+    loops: dict[int, list[list[int]]] = {}
+    passed = [False] * len(tails)
+    for first in range(len(tails)):
+        walk: list[int] = []
+        places: dict[int, int] = {}
+        edge = first
+        while edge >= 0:
+            begin = places.get(tails[edge])
+            if begin is not None:
+                loop = walk[begin:]
+                del walk[begin:]
+                for each in loop:
+                    del places[tails[each]]
+                if 3 <= len(loop) <= MOST_SIDES:
+                    loops.setdefault(len(loop), []).append(loop)
+            if passed[edge]:
+                break
+            passed[edge] = True
+            places[tails[edge]] = len(walk)
+            walk.append(edge)
+            edge = following[edge]
+    return [np.array(loops[n]) for n in sorted(loops)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Holes:
+    """Holes of n sides.
+
+    Attributes
+    ----------
+    vertices : (v, 3) float
+        Positions.
+    loops : (l, n) int
+        Vertices around each.
+    beside : (l, n, 3) float
+        Unit normals of the faces along the edges, of which the k-th begins at the k-th vertex.
+    taken : (e,) int
+        Sorted keys of the edges that are there.
+    """
+
+    vertices: NDArray[np.float64]
+    loops: NDArray[np.int64]
+    beside: NDArray[np.float64]
+    taken: NDArray[np.int64]
+
+    @property
+    def sides(self) -> int:
+        """n."""
+        return self.loops.shape[1]
+
+    @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """(n, n, l) distance between the vertices of each."""
+        corners = self.vertices[self.loops].transpose(1, 0, 2)
+        lengths: NDArray[np.float64] = np.linalg.norm(corners[:, None] - corners, axis=-1)
+        return lengths
+
+    def is_taken(self, i: int, k: int) -> NDArray[np.bool_]:
+        """(l,) whether the i-th and the k-th vertex have an edge already."""
+        keys = _keys(self.loops[:, i], self.loops[:, k])
+        at = np.minimum(np.searchsorted(self.taken, keys), len(self.taken) - 1)
+        found: NDArray[np.bool_] = self.taken[at] == keys
+        return found
+
+
+def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
+    """(k, 3) triangles that close holes across which the surface bends by an angle of at most `steepest`.
+
+    ``bends[i, j]`` is that of the best lid between the i-th and the j-th vertex, but for the edge that joins the two,
+    ``rims[i, j]`` the sum of lengths times squared angles at the rim, and ``normals[i, j]`` that of its triangle there.
+    """
+    count, n = holes.loops.shape
+    every = np.arange(count)
+    bends, rims = np.zeros((n, n, count)), np.zeros((n, n, count))
+    normals, apexes = np.zeros((n, n, count, 3)), np.zeros((n, n, count), dtype=np.int64)
+    for i in range(n - 1):
+        normals[i, i + 1] = holes.beside[:, i]
+    for span in range(2, n):
+        for i in range(n - span):
+            j = i + span
+            made = np.array([_unit(_area_vectors(holes.vertices[holes.loops[:, [i, k, j]]])) for k in range(i + 1, j)])
+            before, behind = _angles(made, normals[i, i + 1 : j]), _angles(made, normals[i + 1 : j, j])
+            sums = bends[i, i + 1 : j] + holes.lengths[i, i + 1 : j] * before
+            sums += bends[i + 1 : j, j] + holes.lengths[i + 1 : j, j] * behind
+            best = np.argmin(sums, axis=0)
+            bends[i, j] = sums[best, every]
+            if span < n - 1:
+                bends[i, j][holes.is_taken(i, j)] = np.inf
+            at_rim = rims[i, i + 1 : j] + rims[i + 1 : j, j]
+            at_rim[0] += holes.lengths[i, i + 1] * before[0] ** 2
+            at_rim[-1] += holes.lengths[j - 1, j] * behind[-1] ** 2
+            rims[i, j], normals[i, j], apexes[i, j] = at_rim[best, every], made[best, every], best + i + 1
+    at_rim = rims[0, -1] + holes.lengths[-1, 0] * _angles(normals[0, -1], holes.beside[:, -1]) ** 2
+    around = holes.lengths[np.arange(n), np.arange(n) - 1].sum(axis=0)
+    triangles, of_hole = _triangles(apexes, np.flatnonzero(np.isfinite(bends[0, -1])))
+    triangles = np.take_along_axis(holes.loops[of_hole], triangles, axis=1)
+    vectors = _area_vectors(holes.vertices[triangles])
+    closed = at_rim <= steepest**2 * around
+    if n > 3:
+        ahead = _unit(holes.beside.sum(axis=1))[of_hole]
+        closed[of_hole[np.einsum("ij,ij->i", _unit(vectors), ahead) < BACK]] = False
+    lid_areas = np.bincount(of_hole, np.linalg.norm(vectors, axis=1), count)
+    return triangles[(closed | (lid_areas <= CRACK * around**2))[of_hole]]
+
+
+def _triangles(apexes: NDArray[np.int64], holes: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(k, 3) places around the loops of some holes of the corners of their best lids' triangles, and whose they are."""
+    triangles, owners = [np.empty((0, 3), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    parts = [(0, len(apexes) - 1, holes)]
+    while parts:
+        i, j, some = parts.pop()
+        for k in np.unique(apexes[i, j, some]).tolist() if j - i > 1 else []:
+            here = some[apexes[i, j, some] == k]
+            triangles.append(np.tile([i, k, j], (len(here), 1)))
+            owners.append(here)
+            parts += [(i, k, here), (k, j, here)]
+    return np.concatenate(triangles), np.concatenate(owners)
+
+
+def _angles(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(...) angles between (..., 3) unit vectors; 0 where one of them is 0."""
+    flat = ~(one.any(axis=-1) & other.any(axis=-1))
+    angles: NDArray[np.float64] = np.arccos(np.clip(np.einsum("...j,...j->...", one, other), -1.0, 1.0))
+    return np.where(flat, 0.0, angles)
+
+
+def _keys(one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+    """A number for each pair of vertices, whichever comes first."""
+    keys: NDArray[np.int64] = (np.minimum(one, other) << 32) | np.maximum(one, other)
+    return keys
+
+
+def _area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) twice the area vectors of (n, 3, 3) triangles."""
+    vectors: NDArray[np.float64] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return vectors
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) vectors of length 1, or 0."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1.0)

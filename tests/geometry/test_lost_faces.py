@@ -1,0 +1,99 @@
+"""Small holes are closed by the faces that were lost there."""
+
+import numpy as np
+import pytest
+
+from signedheat import samples
+from signedheat.geometry.edges import edge_table
+from signedheat.geometry.lost_faces import FEW, MOST_SIDES, lost_faces
+
+
+def unordered(faces):
+    return {tuple(sorted(face)) for face in faces.tolist()}
+
+
+def ring_with_lid_missing(n, height):
+    """A cone of n sides without its tip, above a disc: a loop of n sides around the axis is open."""
+    angles = 2 * np.pi * np.arange(n) / n
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(n)], axis=1)
+    vertices = np.concatenate([circle, 0.3 * circle + [0, 0, height], [[0.0, 0, 0]]])
+    k, after = np.arange(n), (np.arange(n) + 1) % n
+    sides = np.concatenate([np.stack([k, after, n + after], 1), np.stack([k, n + after, n + k], 1)])
+    return vertices, np.concatenate([sides, np.stack([after, k, np.full(n, 2 * n)], 1)])
+
+
+@pytest.mark.parametrize("share", [0.02, 0.15])
+def test_faces_lost_at_random_are_found_but_for_diagonals(share):
+    sphere = samples.sphere(4)
+    lost = np.random.default_rng(1).random(sphere.n_faces) < share
+    found = lost_faces(sphere.vertices, sphere.faces[~lost])
+    assert len(found) == lost.sum()
+    again = unordered(found) & unordered(sphere.faces[lost])
+    assert len(again) >= 0.85 * lost.sum()
+    table = edge_table(np.concatenate([sphere.faces[~lost], found]))
+    assert (table.face_counts == 2).all()
+    assert (np.bincount(table.face_edges.ravel(), np.where(table.forward.ravel(), 1, -1)) == 0).all()
+
+
+def test_one_lost_face_of_each_kind():
+    sphere = samples.sphere(2)
+    for k in (0, 17, 99):
+        assert unordered(lost_faces(sphere.vertices, np.delete(sphere.faces, k, axis=0))) == unordered(
+            sphere.faces[[k]]
+        )
+
+
+def test_holes_that_touch_at_a_vertex_are_two():
+    sphere = samples.sphere(3)
+    first = sphere.faces[0]
+    touching = (sphere.faces == first[0]).any(axis=1) & (np.isin(sphere.faces, first).sum(axis=1) == 1)
+    lost = np.array([0, np.flatnonzero(touching)[0]])
+    found = lost_faces(sphere.vertices, np.delete(sphere.faces, lost, axis=0))
+    assert unordered(found) == unordered(sphere.faces[lost])
+
+
+def test_the_corner_of_a_cube_comes_back():
+    """Three triangles on three sides: the lid that bends least is that of the cube, though its edges bend by 90°."""
+    corners = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
+    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([[s[0], s[k], s[k + 1]] for s in squares for k in (1, 2)])
+    around = np.flatnonzero((faces == 0).any(axis=1))
+    found = lost_faces(corners, np.delete(faces, around[:3], axis=0))
+    whole = np.concatenate([np.delete(faces, around[:3], axis=0), found])
+    volume = np.einsum("ij,ij->", corners[whole[:, 0]], np.cross(corners[whole[:, 1]], corners[whole[:, 2]])) / 6
+    assert abs(volume) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("height", [0.1, 3.0])
+def test_a_lid_on_a_steep_ring_is_put_on_a_small_one_beside_another_hole_only(height):
+    """Around 90° the lid does not go on as the sides do: they may be the end of something longer."""
+    for n in (FEW, FEW + 2, MOST_SIDES + 1):
+        vertices, faces = ring_with_lid_missing(n, height)
+        goes_on = height < 1 and n <= MOST_SIDES
+        assert len(lost_faces(vertices, faces)) == (n - 2 if goes_on else 0)
+        assert len(lost_faces(vertices, faces[:-1])) == 1 + (n - 2 if goes_on or n <= FEW else 0)
+
+
+def test_faces_and_strips_that_hang_on_nothing_get_no_back():
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.2], [2, 1, 0.5], [5, 5, 5], [6, 5, 5], [5, 6, 5]])
+    faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4], [5, 6, 7]])
+    assert not len(lost_faces(vertices, faces))
+    assert not len(lost_faces(vertices, faces[:0]))
+
+
+def test_a_crack_is_sewn_up():
+    """One side of the seam has a vertex in the middle, which the other side does not know."""
+    vertices = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1e-9, 0], [1, 1, 0], [1, -1, 0.3]])
+    faces = np.array([[0, 2, 3], [2, 1, 3], [1, 0, 4], [3, 4, 0], [1, 4, 3]])
+    assert unordered(lost_faces(vertices, faces)) == {(0, 1, 2)}
+
+
+def test_windows_in_sheets_stay():
+    grid = np.array([[x, y, 0.0] for y in range(4) for x in range(4)])
+    squares = [(4 * y + x, 4 * y + x + 1, 4 * y + x + 5, 4 * y + x + 4) for y in range(3) for x in range(3)]
+    faces = np.array([[s[0], s[k], s[k + 1]] for s in squares for k in (1, 2)])
+    window = np.delete(faces, [8, 9], axis=0)
+    assert len(lost_faces(grid, window)) == 2
+    assert not len(lost_faces(grid, window, np.ones(len(window), dtype=bool)))
+    torn = np.delete(faces, 8, axis=0)
+    assert unordered(lost_faces(grid, torn, np.ones(len(torn), dtype=bool))) == unordered(faces[[8]])
