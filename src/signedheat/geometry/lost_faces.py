@@ -74,9 +74,8 @@ def _small_holes(
 ) -> list[_Holes]:
     """Holes of at most `MOST_SIDES` sides, by how many; in sheets only those of three."""
     table = edge_table(faces)
-    is_open = table.face_counts[table.face_edges] == 1
-    is_open &= (np.bincount(faces.ravel(), minlength=len(vertices)) > 1)[faces].any(axis=1)[:, None]  # not alone
-    owners, sides = np.nonzero(is_open)
+    alone = (np.bincount(faces.ravel(), minlength=len(vertices)) == 1)[faces].all(axis=1)
+    owners, sides = np.nonzero((table.face_counts[table.face_edges] == 1) & ~alone[:, None])
     if not len(owners):
         return []
     tails, heads = faces[owners, sides], faces[owners, (sides + 1) % 3]
@@ -147,7 +146,7 @@ class _Holes:
     @property
     def sides(self) -> int:
         """n."""
-        return self.loops.shape[1]
+        return int(self.loops.shape[1])
 
     @cached_property
     def lengths(self) -> NDArray[np.float64]:
@@ -201,7 +200,9 @@ def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
         ahead = _unit(holes.beside.sum(axis=1))[of_hole]
         closed[of_hole[np.einsum("ij,ij->i", _unit(vectors), ahead) < BACK]] = False
     lid_areas = np.bincount(of_hole, np.linalg.norm(vectors, axis=1), count)
-    return triangles[(closed | (lid_areas <= CRACK * around**2))[of_hole]]
+    closed |= lid_areas <= CRACK * around**2
+    result: NDArray[np.int64] = triangles[closed[of_hole]]
+    return result
 
 
 def _triangles(apexes: NDArray[np.int64], holes: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -220,7 +221,7 @@ def _triangles(apexes: NDArray[np.int64], holes: NDArray[np.int64]) -> tuple[NDA
 
 def _angles(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
     """(...) angles between (..., 3) unit vectors; 0 where one of them is 0."""
-    flat = ~(one.any(axis=-1) & other.any(axis=-1))
+    flat = ~np.logical_and(one.any(axis=-1), other.any(axis=-1))
     angles: NDArray[np.float64] = np.arccos(np.clip(np.einsum("...j,...j->...", one, other), -1.0, 1.0))
     return np.where(flat, 0.0, angles)
 
