@@ -180,7 +180,7 @@ def add_step_options(parser: Parser) -> None:
 def add_repair_options(parser: Parser) -> argparse._ArgumentGroup:
     """Add the options that take a shape as it is."""
     steps = parser.add_argument_group("steps (all taken by default)")
-    steps.add_argument("--as-oriented", action="store_true", help="turn no face and no normal, put back no lost face: take them as given")
+    steps.add_argument("--as-oriented", action="store_true", help="turn no face or normal, put back no face")
     steps.add_argument("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface")
     return steps
 
