@@ -13,7 +13,7 @@ FLOORS = [
     ("cli   visualization   samples   public   batches   io", "commands, pictures, many shapes, files", "#f3d9c1"),
     ("extensions", "sharpening, jumps, completion, morphology, tet meshing", "#f7e6d0"),
     ("solver   fields", "SignedHeatSolver, signed_distance; values that know their domain", "#fbf1de"),
-    ("method   constraints", "diffuse → normalize → integrate, once, on discretisations", "#fff6c9"),
+    ("method   extrapolation   constraints", "diffuse → normalize → integrate, once, on discretisations", "#fff6c9"),
     ("lowering", "every domain and every source to its discretisation: surface, grid, tets", "#e3efd3"),
     ("discretization", "the protocols: Discretization, SourceTerm, Integration", "#e3efd3"),
     ("domains", "frozen data: meshes, polygons, points, voxels, tets, grids, curves", "#d3e8ea"),
@@ -44,7 +44,7 @@ def draw(path: Path) -> None:
     level = [len(FLOORS) - 1 - k for k in range(len(FLOORS))]
     for (names, what, color), y in zip(FLOORS, level, strict=True):
         axes.add_patch(_box(0.75, y + 0.06, 7.1, 0.86, color))
-        size = min(11.5, 780 / len(names))  # that it fits into the box
+        size = min(11.5, 750 / len(names))  # that it fits into the box
         axes.text(0.95, y + 0.62, names, family="monospace", size=size, weight="bold", va="center")
         axes.text(0.95, y + 0.28, what, size=9.5, va="center", color="#333333")
     axes.annotate("", (0.4, 0.1), (0.4, len(FLOORS) - 0.1), arrowprops={"arrowstyle": "-|>", "lw": 1.8})
