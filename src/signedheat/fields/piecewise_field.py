@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 FAR = 3.0
 """Somewhere on a cut the jump is at least this many times the longest side of a typical triangle."""
 
+TWIG = 5.0
+"""A branch of a cut whose jump is nowhere this many times that side is none, unless the cut itself is as low."""
+
 
 @dataclass(frozen=True, eq=False)
 class Cut(Frozen):
@@ -137,7 +140,8 @@ class PiecewiseField(Displayed, Frozen):
         """(p,) pairs separated by a cut.
 
         These are the pairs across which φ jumps by more than it changes within a triangle, on connected lines with a
-        jump of `FAR` times that somewhere. Errors in bad triangles are about their size, and no cuts.
+        jump of `FAR` times that somewhere. Errors in bad triangles are about their size, and no cuts. Nor are low
+        branches of a line (`without_twigs`): there the directions turn within several triangles, and so do the jumps.
         """
         longest, typical = self.triangles.edge_lengths.max(axis=1), typical_size(self.triangles)
         height = np.abs(self.jumps).max(axis=1)
@@ -147,8 +151,13 @@ class PiecewiseField(Displayed, Frozen):
         line = connected_components(n, *ends.T)[ends[:, 0]]
         far = np.zeros(n, dtype=bool)
         far[line[height[high] > FAR * typical]] = True
+        high, line = high[far[line]], line[far[line]]
+        highest = np.zeros(n)
+        np.maximum.at(highest, line, height[high])
+        least = np.minimum(TWIG * typical, 0.5 * highest[line])
+        ends = self.triangles.edges.vertices[self.pairs.edges[high]]
         result = np.zeros(len(height), dtype=bool)
-        result[high[far[line]]] = True
+        result[high[without_twigs(ends, height[high] > least)]] = True
         return result
 
     @cached_property
@@ -211,6 +220,36 @@ class PiecewiseField(Displayed, Frozen):
 def typical_size(triangles: IntrinsicMesh) -> float:
     """The longest side of a typical triangle."""
     return float(np.average(triangles.edge_lengths.max(axis=1), weights=triangles.face_areas))
+
+
+def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of some edges are left when lines between ends and forks are taken away that are high nowhere.
+
+    What is left is joined to longer lines, among which there may be such lines again.
+
+    Parameters
+    ----------
+    edges : (k, 2) int
+        Vertex ids; the same edge may come more than once.
+    high : (k,) bool
+        Edges that keep a line.
+
+    Examples
+    --------
+    >>> twig, line = [3, 9], [[1, 2], [2, 3], [3, 4]]
+    >>> without_twigs(np.array([twig, *line]), np.array([False, True, False, True])).tolist()
+    [False, True, True, True]
+    """
+    once, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    keeps = np.zeros(len(once), dtype=bool)
+    keeps[which.ravel()[high]] = True
+    left = np.arange(len(once))
+    while True:
+        low = [chain for chain, _ in chains(once[left]) if not keeps[left[chain]].any()]
+        if not low:
+            result: NDArray[np.bool_] = np.isin(which.ravel(), left)
+            return result
+        left = np.delete(left, np.concatenate(low))
 
 
 def chains(edges: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
