@@ -156,6 +156,27 @@ def test_inconsistently_oriented_curve():
         assert phi(mesh.points_at([vertex]))[0] == pytest.approx(side * np.arcsin(0.6), abs=0.1)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_cut_of_turned_halves_does_not_fork(seed):
+    """Scanned shapes are bumpy: there the directions beside the cut turn within several triangles."""
+    rng = np.random.default_rng(seed)
+    ball = shaken(sphere(4), 0.004)
+    waves = np.cos(ball.vertices @ rng.normal(scale=2.0, size=(3, 5)) + rng.uniform(0, 6, 5)).sum(axis=1)
+    mesh = sh.TriangleMesh(ball.vertices * (1 + 0.08 * waves[:, None]), ball.faces)
+    whole = max(mesh.level_set(mesh.vertices @ rng.normal(size=3), 0.0), key=lambda curve: curve.n_points)
+    half = whole.n_points // 2
+    parts = [sh.Curve(whole.faces[s], whole.barycentric[s]) for s in (slice(half), slice(half, None))]
+    phi = sh.piecewise_distance(mesh, [parts[0], parts[1].reversed()])
+    assert 1 <= len(phi.cut) <= 2
+    ends = np.concatenate([line.vertices[[0, -1]] for line in phi.cut])
+    assert np.unique(ends, return_counts=True)[1].max() <= 2
+    gap = whole.barycentric[[half, 0]]
+    places = np.einsum("ik,ikd->id", gap, mesh.vertices[mesh.faces[whole.faces[[half, 0]]]])
+    for place in places:  # the cut comes near both places where the curve turns
+        near = min(np.linalg.norm(line.points - place, axis=1).min() for line in phi.cut)
+        assert near < 4 * mesh.edge_lengths.max()
+
+
 def test_polygons_equal_triangles():
     mesh = torus(n_around=40, n_across=20)
     polygons = sh.PolygonMesh(mesh.vertices, mesh.faces)
