@@ -17,6 +17,7 @@ from .kernel_cache import KernelCache, digest_of
 from .packages import lazy_module
 
 numba = lazy_module("numba", "compiled kernels")
+kernel_compiler = lazy_module("signedheat.kernel_compiler", "compiled kernels")
 extending = lazy_module("numba.extending", "compiled kernels")
 types = lazy_module("numba.core.types", "compiled kernels")
 
@@ -84,7 +85,7 @@ class Kernel:
 
     def _made(self, options: dict[str, Any]) -> Callable[..., Any]:
         with _LOCK:
-            made = _compiler()(**options)(self.function)
+            made = _compiler()(**options, pipeline_class=kernel_compiler.Pipeline)(self.function)
             if not hasattr(made, "_cache"):  # compiling is disabled
                 return made  # type: ignore[no-any-return]
             made.compile = without_collecting(made.compile)

@@ -25,9 +25,11 @@ import numpy as np
 from .packages import lazy_module
 
 numba = lazy_module("numba", "compiled kernels")
-caching = lazy_module("numba.core.caching", "compiled kernels")
+kernel_compiler = lazy_module("signedheat.kernel_compiler", "compiled kernels")
 serialize = lazy_module("numba.core.serialize", "compiled kernels")
 
+FORMAT = 2
+"""To be raised when the same kernels are compiled otherwise."""
 DAYS = 30
 """After so many, files of other versions of a kernel are removed when one is written."""
 
@@ -60,8 +62,7 @@ class KernelCache:
             try:
                 data = (folder / self._file_name(signature, context.codegen())).read_bytes()
                 if hashlib.sha256(data[32:]).digest() == data[:32]:
-                    kept = caching.CompileResultCacheImpl.__new__(caching.CompileResultCacheImpl)
-                    return kept.rebuild(context, serialize.loads(data[32:]))
+                    return kernel_compiler.restored(context, serialize.loads(data[32:]))
             except Exception:  # whatever is wrong with a file of the cache: it is compiled again
                 continue
         self._missed(self.name)
@@ -78,7 +79,7 @@ class KernelCache:
                 return
 
     def _file_name(self, signature: Any, codegen: Any) -> str:
-        key = repr((str(signature), codegen.magic_tuple(), str(numba.version_info), sys.implementation.cache_tag))
+        key = repr((FORMAT, str(signature), codegen.magic_tuple(), str(numba.version_info), sys.implementation.cache_tag))
         return f"{self.name}-{self.digest[:16]}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.nbc"
 
     def _remove_others(self, folder: Path) -> None:
