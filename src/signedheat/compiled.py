@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cached_property, partial, update_wrapper
 from pathlib import Path
 from threading import RLock
 from typing import Any, overload
@@ -24,6 +24,8 @@ types = lazy_module("numba.core.types", "compiled kernels")
 logger = logging.getLogger("signedheat")
 _LOCK = RLock()
 MOST_THREADS = 1024
+TRIED = (0, 59), (0, 68)
+"""Versions of Numba, first to last, with which `kernel_compiler` has been tried; others compile in their own steps."""
 DEFAULTS = {"error_model": "numpy", "no_cfunc_wrapper": True}
 """Options that save compiling: dividing by zero is no exception, and C does not call kernels."""
 
@@ -126,7 +128,7 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def _compiler() -> Any:
-    """``numba.njit``, after registering `Kernel` with Numba so that compiled code can call kernels.
+    """``numba.njit`` with our own steps, after registering `Kernel` with Numba so that compiled code can call kernels.
 
     Raises
     ------
@@ -142,4 +144,6 @@ def _compiler() -> Any:
         )
     if Kernel not in extending.typeof_impl.registry:
         extending.typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.inner))
-    return numba.njit
+    if not TRIED[0] <= numba.version_info[:2] <= TRIED[1]:
+        return numba.njit
+    return partial(numba.njit, pipeline_class=kernel_compiler.Pipeline)

@@ -25,6 +25,7 @@ import numpy as np
 from .packages import lazy_module
 
 numba = lazy_module("numba", "compiled kernels")
+caching = lazy_module("numba.core.caching", "compiled kernels")
 kernel_compiler = lazy_module("signedheat.kernel_compiler", "compiled kernels")
 serialize = lazy_module("numba.core.serialize", "compiled kernels")
 
@@ -62,7 +63,7 @@ class KernelCache:
             try:
                 data = (folder / self._file_name(signature, context.codegen())).read_bytes()
                 if hashlib.sha256(data[32:]).digest() == data[:32]:
-                    return kernel_compiler.restored(context, serialize.loads(data[32:]))
+                    return _restored(context, serialize.loads(data[32:]))
             except Exception:  # whatever is wrong with a file of the cache: it is compiled again
                 continue
         self._missed(self.name)
@@ -79,7 +80,9 @@ class KernelCache:
                 return
 
     def _file_name(self, signature: Any, codegen: Any) -> str:
-        key = repr((FORMAT, str(signature), codegen.magic_tuple(), str(numba.version_info), sys.implementation.cache_tag))
+        key = repr(
+            (FORMAT, str(signature), codegen.magic_tuple(), str(numba.version_info), sys.implementation.cache_tag)
+        )
         return f"{self.name}-{self.digest[:16]}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.nbc"
 
     def _remove_others(self, folder: Path) -> None:
@@ -109,6 +112,12 @@ def folders() -> Iterator[Path]:
         if Path(base).is_absolute():
             yield Path(base) / "signedheat" / "kernels"
     yield Path(__file__).parent / "__pycache__"
+
+
+def _restored(context: Any, kept: Any) -> Any:
+    if kept[0][1] == "bitcode":
+        return kernel_compiler.restored(context, kept)
+    return caching.CompileResultCacheImpl.__new__(caching.CompileResultCacheImpl).rebuild(context, kept)
 
 
 def _written(path: Path, data: bytes) -> bool:

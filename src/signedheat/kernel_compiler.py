@@ -9,39 +9,47 @@ Importing this imports Numba.
 
 from __future__ import annotations
 
+from importlib import import_module
 from inspect import iscode
 from types import BuiltinFunctionType
 from typing import Any
 
-import llvmlite.binding as llvm
-from numba import _dynfunc
-from numba.core import codegen, compiler, ir, types
-from numba.core.compiler import CompileResult, _LowerResult
-from numba.core.compiler_machinery import register_pass
-from numba.core.environment import lookup_environment
-from numba.core.typed_passes import NativeLowering
-from numba.core.untyped_passes import InlineClosureLikes, WithLifting
+codegen: Any = import_module("numba.core.codegen")  # as far as type checkers are concerned, all of it is untyped
+compiler: Any = import_module("numba.core.compiler")
+environments: Any = import_module("numba.core.environment")
+ir: Any = import_module("numba.core.ir")
+llvm: Any = import_module("llvmlite.binding")
+machinery: Any = import_module("numba.core.compiler_machinery")
+make_function: Any = import_module("numba._dynfunc").make_function
+typed_passes: Any = import_module("numba.core.typed_passes")
+untyped_passes: Any = import_module("numba.core.untyped_passes")
+types: Any = import_module("numba.core.types")
 
 VIEWS = {"getitem", "static_getitem", "getattr", "build_tuple", "cast", "phi", "getiter", "iternext", "exhaust_iter"}
 VIEWS |= {"pair_first", "pair_second"}
 """Expressions whose value, if it is an array, is one that was there before, or a part of it."""
 
-UNNESTED = InlineClosureLikes, WithLifting
+OF_THE_CALLER = {"no_cpython_wrapper", "no_cfunc_wrapper", "release_gil"}
+UNNESTED = untyped_passes.InlineClosureLikes, untyped_passes.WithLifting
 """Steps that do nothing where no function is within another, nor objects of Python are used."""
 
 _KNOWN: dict[Any, Any] = {}
 
 
 class Flags(compiler.Flags):  # type: ignore[misc]
-    """Numba's options, compared by those that are set: it does so a hundred thousand times."""
+    """Numba's options, compared by what matters to the functions that are called, and fast: it is done very often."""
 
     __slots__ = ()
 
+    def values(self) -> dict[str, Any]:
+        """Those that were set."""
+        return {name: value for name, value in self._values.items() if name not in OF_THE_CALLER}
+
     def __hash__(self) -> int:
-        return hash(frozenset(self._values))
+        return hash(frozenset(self.values()))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, compiler.Flags) and self._values == other._values
+        return isinstance(other, Flags) and self.values() == other.values()
 
 
 class Typing:
@@ -56,9 +64,9 @@ class Typing:
 
     def resolve_function_type(self, function: Any, arguments: Any, keywords: Any) -> Any:
         """The signature of a call."""
-        if keywords or not isinstance(function, types.Function | BuiltinFunctionType | str):
+        if not isinstance(function, types.Function | BuiltinFunctionType | str):
             return self._context.resolve_function_type(function, arguments, keywords)
-        key = function, arguments, self._flags
+        key = function, arguments, tuple(keywords.items()), self._flags
         found = _KNOWN.get(key)
         if found is None:
             found = _KNOWN[key] = self._context.resolve_function_type(function, arguments, keywords)
@@ -88,8 +96,8 @@ class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
         return library
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class Lowering(NativeLowering):  # type: ignore[misc]
+@machinery.register_pass(mutates_CFG=True, analysis_only=False)
+class Lowering(typed_passes.NativeLowering):  # type: ignore[misc]
     """From typed to compiled code."""
 
     _name = "signedheat_lowering"
@@ -102,7 +110,7 @@ class Lowering(NativeLowering):  # type: ignore[misc]
             return self._link_only(state)
         done = super().run_pass(state)
         for variable in state.library._final_module.global_variables:
-            environment = variable.name.startswith("_ZN08NumbaEnv") and lookup_environment(variable.name)
+            environment = variable.name.startswith("_ZN08NumbaEnv") and environments.lookup_environment(variable.name)
             if environment:  # those of linked kernels
                 state.library.codegen.set_env(variable.name, environment)
         return bool(done)
@@ -115,13 +123,13 @@ class Lowering(NativeLowering):  # type: ignore[misc]
         lowered = state.cr
         entry = handle(lowered.fndesc, lowered.env)
         state.targetctx.insert_user_function(entry, lowered.fndesc, [state.library])
-        state.cr = _LowerResult(lowered.fndesc, lowered.call_helper, cfunc=entry, env=lowered.env)
+        state.cr = compiler._LowerResult(lowered.fndesc, lowered.call_helper, cfunc=entry, env=lowered.env)
         return True
 
 
 def handle(description: Any, environment: Any) -> Any:
     """What other kernels know a linked function by; it cannot be called."""
-    return _dynfunc.make_function(description.lookup_module(), description.qualname, "", 0, environment, ())
+    return make_function(description.lookup_module(), description.qualname, "", 0, environment, ())
 
 
 def makes_references(state: Any) -> bool:
@@ -150,7 +158,9 @@ def makes_references(state: Any) -> bool:
 class Pipeline(compiler.CompilerBase):  # type: ignore[misc]
     """The steps."""
 
-    def __init__(self, typing: Any, target: Any, library: Any, arguments: Any, returned: Any, flags: Any, variables: Any):
+    def __init__(
+        self, typing: Any, target: Any, library: Any, arguments: Any, returned: Any, flags: Any, variables: Any
+    ):
         super().__init__(typing, target, library, arguments, returned, flags, variables)
         self.state.flags = Flags(flags)
         self.state.typingctx = Typing(typing, flags)
@@ -159,21 +169,18 @@ class Pipeline(compiler.CompilerBase):  # type: ignore[misc]
         """Numba's, with another last step, and without those for functions within functions where there are none."""
         steps = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state, "signedheat")
         left_out = () if any(map(iscode, self.state.func_id.code.co_consts)) else UNNESTED
-        steps.passes = [
-            (Lowering if step is NativeLowering else step, about) for step, about in steps.passes if step not in left_out
-        ]
+        kept = [(step, about) for step, about in steps.passes if step not in left_out]
+        steps.passes = [(Lowering if step is typed_passes.NativeLowering else step, about) for step, about in kept]
         steps._finalized = False
         steps.finalize()
         return [steps]
 
 
 def restored(context: Any, kept: Any) -> Any:
-    """A compiled kernel from what the cache on disk holds of it."""
-    (name, kind, code), description, environment, signature, objects, lifted, annotation, reload, environments = kept
-    if kind != "bitcode":
-        return CompileResult._rebuild(context, *kept)
-    library = LinkedLibrary.restored(context, name, code)
-    return CompileResult(
+    """A kernel that is only linked, from what the cache on disk holds of it."""
+    (name, _, bitcode), description, environment, signature, objects, lifted, annotation, reload, referenced = kept
+    library = LinkedLibrary.restored(context, name, bitcode)
+    return compiler.CompileResult(
         target_context=context,
         typing_context=context.typing_context,
         library=library,
@@ -188,5 +195,5 @@ def restored(context: Any, kept: Any) -> Any:
         call_helper=None,
         metadata=None,
         reload_init=reload,
-        referenced_envs=environments,
+        referenced_envs=referenced,
     )
