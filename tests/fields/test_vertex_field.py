@@ -163,3 +163,43 @@ def test_a_refined_field_is_linear_on_its_pieces():
     points = np.einsum("pk,pkd->pd", weights, mesh.vertices[mesh.faces[np.arange(200) % 6]])
     np.testing.assert_allclose(pieces(points), phi(points), atol=1e-9)
     assert pieces.subdivided() is pieces
+
+
+def slab():
+    """A thin plate in two slivers and a flap; fields of two lines across it, each on triangles of its own."""
+    plate = sh.TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0], [4, 3, 2]], [[0, 1, 2], [0, 2, 3], [3, 2, 4]])
+    lines = [plate.polyline([[x, 0, 0], [x, 1, 0]]) for x in (3.0, 6.0)]
+    return plate, [sh.SignedHeatSolver(plate, intrinsic=True).distance(line) for line in lines]
+
+
+def test_gradient_is_that_of_the_finer_triangles():
+    plate, (phi, _) = slab()
+    rng = np.random.default_rng(0)
+    faces, weights = rng.integers(0, 3, 60), rng.dirichlet(np.ones(3), 60)
+    gradient = phi.gradient(sh.SurfacePoints(faces, weights))
+    corners = plate.vertices[plate.faces[faces]]
+    step = 1e-6 * weights.min(axis=1)[:, None]
+    for k in (1, 2):
+        move = step * (np.eye(3)[k] - np.eye(3)[0])
+        rise = phi(sh.SurfacePoints(faces, weights + move)) - phi(sh.SurfacePoints(faces, weights - move))
+        slope = np.einsum("pd,pd->p", gradient, corners[:, k] - corners[:, 0])
+        assert np.median(np.abs(rise / (2 * step[:, 0]) - slope)) < 1e-6
+    assert np.abs(np.einsum("pd,pd->p", gradient, plate.face_area_vectors[faces])).max() < 1e-12
+
+
+def test_sets_of_regions_keep_the_finer_triangles():
+    plate, (left, right) = slab()
+    x = np.linspace(0.2, 8.8, 40)
+    at = np.stack([x, np.full_like(x, 0.4), 0 * x], axis=1)
+    between = (left & ~right) if left([[4.5, 0.4, 0]]) < 0 else (right & ~left)
+    assert between.finer is not None and np.array_equal(between.finest.values[:5], between.values)
+    inner = np.abs(x - 4.5) < 0.7  # where both lines are as near: a ridge between vertices
+    exact = np.maximum(3 - x, x - 6)
+    assert between(at)[~inner] == pytest.approx(exact[~inner], abs=0.1)
+    assert between(at)[inner] == pytest.approx(exact[inner], abs=0.3)
+    assert (~between)(at) == pytest.approx(-between(at), abs=1e-12)
+    crossings = np.concatenate([positions(plate, curve) for curve in between.contour()])
+    flat = crossings[crossings[:, 1] < 1]
+    assert np.abs(np.abs(flat[:, 0] - 4.5) - 1.5).max() < 0.1
+    other = sh.VertexField(plate, left.values)
+    assert (left | other).finer is not None and (other | other).finer is None

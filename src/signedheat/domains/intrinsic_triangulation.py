@@ -167,9 +167,24 @@ class IntrinsicTriangulation(Displayed, Frozen):
                 f"point {wrong[0]} is in face {faces[wrong[0]]}, of {self.mesh.n_faces} faces",
                 element=f"point {wrong[0]}",
             )
-        below = self.refinement.push_forward(faces, barycentric, np.zeros((len(faces), 0, 3)))
-        found, weights, _ = self.history.forward(below[0], np.maximum(below[1], 0.0))
-        return found, weights / weights.sum(axis=1, keepdims=True)
+        return self._forward(faces, barycentric, np.zeros((len(faces), 0, 3)))[:2]
+
+    def gradient(
+        self, values: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(p, 3) gradients in space, at points given on the mesh, of a function linear on these triangles."""
+        sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(faces), 2, 3))
+        found, _, moves = self._forward(faces, barycentric, sides)
+        rises = np.einsum("psk,pk->ps", moves, values[self.faces[found]])
+        return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[faces]]), rises)
+
+    def _forward(
+        self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Points of the mesh, and vectors (p, k, 3) at them, on the triangulation."""
+        below = self.refinement.push_forward(faces, barycentric, vectors)
+        found, weights, moved = self.history.forward(below[0], np.maximum(below[1], 0.0), below[2])
+        return found, weights / weights.sum(axis=1, keepdims=True), moved
 
     def level_set(self, values: NDArray[np.float64], level: float = 0.0) -> list[Curve]:
         """Level set of a function given at the vertices, linear on these triangles, as curves on the mesh.
@@ -321,6 +336,21 @@ def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
             remedy="remove faces that are all but flat, or scale the shape where it is squashed",
             element="faces",
         )
+
+
+def gradients_along(sides: NDArray[np.float64], rises: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(p, 3) gradients in the planes of two sides (p, 2, 3), along which a function rises by (p, 2); 0 if they are one.
+
+    Examples
+    --------
+    >>> gradients_along(np.array([[[2.0, 0, 0], [1, 1, 0]]]), np.array([[4.0, 1.0]])).tolist()
+    [[2.0, -1.0, 0.0]]
+    """
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    square = np.einsum("pd,pd->p", normals, normals)
+    across = rises[:, :1] * sides[:, 1] - rises[:, 1:] * sides[:, 0]
+    result: NDArray[np.float64] = np.cross(across, normals) / np.where(square > 0, square, np.inf)[:, None]
+    return result
 
 
 def triangle_mesh(domain: object) -> TriangleMesh:

@@ -27,7 +27,11 @@ class SolidField(Protocol):
     def with_values(self: Solid, values: NDArray[np.float64]) -> Solid:
         """A field with other values on the same domain."""
 
+    def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
+        """The field whose values a rule makes of the values of two, wherever these are known."""
 
+
+Rule = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 Solid = TypeVar("Solid", bound=SolidField)
 
 
@@ -63,6 +67,10 @@ class Combinable:
     def __invert__(self: Solid) -> Solid:
         """Complement: inside and outside exchanged."""
         return complement(_checked(self, self))
+
+    def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
+        """The field whose values a rule makes of those of two fields on one domain."""
+        return self.with_values(rule(self.values, other.values))
 
 
 def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
@@ -114,7 +122,7 @@ def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
 
 def complement(field: Solid) -> Solid:
     """The field of the other side: inside and outside exchanged."""
-    return field.with_values(-field.values)
+    return field.combined_with(field, lambda values, _: -values)
 
 
 def combined(
@@ -135,12 +143,16 @@ def combined(
         Width of the transition: negative adds to the inside, positive takes from it.
     """
     _checked(a, b)
-    values = np.where(takes_first(a.values, b.values), a.values, b.values)
-    if bulge:
-        near = np.maximum(abs(bulge) - np.abs(a.values - b.values), 0.0)
-        values = values + near**2 / (4 * bulge)
-    values[np.isnan(a.values) | np.isnan(b.values)] = np.nan
-    return a.with_values(values)
+
+    def rule(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+        values = np.where(takes_first(one, other), one, other)
+        if bulge:
+            near = np.maximum(abs(bulge) - np.abs(one - other), 0.0)
+            values = values + near**2 / (4 * bulge)
+        values[np.isnan(one) | np.isnan(other)] = np.nan
+        return values
+
+    return a.combined_with(b, rule)
 
 
 def _checked(a: Solid, b: Solid) -> Solid:

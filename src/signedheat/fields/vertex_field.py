@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Generic, cast, overload
@@ -22,7 +22,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number, finite_rows
 from ..errors import OutsideError
 from ..frozen import Frozen
-from .booleans import Combinable
+from .booleans import Combinable, Rule
 from .files import save_field
 
 if TYPE_CHECKING:
@@ -108,14 +108,18 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return cast("VertexField[SurfaceDomain]", finer)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) ∇φ in the faces of points; for `points` see `__call__`."""
-        _, _, faces, _ = self._at(points)
+        """(n, 3) ∇φ in space at points, in the triangles on which φ is linear; for `points` see `__call__`."""
+        _, _, faces, weights = self._at(points)
+        finest = self.finest
+        if isinstance(finest.domain, IntrinsicTriangulation):
+            return finest.domain.gradient(finest.values, faces, weights)
         return self.face_gradients[faces]
 
     @cached_property
     def face_gradients(self) -> NDArray[np.float64]:
         """(m, 3) ∇φ on the faces of the domain's triangulation, in space; of length about 1, since φ is a distance.
 
+        Of φ between the vertices of the domain: where it was computed on finer triangles, `gradient` is more accurate.
         Zero on degenerate faces.
         """
         field = self._embedded
@@ -164,6 +168,27 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     def with_values(self, values: NDArray[np.float64]) -> VertexField[Surface]:
         """Other values on the same surface, without the diagnostics and the source of these."""
         return VertexField(self.domain, values)
+
+    def combined_with(self, other: VertexField[Surface], rule: Rule) -> VertexField[Surface]:
+        """The field whose values a rule makes of those of two, also on the finer triangles of one of them."""
+        result = self.with_values(rule(self.values, other.values))
+        finer = [field.finer for field in (self, other) if field.finest is field.finer]
+        if not finer:
+            return result
+        domain = max((field.domain for field in finer if field), key=lambda triangulation: triangulation.n_vertices)
+        values = rule(self._at_vertices_of(domain), other._at_vertices_of(domain))
+        values[: len(result.values)] = result.values
+        return replace(result, finer=VertexField(domain, values))
+
+    def _at_vertices_of(self, domain: IntrinsicTriangulation) -> NDArray[np.float64]:
+        """φ at the vertices of an intrinsic triangulation of the mesh; NaN at those that no face has."""
+        if self.finest.domain is domain:
+            return self.finest.values
+        faces, weights = domain.vertex_places
+        used = np.flatnonzero(faces >= 0)
+        values = np.full(len(faces), np.nan)
+        values[used] = self(SurfacePoints(faces[used], weights[used]))
+        return values
 
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData` with point data ``signed_distance``: triangles, polygons or points."""
