@@ -24,9 +24,11 @@ CLOSE = 1e-3
 """Cells off a level that a point may be and stay as it is."""
 ROUNDS = 10
 """Times a point is moved at most."""
+PRESSES, FARTHEST = 2, 0.5
+"""Times that a point is moved off its edge, and how many cells at most."""
 CLEARANCE = 1e-3
 """Fraction of a cell that points of a level keep from the nodes."""
-APART = 4.0
+APART = 2.0
 """Cells between corners of the faces nearest to the nodes of an edge from which on more than these are asked."""
 _BENDING = ((0, 0, 10), (1, 0, 12), (1, 1, 13), (2, 0, 15), (2, 1, 16), (2, 2, 17))
 """Row, column and place among the numbers of a crossing of its shape operator in space."""
@@ -164,10 +166,15 @@ class ExactSurface(Frozen):
             (doubtful, self._nearest_of_chunk(points[doubtful])),
             (~doubtful, self._nearest_to_nodes(points[~doubtful], labels[~doubtful])),
         ):
-            distances, sides = found[0], found[3]
-            signs = np.where(sides == 0, np.sign(guess), sides)
-            result[rows] = np.where(signs == 0, np.nan, np.where(signs < 0, -distances, distances))
+            result[rows] = self._signed(found, guess)
         return result
+
+    @staticmethod
+    def _signed(found: tuple[NDArray[Any], ...], guess: float) -> NDArray[np.float64]:
+        """Distances with the sides that are told, or that of `guess`; NaN if that is 0."""
+        distances, sides = found[0], found[3]
+        signs = np.where(sides == 0, np.sign(guess), sides)
+        return np.where(signs == 0, np.nan, np.where(signs < 0, -distances, distances))
 
     def _nearer(
         self,
@@ -231,8 +238,9 @@ class ExactSurface(Frozen):
         """Points on edges of the grid, where values of the nodes pass a level, moved along to where distance does.
 
         By regula falsi, halving the weight of an end that stays twice (Dowell & Jarratt 1971). The ends of an edge keep
-        the sides that their values have, so that every point stays on its edge. Points inside cells stay, and so do
-        those whose side nothing tells. Where `nodes` is known, what is nearest to those around an edge is asked alone.
+        the sides that their values have, so that points stay on their edges, but for those whose node's value is wrong:
+        they are moved onto the level beside it. Points inside cells stay, and so do those whose side nothing tells.
+        Where `nodes` is known, what is nearest to those around an edge is asked first.
 
         Parameters
         ----------
@@ -263,10 +271,36 @@ class ExactSurface(Frozen):
         moved = np.array(points, dtype=np.float64)
         if not len(movable):
             return moved
-        labels, doubtful = self._labels_around(base, axis)
-        start, stop, last = np.zeros(len(movable)), np.ones(len(movable)), np.zeros(len(movable), dtype=np.int8)
-        active = np.flatnonzero((low < 0) != (high < 0))
+        crossed = np.flatnonzero((low < 0) != (high < 0))
+        edges = base[crossed], axis[crossed], low[crossed], high[crossed]
+        labels, doubtful = self._labels_around(*edges[:2])
+        at, off = self._crossings_of(*edges, labels, doubtful, level)
         step = float(self.steps.min())
+        wrong = np.flatnonzero(~doubtful & (labels[:, :1] < 0).any(axis=1))  # what is completed bends, and has no walk
+        wrong = wrong[np.abs(self._signed(self._nearest_of_chunk(at[wrong]), level) - level) > CLOSE * step]
+        if len(wrong):
+            again = (part[wrong] for part in edges)
+            at[wrong], off[wrong] = self._crossings_of(*again, labels[wrong], np.ones(len(wrong), dtype=bool), level)
+        self._press_on(at, np.flatnonzero(np.abs(off) > CLOSE * step), level)
+        moved[movable[crossed]] = self.origin + at
+        return moved
+
+    def _crossings_of(
+        self,
+        base: NDArray[np.int64],
+        axis: NDArray[np.int64],
+        low: NDArray[np.float64],
+        high: NDArray[np.float64],
+        labels: NDArray[np.int32],
+        doubtful: NDArray[np.bool_],
+        level: float,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(e, 3) where edges pass the level, and how far off it distance is there; by the values of their ends."""
+        n = len(base)
+        low, high = low.copy(), high.copy()
+        start, stop, last = np.zeros(n), np.ones(n), np.zeros(n, dtype=np.int8)
+        result, deviation = np.empty((n, 3)), np.zeros(n)
+        active = np.arange(n)
         for _ in range(ROUNDS):
             if not len(active):
                 break
@@ -275,8 +309,8 @@ class ExactSurface(Frozen):
             at = base[active].astype(np.float64)
             at[np.arange(len(active)), axis[active]] += share
             at *= self.steps
-            moved[movable[active]] = self.origin + at
             off = self._level_at(at, labels[active], doubtful[active], level) - level
+            result[active], deviation[active] = at, off
             same = (off < 0) == (low[active] < 0)
             ahead, behind = active[same], active[~same]
             start[ahead], low[ahead] = share[same], off[same]
@@ -284,8 +318,24 @@ class ExactSurface(Frozen):
             high[ahead] *= np.where(last[ahead] > 0, 0.5, 1.0)
             low[behind] *= np.where(last[behind] < 0, 0.5, 1.0)
             last[ahead], last[behind] = 1, -1
-            active = active[np.abs(off) > CLOSE * step]  # not where it is NaN
-        return moved
+            active = active[np.abs(off) > CLOSE * float(self.steps.min())]  # not where it is NaN
+        return result, deviation
+
+    def _press_on(self, at: NDArray[np.float64], rows: NDArray[np.int64], level: float) -> None:
+        """Move, in place, points whose edge does not pass the level after all onto it, away from their nearest place.
+
+        That is so where a node missed a nearer face by a fraction of a cell, and its value is that much too large.
+        """
+        cell = float(self.steps.min())
+        for _ in range(PRESSES):
+            if not len(rows):
+                return
+            found = self._nearest_of_chunk(at[rows])
+            off = self._signed(found, level) - level
+            near = np.abs(off) < FARTHEST * cell  # not where it is NaN
+            rows, off, signs = rows[near], off[near], np.where(self._signed(found, level)[near] < 0, -1.0, 1.0)
+            at[rows] -= (off * signs)[:, None] * found[2][near]
+            rows = rows[np.abs(off) > CLOSE * cell]
 
 
 @compiled(nogil=True)
