@@ -276,10 +276,10 @@ class ExactSurface(Frozen):
         labels, doubtful = self._labels_around(*edges[:2])
         at, off = self._crossings_of(*edges, labels, doubtful, level)
         step = float(self.steps.min())
-        wrong = np.flatnonzero(~doubtful & (labels[:, :1] < 0).any(axis=1))  # what is completed bends, and has no walk
+        wrong = np.flatnonzero(~doubtful & (labels[:, :1] < 0).any(axis=1))  # on completed surface no walk leads on
         wrong = wrong[np.abs(self._signed(self._nearest_of_chunk(at[wrong]), level) - level) > CLOSE * step]
         if len(wrong):
-            again = (part[wrong] for part in edges)
+            again = edges[0][wrong], edges[1][wrong], edges[2][wrong], edges[3][wrong]
             at[wrong], off[wrong] = self._crossings_of(*again, labels[wrong], np.ones(len(wrong), dtype=bool), level)
         self._press_on(at, np.flatnonzero(np.abs(off) > CLOSE * step), level)
         moved[movable[crossed]] = self.origin + at
