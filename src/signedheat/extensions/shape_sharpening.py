@@ -113,7 +113,7 @@ def assemble(
         if cloud.normals is None:
             raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
         sides = fitted_to_points(sides, steps, cloud.points - grid.origin, cloud.normals)
-    joined = _joined([part for part in parts if not isinstance(part, PointCloud)], grid.origin)
+    joined = joined_triangles([part for part in parts if not isinstance(part, PointCloud)], grid.origin)
     features = FaceFeatures.of(*joined, None if restored is None else _trust_in_faces(*joined, restored))
     band = FaceBand.of(features, grid.shape, steps)
     whole, n_faces = features, len(features.rows)
@@ -241,7 +241,9 @@ def _trust_in_faces(
     return trust
 
 
-def _joined(parts: Sequence[Shape], origin: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def joined_triangles(
+    parts: Sequence[Shape], origin: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices around `origin` and triangles of shapes with faces."""
     vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
     for part in parts:

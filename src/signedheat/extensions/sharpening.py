@@ -60,6 +60,8 @@ def sharpen(
 @overload
 def sharpen(field: OnSurface, curves: CurvesAndPoints, *, progress: Progress | None = None) -> OnSurface: ...
 @overload
+def sharpen(field: TetField, shape: Shapes, *, progress: Progress | None = None) -> TetField: ...
+@overload
 def sharpen(field: AnyField, method: Method | None = None, progress: Progress | None = None) -> AnyField: ...
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
@@ -80,8 +82,11 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With
     ``curves``: exact distance to the curves and points themselves, however they cross the faces. In regions that curves
     bound, these tell the side; elsewhere the field does, and its zero set stands in for missing curve where it is
-    farther from any curve than the triangles are large, or begins at the free end of one. On tets: distance along
-    straight lines in space, which bend around the boundary of the mesh.
+    farther from any curve than the triangles are large, or begins at the free end of one.
+
+    On tets: distance along straight lines in space, which bend around the boundary of the mesh, to the zero set. With a
+    ``shape``: to the faces of the shape, exactly, and to the zero set where it is farther than one and a half edges
+    from any; faces tell sides as on grids.
 
     On surfaces and tets ``method=Convex()`` is the method of the paper, which is less accurate but can correct wrong
     signs. On tets it usually increases the error: gradients of length at most one in every tet make the field too
@@ -92,7 +97,8 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     field : GridField, VertexField or TetField
         From `signed_distance` or `SignedHeatSolver.distance`.
     shape : TriangleMesh, PolygonMesh or PointCloud with normals, or a sequence of them, optional
-        On grids in space: what the field was computed from, oriented, and without parts inside others.
+        On grids in space and on tets: what the field was computed from, oriented, and without parts inside others; no
+        points on tets.
     fit : "auto", "exact" or "smooth"
         With a shape: whether to tell layers from shape, to measure to every face, or to the zero set alone.
     curves : Curve, SurfacePoints or a sequence of them, optional

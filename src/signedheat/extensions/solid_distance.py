@@ -210,7 +210,7 @@ def _oriented(shape: Shape, notes: list[Note]) -> tuple[Merged, bool]:
 
 
 def _elsewhere(shape: Shape, domain: Grid | TetMesh, steps: Steps, progress: Progress | None) -> GridField | TetField:
-    """On tets, and on grids with solid nodes: the method, and distance to φ's own zero set where that can be."""
+    """On tets, and on grids with solid nodes: the method, and distance to the shape where that can be."""
     notes: list[Note] = []
     if steps.orient:
         shape = _oriented(shape, notes)[0].shape
@@ -223,7 +223,7 @@ def _elsewhere(shape: Shape, domain: Grid | TetMesh, steps: Steps, progress: Pro
         kind = type(domain).__name__
         raise UnsupportedTypeError(f"a solid is measured on a Grid or a TetMesh, not on a {kind}", element="domain")
     if steps.sharpen and not (isinstance(domain, Grid) and domain.mask is not None):
-        phi = sharpen(phi)
+        phi = sharpen(phi) if isinstance(shape, PointCloud) or isinstance(phi, GridField) else sharpen(phi, shape)
     return replace(phi, diagnostics=phi.diagnostics.noting(*notes))
 
 

@@ -111,7 +111,7 @@ def any_angle_distance(
     first_triangle, triangles_at : int arrays
         The triangles at each of these ids: where they begin, and the triangles.
     owners : (k,) int
-        The tet that each triangle lies in.
+        The tet that each triangle lies in; −1 for such as lie in several.
     nearest : (n,) int
         The triangle nearest to each vertex, regardless of visibility; −1 for vertices that have no distance.
     slack : float
@@ -146,7 +146,7 @@ def any_angle_distance(
     for i in range(len(triangles)):  # a triangle in a tet is visible from the tet's corners, if not the nearest to them
         for k in range(4):
             v = planes.tets[owners[i], k]
-            if not known[v] and nearest[v] >= 0:
+            if owners[i] >= 0 and not known[v] and nearest[v] >= 0:
                 x, y, z = points[v]
                 square, a, b, g = place_on_triangle(triangles[i], x, y, z)
                 if square < distance[v] ** 2:

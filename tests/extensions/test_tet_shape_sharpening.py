@@ -1,0 +1,100 @@
+"""Sharpening to a shape on tets: closed forms, what is missing, walls, sides, bad input."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from shapes.tet_cases import boxes, lattice, rectangle, rms, sphere
+from signedheat import samples
+from signedheat.diagnostics import FacesRestored, SharpenedToShape
+from signedheat.errors import SourceError, UnsupportedTypeError
+
+
+def cube(half: float) -> sh.TriangleMesh:
+    corners = half * np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
+    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return sh.TriangleMesh(corners, [[s[0], s[k], s[k + 1]] for s in squares for k in (1, 2)])
+
+
+def distance_to_cube(points: np.ndarray, half: float) -> np.ndarray:
+    beyond = np.abs(points) - half
+    return np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+
+
+@pytest.fixture(scope="module")
+def tets() -> sh.TetMesh:
+    return lattice(12)
+
+
+def test_a_cube_is_exact_at_its_edges_too(tets):
+    field = sh.signed_distance(cube(0.83), tets)
+    exact = distance_to_cube(tets.vertices, 0.83)
+    sharp = sh.sharpen(field, cube(0.83))
+    assert np.abs(sharp.values - exact).max() < 1e-12
+    assert rms(sh.sharpen(field).values - exact) > 1e-3
+    assert sharp.diagnostics.note(SharpenedToShape).completed_zero_set == 0
+    assert np.array_equal(sh.sharpen(field, shape=[cube(0.83)]).values, sharp.values)
+
+
+def test_solids_on_tets_are_measured_to_the_shape(tets):
+    """Whichever way its faces look, and though one was lost."""
+    shape = cube(0.83)
+    turned = np.where(np.isin(np.arange(12), [2, 5, 6])[:, None], shape.faces[:, ::-1], shape.faces)[1:]
+    field = sh.solid_distance(sh.TriangleMesh(shape.vertices, turned), tets)
+    assert np.abs(field.values - distance_to_cube(tets.vertices, 0.83)).max() < 1e-12
+    assert field.diagnostics.note(FacesRestored).restored_faces == 1
+
+
+def test_where_surface_is_missing_its_zero_set_stands_in(tets):
+    ball = sphere(4)
+    holed = sh.TriangleMesh(ball.vertices, ball.faces[(ball.vertices[ball.faces].mean(axis=1) @ [1, 2, 2]) < 3 * 0.8])
+    field = sh.signed_distance(holed, tets)
+    exact = np.linalg.norm(tets.vertices, axis=1) - 1
+    sharp, own = sh.sharpen(field, holed), sh.sharpen(field)
+    away = tets.vertices @ [1, 2, 2] / 3 / np.maximum(np.linalg.norm(tets.vertices, axis=1), 1e-9)
+    there, missing = away < 0.5, away > 0.9
+    assert rms((sharp.values - exact)[there]) < 0.2 * rms((own.values - exact)[there])
+    assert rms((sharp.values - own.values)[missing]) < 0.02
+    assert 0.02 < sharp.diagnostics.note(SharpenedToShape).completed_zero_set < 0.2
+
+
+def test_lines_bend_round_the_corners_of_the_mesh():
+    n = 8
+    mesh = boxes((2 * n, 2 * n, n // 2), 1 / n, keep=lambda c: ~((c[:, 0] > 1) & (c[:, 1] > 1)), jitter=0.1)
+    x, y, _ = mesh.vertices.T
+    wall = rectangle([1.55, -0.5, -0.5], [0, 3, 0], [0, 0, 3])
+    exact = np.where((x <= 1) & (y > 1), -(0.55 + np.hypot(x - 1, y - 1)), x - 1.55)
+    sharp = sh.sharpen(sh.signed_distance(wall, mesh), wall)
+    straight = (y <= 1) | (x > 1)
+    assert np.abs(sharp.values - exact * np.sign(wall.face_area_vectors[0, 0]))[straight].max() < 1e-12
+    assert np.abs(np.abs(sharp.values) - np.abs(exact)).max() < 1 / n
+
+
+def test_a_plate_thinner_than_a_tet_keeps_its_sides(tets):
+    plate = sh.TriangleMesh(cube(1.0).vertices * [1.0, 1.0, 0.01], cube(1.0).faces)
+    field = sh.solid_distance(plate, tets)
+    points = tets.vertices
+    beyond = np.abs(points) - [1.0, 1.0, 0.01]
+    exact = np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+    assert np.abs(field.values - exact).max() < 1e-9
+
+
+def test_points_and_methods_beside_shapes_are_refused(tets):
+    field = sh.signed_distance(cube(0.8), tets)
+    cloud = sh.PointCloud(samples.sphere(2).vertices, samples.sphere(2).vertices)
+    with refused(SourceError, "shape"):
+        sh.sharpen(field, cloud)
+    with refused(UnsupportedTypeError):
+        sh.sharpen(field, sh.Convex(), shape=cube(0.8))
+
+
+def test_it_can_be_cancelled(tets):
+    class Stop(Exception):
+        pass
+
+    def stop(fraction, step):
+        raise Stop
+
+    with pytest.raises(Stop):
+        sh.sharpen(sh.signed_distance(cube(0.8), tets), cube(0.8), progress=stop)
