@@ -47,16 +47,15 @@ def restored(found: Orientation) -> Restored:
 
     In sheets that bound nothing only single faces are put back, in doubled walls none: larger holes may be meant.
     """
-    open_area = found.undecided_area or found.wall_area or found.nonorientable_parts
     if found.closed_parts == found.n_parts:
-        return Restored(found.shape, found.walls, None, not open_area)
+        return as_found(found)
     shape, parents = _triangles(found.shape)
     places = welded(shape.vertices, roundoff(shape.vertices))[shape.faces]
     whole = (places != np.roll(places, 1, axis=1)).all(axis=1)
     kept = whole & ~found.walls[parents]
     faces = lost_faces(shape.vertices, places[kept], found.undecided[parents][kept])
     if not len(faces):
-        return Restored(found.shape, found.walls, None, False)
+        return as_found(found)
     mesh = TriangleMesh(shape.vertices, np.concatenate([shape.faces, faces]))
     share = float(mesh.face_areas[-len(faces) :].sum() / mesh.face_areas.sum())
     added = np.arange(mesh.n_faces) >= shape.n_faces
@@ -64,9 +63,19 @@ def restored(found: Orientation) -> Restored:
         mesh,
         np.concatenate([found.walls[parents], np.zeros(len(faces), dtype=bool)]),
         added,
-        not open_area and _is_closed(np.concatenate([places[whole], faces])),
+        _all_decided(found) and _is_closed(np.concatenate([places[whole], faces])),
         FacesRestored(len(faces), share),
     )
+
+
+def as_found(found: Orientation) -> Restored:
+    """An oriented mesh with the faces that it has, and no others."""
+    return Restored(found.shape, found.walls, None, found.closed_parts == found.n_parts and _all_decided(found))
+
+
+def _all_decided(found: Orientation) -> bool:
+    """Whether all faces have an inside."""
+    return not (found.undecided_area or found.wall_area or found.nonorientable_parts)
 
 
 def _triangles(shape: Mesh) -> tuple[TriangleMesh, NDArray[np.int64]]:

@@ -39,7 +39,7 @@ from .inside import Sides, closed_sides
 from .joining import Shape, joined_shape
 from .orientation import orientation
 from .point_orientation import orient_points
-from .restoring import restored
+from .restoring import as_found, restored
 from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .shape_sides import sides_of_shape
 from .sharpening import sharpen
@@ -197,14 +197,17 @@ def coarse_distance(shape: Shape, domain: Grid, steps: Steps, progress: Progress
     return _on_grid(shape, coarse_grid(domain), replace(steps, closed="exact"), progress)
 
 
-def _oriented(shape: Shape, notes: list[Note]) -> tuple[Merged, bool]:
-    """The shape as `orient` leaves it, which knows its duplicates, and whether it is closed; points get normals."""
+def _oriented(shape: Shape, steps: Steps, notes: list[Note]) -> tuple[Merged, bool]:
+    """The shape as `orient` leaves it, which knows its duplicates, and whether it is closed; points get normals.
+
+    Faces that it lost are put back where distance is measured to faces: the method completes by itself.
+    """
     if isinstance(shape, PointCloud):
         oriented = orient_points(shape)
         notes.append(OrientedPoints(oriented.n_fitted, oriented.n_turned))
         return merge_duplicates(oriented.cloud), False
     found = orientation(shape)
-    whole = restored(found)
+    whole = restored(found) if steps.sharpen else as_found(found)
     notes += [note for note in (found.note, whole.note) if note is not None]
     return Merged(whole.shape, whole.walls, 0, whole.restored), whole.closed
 
@@ -213,7 +216,7 @@ def _elsewhere(shape: Shape, domain: Grid | TetMesh, steps: Steps, progress: Pro
     """On tets, and on grids with solid nodes: the method, and distance to the shape where that can be."""
     notes: list[Note] = []
     if steps.orient:
-        shape = _oriented(shape, notes)[0].shape
+        shape = _oriented(shape, steps, notes)[0].shape
     if steps.unite and not isinstance(domain, Grid):
         united = union_of(shape)
         shape = united.shape
@@ -233,7 +236,7 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     stopwatch = Stopwatch(progress, STEPS)
     refuse_beyond_memory(grid, BYTES_IF_CLOSED if steps.sharpen and steps.orient else BYTES_IF_PLAIN)
     with stopwatch("orient"):
-        merged, closed = _oriented(shape, notes) if steps.orient else (merge_duplicates(shape), False)
+        merged, closed = _oriented(shape, steps, notes) if steps.orient else (merge_duplicates(shape), False)
     if closed and steps.sharpen:
         field = _bounded(merged, grid, steps, notes, stopwatch)
         if field is not None:
