@@ -85,7 +85,7 @@ def test_a_thousand_solvers_grids_and_fields_leave_nothing():
 def test_factors_are_freed_with_what_holds_them(backend):
     factor = factorize(sparse.identity(50, format="csr") * 2.0, backend=backend)
     gone = weakref.ref(factor)
-    finalizer = getattr(factor, "_finalizer", None)
+    finalizer = getattr(getattr(factor, "_analysis", factor), "_finalizer", None)
     del factor
     gc.collect()
     assert gone() is None and (finalizer is None or not finalizer.alive)

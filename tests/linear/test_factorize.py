@@ -129,3 +129,27 @@ def test_a_factor_outlives_a_change_of_threads(backend, dtype, made_on, solved_o
     with threadpool_limits(made_on):
         again = factorize(matrix, backend)
     assert np.array_equal(again.solve(rhs), solution)
+
+
+@backends
+def test_factors_like_others_are_independent_of_them(surface, backend):
+    """Matrices with entries at the same places share an order and memory; each solves its own system whenever asked."""
+    first = surface.stiffness + sparse.diags_array(np.linspace(1, 2, surface.triangles.n_vertices))
+    second = first + sparse.diags_array(np.geomspace(1e-3, 1e6, surface.triangles.n_vertices))
+    other = sparse.identity(surface.triangles.n_vertices, format="csr") * 3.0  # entries at fewer places
+    matrices = [sparse.csr_matrix(matrix) for matrix in (first, second, other)]
+    factors = [factorize(matrices[0], backend)]
+    factors += [factorize(matrix, backend, like=factors[0]) for matrix in matrices[1:]]
+    truth = np.random.default_rng(0).normal(size=matrices[0].shape[0])
+    for k in (0, 1, 2, 0, 0, 1):
+        np.testing.assert_allclose(factors[k].solve(whole(matrices[k]) @ truth), truth, atol=1e-9)
+        np.testing.assert_array_equal(
+            factors[k].solve(truth), factorize(matrices[k], backend, like=factors[0]).solve(truth)
+        )
+    indefinite = sparse.csr_matrix(first - sparse.diags_array(np.full(len(truth), 9.0)))
+    with refused(sh.FactorizationError, "matrix"):
+        factorize(indefinite, backend, like=factors[0]).solve(truth)
+    np.testing.assert_allclose(factors[0].solve(whole(matrices[0]) @ truth), truth, atol=1e-9)
+    del factors[0]
+    gc.collect()
+    np.testing.assert_allclose(factors[0].solve(whole(matrices[1]) @ truth), truth, atol=1e-9)

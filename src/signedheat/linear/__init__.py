@@ -16,7 +16,7 @@ from .ordering import elimination_order
 from .pardiso import PardisoFactor
 from .superlu import SuperLUFactor
 
-__all__ = ["Factor", "available_backends", "elimination_order", "factorize", "upper_triangle", "whole"]
+__all__ = ["Factor", "PardisoFactor", "available_backends", "elimination_order", "factorize", "upper_triangle", "whole"]
 
 
 class Factor(Protocol):
@@ -39,7 +39,11 @@ def available_backends() -> list[str]:
 
 
 def factorize(
-    matrix: Any, backend: str | None = None, order: NDArray[np.integer] | None = None, reused: bool = False
+    matrix: Any,
+    backend: str | None = None,
+    order: NDArray[np.integer] | None = None,
+    reused: bool = False,
+    like: Factor | None = None,
 ) -> Factor:
     """Factorise a sparse Hermitian positive definite matrix.
 
@@ -53,6 +57,8 @@ def factorize(
         Fill-reducing elimination order, if one is known: ``order[k]`` is the unknown eliminated k-th.
     reused : bool
         Whether many systems will be solved. PARDISO then finds an order of its own, with which it solves on all cores.
+    like : Factor, optional
+        Of a matrix with entries at the same places: PARDISO then takes half the time.
 
     Returns
     -------
@@ -78,6 +84,8 @@ def factorize(
             remedy=f"choose one of {', '.join(available)}",
         )
     upper = upper_triangle(matrix)
+    if isinstance(like, PardisoFactor) and name == "pardiso" and (again := like.like_this(upper)):
+        return again
     if name == "pardiso":
         return PardisoFactor(upper, None if reused else order)
     if name == "cholmod":

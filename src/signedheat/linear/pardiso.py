@@ -18,7 +18,7 @@ from scipy import sparse
 
 from ..errors import FactorizationError, UnsupportedTypeError
 
-_ANALYZE_AND_FACTORIZE, _SOLVE, _RELEASE = 12, 33, -1
+_ANALYZE_AND_FACTORIZE, _FACTORIZE, _SOLVE, _RELEASE = 12, 22, 33, -1
 _POSITIVE_DEFINITE = {np.dtype(np.float64): 2, np.dtype(np.complex128): 4}
 _CAUSES = {
     -1: "inconsistent input",
@@ -43,30 +43,70 @@ class PardisoFactor:
     backend = "pardiso"
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
+        self._take(_Analysis(upper, order), upper)
+
+    def _take(self, analysis: _Analysis, upper: sparse.csr_matrix) -> None:
         self.n, self.dtype = upper.shape[0], upper.dtype
-        self._call = _Call(upper, order)
-        self._lock = threading.Lock()
-        self._finalizer = weakref.finalize(self, _Call.release, self._call)
-        self._call(_ANALYZE_AND_FACTORIZE)
+        self._analysis, self._values = analysis, upper.data
+        with analysis.lock:
+            analysis.factorize(self._values)
+
+    def like_this(self, upper: sparse.csr_matrix) -> PardisoFactor | None:
+        """Factor of another matrix with entries at the same places, for half the time; None if they are not.
+
+        The two share memory: the one that did not solve last is factorised again when it is asked to.
+        """
+        if not self._analysis.fits(upper):
+            return None
+        other = object.__new__(PardisoFactor)
+        other._take(self._analysis, upper)
+        return other
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
         """Solution for one right-hand side (n,) or several (n, k)."""
         columns = np.asfortranarray(rhs, dtype=self.dtype)
         solution = np.empty_like(columns, order="F")
-        with self._lock:
-            self._call(_SOLVE, columns, solution)
+        with self._analysis.lock:
+            self._analysis.factorize(self._values)
+            self._analysis.call(_SOLVE, columns, solution)
         return solution
 
     @property
     def nonzeros(self) -> int:
         """Entries stored in the factor."""
-        return int(self._call.parameters[17])
+        return int(self._analysis.call.parameters[17])
 
     def __reduce__(self) -> NoReturn:
         raise UnsupportedTypeError(
             "a factor is memory of the MKL library, which is released with it: it cannot be copied or pickled",
             remedy="factorise the matrix again",
         )
+
+
+class _Analysis:
+    """What factors of matrices with entries at the same places share: the order, and memory for one of them."""
+
+    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None) -> None:
+        self.call = _Call(upper, order)
+        self.lock = threading.Lock()
+        self._factorized: NDArray[Any] | None = None
+        self._finalizer = weakref.finalize(self, _Call.release, self.call)
+
+    def factorize(self, values: NDArray[Any]) -> None:
+        """Make the factor of the matrix with these values, unless it is there."""
+        if self._factorized is values:
+            return
+        phase = _ANALYZE_AND_FACTORIZE if self._factorized is None else _FACTORIZE
+        self._factorized = None
+        self.call.values = values
+        self.call(phase)
+        self._factorized = values
+
+    def fits(self, upper: sparse.csr_matrix) -> bool:
+        """Whether a matrix has its entries at the places of the others."""
+        call = self.call
+        same = upper.dtype == call.values.dtype and len(upper.data) == len(call.values)
+        return bool(same and np.array_equal(upper.indptr, call.indptr) and np.array_equal(upper.indices, call.indices))
 
 
 class _Call:
@@ -77,7 +117,8 @@ class _Call:
         index = np.int64 if wide else np.int32
         self._function = _library().pardiso_64 if wide else _library().pardiso
         self._handle = np.zeros(64, dtype=np.int64)
-        self._matrix = (upper.data, upper.indptr.astype(index, copy=False), upper.indices.astype(index, copy=False))
+        self.values = upper.data
+        self.indptr, self.indices = upper.indptr.astype(index, copy=False), upper.indices.astype(index, copy=False)
         self._integer = ctypes.c_longlong if wide else ctypes.c_int
         self._kind, self._n = _POSITIVE_DEFINITE[upper.dtype], upper.shape[0]
         self._order = np.zeros(1, dtype=index) if order is None else np.ascontiguousarray(order, dtype=index)
@@ -94,7 +135,7 @@ class _Call:
         integer = self._integer
         one, status = integer(1), integer(0)
         n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])
-        empty = np.zeros(1, dtype=self._matrix[0].dtype)
+        empty = np.zeros(1, dtype=self.values.dtype)
         # a two-level factor made on several threads gives wrong solutions on one, without an error, and vice versa
         others = _library().MKL_Set_Num_Threads_Local(self._threads)
         self._function(
@@ -104,7 +145,7 @@ class _Call:
             ctypes.byref(integer(self._kind)),
             ctypes.byref(integer(phase)),
             ctypes.byref(integer(self._n)),
-            *(_address(array) for array in self._matrix),
+            *(_address(array) for array in (self.values, self.indptr, self.indices)),
             _address(self._order),
             ctypes.byref(n_columns),
             _address(self.parameters),

@@ -14,7 +14,7 @@ from ..cache import LastUsed, fingerprint
 from ..discretization import Levels, SourceTerm
 from ..errors import ConstraintError
 from ..frozen import Frozen
-from ..linear import Factor, factorize, upper_triangle, whole
+from ..linear import Factor, PardisoFactor, factorize, upper_triangle, whole
 from ..linear.conjugate_gradients import conjugate_gradients
 
 _MAX_ROUNDS = 12
@@ -35,16 +35,18 @@ class DirectIntegration(Frozen):
     stiffness : (n, n) sparse
         Upper triangle of C, as `upper_triangle` makes it. Its kernel are the constants on each connected component.
     factorize : callable
-        From the upper triangle of a matrix to an object with a method ``solve``.
+        From the upper triangle of a matrix to an object with a method ``solve``; one that returns a
+        `PardisoFactor` is given the last one as `like`.
     spring : float
         ρ of the augmented Lagrangian behind exact constraints, relative to the largest diagonal entry of C. Larger
         values need fewer rounds, and worsen the condition of the matrix.
     """
 
     stiffness: sparse.csr_matrix
-    factorize: Callable[[sparse.csr_matrix], Factor] = factorize
+    factorize: Callable[..., Factor] = factorize
     spring: float = 1e8
     _pulled: LastUsed[bytes, Factor] = field(default_factory=LastUsed, init=False, repr=False)
+    _of_this_pattern: LastUsed[bytes, list[Factor]] = field(default_factory=LastUsed, init=False, repr=False)
 
     @cached_property
     def components(self) -> NDArray[np.int64]:
@@ -160,7 +162,11 @@ class DirectIntegration(Frozen):
     def _factorize_pulled(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
         unreached = np.isin(self.components[self._first_vertices], self._component_of(rows), invert=True)
-        return self.factorize(_grounded(matrix, self._first_vertices[unreached]))
+        matrix = _grounded(matrix, self._first_vertices[unreached])
+        before: list[Factor] = self._of_this_pattern(fingerprint(matrix.indptr, matrix.indices), list)
+        factor = self.factorize(matrix, like=before[0]) if before else self.factorize(matrix)
+        before[:] = [factor] if isinstance(factor, PardisoFactor) else []  # others have nothing to share
+        return factor
 
     @cached_property
     def _first_vertices(self) -> NDArray[np.int64]:
