@@ -99,8 +99,8 @@ def assemble(
     4. All nodes find the nearest of both (`sampled_surface`), and the sides from faces nearby or from `sides`.
 
     Around layers what `phi` returns, where given, takes the place of `sides`, which need not run in their middle; it is
-    called where there are layers only. Faces tell no side where `tells`, given (s, 3) places on them in cells from the
-    first node, is False. Those that are `restored` were not there.
+    called where there are layers only, and its memory is used. Faces tell no side where `tells`, given (s, 3) places on
+    them in cells from the first node, is False.
     """
     steps = np.array(grid.spacing)
 
@@ -122,7 +122,9 @@ def assemble(
         left_out = layered_faces(features, band, middle, steps)
     if left_out.any():
         if phi is not None:
-            sides = np.where(_around_faces(left_out, band), middle(), sides)
+            there = middle()
+            np.copyto(there, sides, where=~_around_faces(left_out, band))
+            sides = there
         kept = features.faces[~left_out].astype(np.int64)
         features = FaceFeatures.of(features.vertices, kept, features.trusted[~left_out])
         band = FaceBand.of(features, grid.shape, steps)
