@@ -2,6 +2,7 @@
 =============================
 
 Two broken circles on a plane, with different radii: φ free at the source, zero on the whole, or one level on each.
+:class:`signedheat.Soft` is between the first two.
 """
 
 from pathlib import Path

@@ -2,8 +2,8 @@
 =============================
 
 Fine nodes are needed near the surface only. A band has the fine spacing up to a distance on both sides, and a coarse
-grid beyond: the same surface from a tenth of the nodes, and from a hundredth where grids are finer. Where even that is
-too much for the memory, :func:`signedheat.tiled_distance` makes the same band in tiles on disk.
+grid beyond: the same surface from a tenth of the nodes, and from a hundredth where grids are finer. Where even a
+:class:`signedheat.BandField` is too much for the memory, :func:`signedheat.tiled_distance` makes it in tiles on disk.
 """
 
 from pathlib import Path

@@ -1,8 +1,8 @@
 """From a mask to distance and back
 ================================
 
-A whole application: a segmented organ as voxels; distance at the same nodes, and from it the very same mask, one
-grown by a millimetre, and one that is smooth.
+A whole application: a segmented organ as voxels; distance at the same nodes, and from it the very same mask, and
+one grown by a millimetre. Files of masks are for :func:`signedheat.read_volume` and :func:`signedheat.read_labels`.
 """
 
 from pathlib import Path
