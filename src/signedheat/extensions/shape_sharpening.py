@@ -151,6 +151,8 @@ def assemble(
 
 def _unfold(values: NDArray[np.float64], inside: NDArray[np.bool_], surface: ExactSurface) -> None:
     """Turn, in place, values with the sign of a face that is folded over: the whole shape winds the other way there."""
+    if not len(surface.features.rows):  # all faces lie in layers
+        return
     turned = np.empty(inside.shape, dtype=bool)
 
     def planes(here: slice) -> None:
