@@ -179,6 +179,16 @@ def test_intrinsic_triangulations_keep_the_area_or_refuse(flatness, refine):
         assert made.triangles.face_areas.sum() == pytest.approx(squashed.face_areas.sum(), rel=1e-4)
 
 
+@pytest.mark.parametrize("flatness", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
+def test_intrinsic_triangulations_lose_no_more_area_than_cancels_in_heron_s_formula(flatness):
+    """Height over longest side f: the area's square is a difference of numbers f⁻² times as large."""
+    ball, turn = sphere(3), np.linalg.qr(np.arange(9.0).reshape(3, 3) + np.eye(3))[0]
+    squashed = sh.TriangleMesh(ball.vertices * [1.0, flatness, 0.7 * flatness] @ turn, ball.faces)
+    for refine in (False, True):
+        made = sh.intrinsic_delaunay(squashed, refine=refine).triangles.face_areas.sum()
+        assert made == pytest.approx(squashed.face_areas.sum(), rel=np.finfo(float).eps / flatness**2)
+
+
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
 def test_the_convex_method_stays_bounded_where_the_field_is_constant(scale):
     """Sources on all sides cancel: φ is rounding alone, and tells no scale."""
