@@ -14,7 +14,8 @@ from import_graph import circles, import_graph, upward_imports
 PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
-    set("cache compiled diagnostics errors frozen kernel_cache memory packages parallel progress reprs slots".split()),
+    {"cache", "compiled", "diagnostics", "errors", "frozen", "kernel_cache", "kernel_compiler", "memory"}
+    | {"packages", "parallel", "progress", "reprs", "slots"},
     {"geometry"},
     {"linear"},
     {"operators"},

@@ -1,4 +1,4 @@
-"""How kernels are compiled: Numba's steps, without what kernels do not need. Halves the time that compiling takes.
+"""How kernels are compiled: Numba's steps, without what kernels do not need, in two thirds of the time.
 
 * The type of ``a + b`` for types that another kernel has added is not searched for again.
 * References are counted only in kernels that make arrays. Others borrow those of their caller.
