@@ -61,8 +61,9 @@ COMPARISONS = {
     "solids-missing": Comparison(
         "Solids in space: missing faces",
         ("solids.py", "15 % of the faces missing", "six holes", "half of it missing", "--repeats", "1"),
-        """The same shapes. Where single faces are missing, all are as good. Heat completes holes better than winding
-        numbers. With half of the shape gone, nothing tells where the rest was. One run.""",
+        """The same shapes. Single missing faces are put back here, whose rims tell what they were; winding numbers are
+        a little off there. Heat completes holes better than winding numbers. With half of the shape gone, nothing
+        tells where the rest was. One run.""",
     ),
     "solids-noise": Comparison(
         "Solids in space: noise and doubled faces",
