@@ -15,6 +15,7 @@ from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import refuse_extreme
 from ..errors import GeometryError, OutsideError
+from ..geometry.edge_flips import flipped_along_creases
 from ..operators.grid.block_contours import block_contour
 from ..operators.grid.blocks import NODES, SIDE, Blocks
 from ..operators.grid.exact_surface import ExactSurface
@@ -222,7 +223,7 @@ class BandField(Displayed, Combinable):
             return points if surface is None else surface.on_level(points, _NodeValues(self), level)
 
         vertices, faces = block_contour(self.blocks, self.values, spacing, level, refine)
-        return TriangleMesh(vertices, faces)
+        return TriangleMesh(vertices, faces if surface is None else flipped_along_creases(vertices, faces))
 
     def offset(self, distance: float) -> TriangleMesh:
         """The offset of the shape at a signed distance: `contour`, but refused if the grid is too small for it.

@@ -19,6 +19,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import contiguous
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..frozen import Frozen
+from ..geometry.edge_flips import flipped_along_creases
 from ..geometry.marching import closed_surface, level_lines
 from ..operators.grid.exact_surface import ExactSurface
 from ..parallel import in_chunks
@@ -209,7 +210,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             return [Polyline(points, closed) for points, closed in lines]
         surface = self.surface
         refine = None if surface is None else lambda points: surface.on_level(points, self.values, level)
-        return TriangleMesh(*closed_surface(self.values, grid.origin, grid.spacing, level, refine))
+        vertices, faces = closed_surface(self.values, grid.origin, grid.spacing, level, refine)
+        return TriangleMesh(vertices, faces if surface is None else flipped_along_creases(vertices, faces))
 
     @overload
     def offset(self: GridField[Literal[3]], distance: float) -> TriangleMesh: ...

@@ -69,3 +69,9 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     """
     faces = np.array(faces, dtype=np.int64, order="C")  # what must not be written is a type of its own to the compiler
     return EdgeTable(*find_edges(faces, np.bincount(faces.ravel())))
+
+
+def edge_keys(one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k,) a number for each pair of vertices, whichever comes first."""
+    keys: NDArray[np.int64] = (np.minimum(one, other) << 32) | np.maximum(one, other)
+    return keys

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .edges import edge_table
+from .edges import edge_keys, edge_table
 from .hole_filling import next_around_gap
 
 MOST_SIDES = 16
@@ -85,7 +85,7 @@ def _small_holes(
     touching = np.zeros(len(vertices), dtype=bool)
     touching[tails] = True
     known = table.vertices[touching[table.vertices].all(axis=1)]
-    taken = np.sort(_keys(known[:, 0], known[:, 1]))
+    taken = np.sort(edge_keys(known[:, 0], known[:, 1]))
     found = []
     for loops in _simple_loops(tails.tolist(), following.tolist()):
         for begin in range(0, len(loops), TOGETHER):
@@ -157,7 +157,7 @@ class _Holes:
 
     def is_taken(self, i: int, k: int) -> NDArray[np.bool_]:
         """(l,) whether the i-th and the k-th vertex have an edge already."""
-        keys = _keys(self.loops[:, i], self.loops[:, k])
+        keys = edge_keys(self.loops[:, i], self.loops[:, k])
         at = np.minimum(np.searchsorted(self.taken, keys), len(self.taken) - 1)
         found: NDArray[np.bool_] = self.taken[at] == keys
         return found
@@ -224,12 +224,6 @@ def _angles(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.
     flat = ~np.logical_and(one.any(axis=-1), other.any(axis=-1))
     angles: NDArray[np.float64] = np.arccos(np.clip(np.einsum("...j,...j->...", one, other), -1.0, 1.0))
     return np.where(flat, 0.0, angles)
-
-
-def _keys(one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
-    """A number for each pair of vertices, whichever comes first."""
-    keys: NDArray[np.int64] = (np.minimum(one, other) << 32) | np.maximum(one, other)
-    return keys
 
 
 def _area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:

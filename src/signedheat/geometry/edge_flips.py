@@ -1,0 +1,176 @@
+"""Edges of a triangulated level set flipped so that they run along its creases.
+
+Marching from cell to cell cuts across the creases of a level set, and leaves teeth there although every vertex lies on
+the level. Of the two triangulations of a quadrilateral the one that bends less, ``Σ length · angle`` over its five
+edges, has its diagonal along the crease.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .edges import EdgeTable, edge_keys, edge_table
+
+SHARP = np.deg2rad(25.0)
+"""Angle between two faces from which on the edge between them is looked at."""
+GAIN = 1e-9
+"""What a flip must save, over the length of the edges around times a radian: less is rounding."""
+ROUNDS = 12
+"""Times that edges are flipped at most; what one flip makes better for another is nearly done after four."""
+MOST = 4_000_000
+"""Faces beyond which creases stay as they are: their teeth are too small to be seen."""
+
+
+def flipped_along_creases(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        Positions.
+    faces : (m, 3) int
+        A surface of which no edge has more than two faces, which agree. It stays so.
+
+    Examples
+    --------
+    A roof whose ridge the edge between its triangles crosses; the faces around hold its eaves:
+
+    >>> roof, corners = [[0, -1, 0], [1, 0, 1], [0, 1, 0], [-1, 0, 1]], [[2, -2, 0], [2, 2, 0], [-2, 2, 0], [-2, -2, 0]]
+    >>> vertices = np.array(roof + corners, dtype=float)
+    >>> around = [[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]]
+    >>> flipped_along_creases(vertices, np.array([[0, 1, 2], [0, 2, 3], *around]))[:2].tolist()
+    [[2, 3, 1], [3, 0, 1]]
+    """
+    if not 0 < len(faces) <= MOST:
+        return faces
+    sharp = _Creases.of(vertices, faces)
+    if not len(sharp.edges):
+        return faces
+    near = np.zeros(len(vertices), dtype=bool)
+    near[faces[sharp.faces_beside]] = True
+    some = np.flatnonzero(near[faces].any(axis=1))
+    result: NDArray[np.int64] = faces.copy()
+    for _ in range(ROUNDS):
+        creases = _Creases.of(vertices, result[some])
+        first, second, one, other = _flips(vertices, creases)
+        if not len(first):
+            break
+        result[some[first]], result[some[second]] = one, other
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Creases:
+    """Faces, and the edges at which they bend sharply.
+
+    Attributes
+    ----------
+    faces : (m, 3) int
+        Triangles.
+    table : EdgeTable
+        Their edges.
+    sides : (e, 2) int
+        Sides of faces along each edge, three times the face plus the corner where it begins; −1 where there is none.
+    normals : (m, 3) float
+        Unit normals.
+    edges : (k,) int
+        Those at which two faces make an angle of more than `SHARP`.
+    """
+
+    faces: NDArray[np.int64]
+    table: EdgeTable
+    sides: NDArray[np.int64]
+    normals: NDArray[np.float64]
+    edges: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Creases:
+        table = edge_table(faces)
+        flat = table.face_edges.ravel()
+        sides = np.full((len(table.vertices), 2), -1)
+        sides[flat[::-1], 0] = np.arange(len(flat))[::-1]  # the first is written last
+        sides[flat, 1] = np.arange(len(flat))
+        sides[sides[:, 0] == sides[:, 1], 1] = -1
+        normals = _unit_normals(vertices, *faces.T)
+        two = np.flatnonzero(sides[:, 1] >= 0)
+        cosines = np.einsum("ij,ij->i", *normals[sides[two] // 3].transpose(1, 0, 2))
+        return cls(faces, table, sides, normals, two[cosines < np.cos(SHARP)])
+
+    @property
+    def faces_beside(self) -> NDArray[np.int64]:
+        """(2 k,) faces at the sharp edges."""
+        return np.asarray(self.sides[self.edges] // 3).ravel()
+
+    def beyond(self, edges: NDArray[np.int64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(k,) the face on the other side of an edge of each of some faces; the face itself where there is none."""
+        one, other = (self.sides[edges] // 3).T
+        found: NDArray[np.int64] = np.where(one == faces, np.where(self.sides[edges, 1] < 0, faces, other), one)
+        return found
+
+
+def _flips(
+    vertices: NDArray[np.float64], creases: _Creases
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of faces to replace, (k,) each, none beside another, and what replaces them, (k, 3) each.
+
+    The edge from a to b has c and d across; the edge from c to d takes its place.
+    """
+    faces, around = creases.faces, creases.table.face_edges
+    sides = creases.sides[creases.edges]
+    first, second, i, j = sides[:, 0] // 3, sides[:, 1] // 3, sides[:, 0] % 3, sides[:, 1] % 3
+    a, b = faces[first, i], faces[first, (i + 1) % 3]
+    c, d = faces[first, (i + 2) % 3], faces[second, (j + 2) % 3]
+    rim = (  # from, to, the edge, the face it belongs to, and which of the new ones it will
+        (b, c, around[first, (i + 1) % 3], first, 1),
+        (c, a, around[first, (i + 2) % 3], first, 0),
+        (a, d, around[second, (j + 1) % 3], second, 0),
+        (d, b, around[second, (j + 2) % 3], second, 1),
+    )
+    made = np.stack([_unit_normals(vertices, a, d, c), _unit_normals(vertices, d, b, c)])
+    normals = creases.normals
+    gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *made)
+    reach = np.linalg.norm(vertices[c] - vertices[d], axis=1)
+    beside = [first, second]
+    for tail, head, edge, owner, new in rim:
+        other = creases.beyond(edge, owner)
+        beside.append(other)
+        there = other != owner
+        before = _bend(vertices, tail, head, normals[owner], normals[other])
+        gain += np.where(there, before - _bend(vertices, tail, head, made[new], normals[other]), 0.0)
+    taken = np.sort(edge_keys(*creases.table.vertices.T))
+    keys = edge_keys(c, d)
+    gain[taken[np.minimum(np.searchsorted(taken, keys), len(taken) - 1)] == keys] = 0.0
+    order = np.argsort(gain, kind="stable")
+    rank = np.empty(len(gain), dtype=np.int64)
+    rank[order] = np.arange(1, len(gain) + 1)
+    rank[gain <= GAIN * reach] = 0
+    best = np.zeros(len(faces), dtype=np.int64)
+    for face in beside:
+        np.maximum.at(best, face, rank)
+    won = (rank > 0) & np.all([best[face] == rank for face in beside], axis=0)  # so none is beside another
+    return first[won], second[won], np.stack([a, d, c], axis=1)[won], np.stack([d, b, c], axis=1)[won]
+
+
+def _bend(
+    vertices: NDArray[np.float64],
+    tails: NDArray[np.int64],
+    heads: NDArray[np.int64],
+    one: NDArray[np.float64],
+    other: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(k,) length times the angle between the unit normals on both sides of edges."""
+    lengths = np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
+    bends: NDArray[np.float64] = lengths * np.arccos(np.clip(np.einsum("ij,ij->i", one, other), -1.0, 1.0))
+    return bends
+
+
+def _unit_normals(
+    vertices: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.int64], c: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(m, 3) of triangles; 0 where they are flat."""
+    vectors = np.cross(vertices[b] - vertices[a], vertices[c] - vertices[a])
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1.0)
