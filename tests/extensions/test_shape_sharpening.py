@@ -91,7 +91,7 @@ def test_turned_axes_and_units_do_not_matter():
     other = sh.Grid(1000 * grid.origin[[1, 2, 0]], 1000 * grid.spacing[[1, 2, 0]], np.array(grid.shape)[[1, 2, 0]])
     values = np.moveaxis(field.values, 0, -1)
     difference = np.abs(sharpened(turned, other).values / 1000 - values) / CELL
-    assert np.quantile(difference, 0.95) < 1e-9  # between two places, nodes may choose the other
+    assert np.quantile(difference, 0.95) < 1e-6  # of φ; between two places, nodes may choose the other
     assert root_mean_square(difference) < 0.02
 
 

@@ -246,3 +246,18 @@ def test_half_of_the_points_of_a_ball_make_no_second_ball():
     away = np.linalg.norm(grid.points, axis=-1) - 1.0
     assert not (field.values[away > 0.3] < 0).any()
     assert (field.values[(away < -0.2) & (grid.points[..., 2] < 0)] < 0).all()
+
+
+@pytest.mark.parametrize("band", [None, 0.1])
+def test_completed_surface_begins_at_the_rims_of_holes(band):
+    """No groove lies between: contours of a ball look outwards as it does, at the surface and away from it."""
+    broken = samples.without_patches(samples.sphere(5), 6, 0.15)
+    grid = Grid.around(broken.bounds, 96)
+    field = solid_distance(broken, grid) if band is None else solid_distance(broken, grid, band=band)
+    for level in (0.0, 2 * grid.spacing[0]):
+        made = field.contour(level)
+        corners = made.vertices[made.faces]
+        ahead = np.einsum("ij,ij->i", made.face_area_vectors, corners.mean(axis=1))
+        cosines = ahead / np.linalg.norm(made.face_area_vectors, axis=1) / np.linalg.norm(corners.mean(axis=1), axis=1)
+        areas = np.linalg.norm(made.face_area_vectors, axis=1)
+        assert areas[cosines < np.cos(np.deg2rad(15))].sum() < 0.003 * areas.sum()

@@ -15,6 +15,7 @@ from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points, off
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
 from .band_completion import NONE, completed_function, halo
 from .band_plan import FAR, NEAR, BandPlan
+from .shape_sharpening import stands_in
 
 TOGETHER = 512
 """Blocks whose faces are searched at a time."""
@@ -44,12 +45,16 @@ class Tile:
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Blocks with distances to faces, functions that are negative inside, and confidence in the nearest face."""
+    """Blocks with distances to faces, functions that are negative inside, confidence in the nearest face, and its ends.
+
+    `at_ends` tells whether the nearest place is on an edge or vertex beyond which the surface does not go on.
+    """
 
     blocks: Blocks
     distances: NDArray[np.float64]
     function: NDArray[np.float64]
     trusted: NDArray[np.float16]
+    at_ends: NDArray[np.bool_]
 
 
 def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
@@ -88,6 +93,7 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
     n = len(blocks)
     distances, function = np.full((n, NODES), np.inf), np.empty((n, NODES))
     doubtful, trusted = np.zeros((n, NODES), dtype=bool), np.ones((n, NODES), dtype=np.float16)
+    at_ends = np.zeros((n, NODES), dtype=bool)
     near = min(NEAR * plan.coarse_cell, plan.open_reach)
     for begin in range(0, n, TOGETHER):
         here = slice(begin, begin + TOGETHER)
@@ -104,29 +110,33 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
         function[here] = signed.reshape(-1, NODES)
         doubtful[here] = (~told & plan.telling[found.faces]).reshape(-1, NODES)
         trusted[here] = plan.features.trusted[found.faces].reshape(-1, NODES)
+        at_ends[here] = ~found.regular.reshape(-1, NODES)
     completed_function(plan, blocks, distances, function, doubtful)
-    return _Sides(blocks, distances, function, trusted)
+    return _Sides(blocks, distances, function, trusted, at_ends)
 
 
 def _crossings(plan: BandPlan, sides: _Sides, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(c, 18) points of the zero set of the sides, farther than `FAR` cells from any face: see `crossings_at`."""
+    """(c, 18) points of the zero set of the sides where faces are missing (`stands_in`): see `crossings_at`."""
     first, shape = low * SIDE, tuple((high - low) * SIDE)
     n = len(sides.blocks)
-    function = sides.blocks.window(sides.function.astype(np.float32).reshape(n, SIDE, SIDE, SIDE), first, shape)
-    distance = sides.blocks.window(sides.distances.astype(np.float32).reshape(n, SIDE, SIDE, SIDE), first, shape)
+    function, distance, at_ends = (
+        sides.blocks.window(values.astype(np.float32).reshape(n, SIDE, SIDE, SIDE), first, shape)
+        for values in (sides.function, sides.distances, sides.at_ends)
+    )
     field = function.astype(np.float64)
     edges = crossed_edges(field[None])
     ends = edges[:, 1:4], edges[:, 1:4] + (edges[:, 4, None] == np.array([1, 2, 3]))
     known = np.logical_and.reduce([np.isfinite(field[tuple(end.T)]) for end in ends])
     away = np.maximum.reduce([distance[tuple(end.T)] for end in ends])
-    edges = edges[known & (away > FAR * plan.cell)]
+    ended = np.logical_or.reduce([at_ends[tuple(end.T)] > 0 for end in ends])
+    edges = edges[known & (ended | (away > FAR * plan.cell))]
     result: NDArray[np.float64] = crossings_at(field[None], edges, np.array([1.0, *plan.steps]))
     unknown = np.flatnonzero(~np.isfinite(result).all(axis=1))
     result[unknown] = _straight(field, edges[unknown], plan.steps)
     result[:, 1:4] += first * plan.steps
     if plan.faces is None:
         return result
-    return result[plan.faces.distances(np.ascontiguousarray(result[:, 1:4])) > FAR * plan.cell]
+    return result[stands_in(plan.faces.search(np.ascontiguousarray(result[:, 1:4])), plan.cell)]
 
 
 def _straight(field: NDArray[np.float64], edges: NDArray[np.int32], steps: NDArray[np.float64]) -> NDArray[np.float64]:

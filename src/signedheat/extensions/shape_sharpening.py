@@ -18,6 +18,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
+from ..geometry.nearest_faces import NearestFaces
 from ..geometry.winding_tree import winding_numbers_of_points
 from ..operators.grid.closest_points import crossed_edges, crossings_at
 from ..operators.grid.exact_surface import ExactSurface
@@ -32,6 +33,8 @@ Shape = TriangleMesh | PolygonMesh | PointCloud
 
 FAR = 1.5
 """Cells: what the zero set has farther from any face stands in for missing surface."""
+BEYOND, LEVEL = 0.3, 0.5
+"""Cells from the end of a face from which on it does so there, too, up to this sine of the angle with the face."""
 COVERED, CLEAR = 0.5, 0.25
 """Winding numbers above which no face has its front, which is at most 0, and below which hardly one its back."""
 DOUBT = 0.05
@@ -95,7 +98,7 @@ def assemble(
 
     1. The zero set is fitted to the points of clouds (`fitted_to_points`); points far from it stand for themselves.
     2. Faces that lie in layers are left out (`layered_faces`), as all are where the fit is to be smooth.
-    3. Crossings of the zero set farther than `FAR` cells from the others stand in for what is missing.
+    3. Crossings of the zero set away from the others, or beyond their ends, stand in for what is missing (`stands_in`).
     4. All nodes find the nearest of both (`sampled_surface`), and the sides from faces nearby or from `sides`.
 
     Around layers what `phi` returns, where given, takes the place of `sides`, which need not run in their middle; it is
@@ -171,16 +174,23 @@ def _unfold(values: NDArray[np.float64], inside: NDArray[np.bool_], surface: Exa
 def _missing(
     sides: NDArray[np.float64], features: FaceFeatures, band: FaceBand, steps: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], float]:
-    """Crossed edges of the zero set of `sides` farther than `FAR` cells from faces; crossings there; their share."""
+    """Crossed edges of the zero set of `sides` where faces are missing; crossings there; their share."""
     edges = crossed_edges(sides[None])
     n_edges = len(edges)
-    edges = edges[band.leave(edges, sides[None])]
+    with_ends: NDArray[np.bool_] = np.any(features.across < 0, axis=1)
+    edges = edges[band.leave(edges, sides[None], with_ends)]
     if not len(edges):
         return edges, np.empty((0, 18)), 0.0
     crossings = crossings_at(sides[None], edges, np.array([1.0, *steps]))
     points = np.ascontiguousarray(crossings[:, 1:4])
-    missing = band.search(features, points, steps).distances > FAR * float(steps.max())
+    missing = stands_in(band.search(features, points, steps), float(steps.max()))
     return edges[missing], crossings[missing], float(missing.sum() / n_edges)
+
+
+def stands_in(found: NearestFaces, cell: float) -> NDArray[np.bool_]:
+    """(n,) whether places of a zero set are where faces are missing: far from the nearest, or beyond an end of it."""
+    beyond = ~found.regular & (np.abs(found.cosines) < LEVEL) & (found.distances > BEYOND * cell)
+    return beyond | (found.distances > FAR * cell)
 
 
 def _telling(

@@ -22,9 +22,9 @@ MOST_SIDES = 16
 BENT = np.deg2rad(70.0)
 """Root mean square of the angles at the rim from which on a lid does not go on as the surface around it: at the end of
 a tube it is 90°."""
-FOLDED = np.deg2rad(120.0)
-"""The same for one triangle, and for holes of few sides beside others: a tetrahedron bends by 109°, the back of a face
-by 180°."""
+FOLDED = np.deg2rad(135.0)
+"""The same for one triangle, and for holes of few sides beside others: behind the corner of a cube it is 125°, on the
+back of a face 180°."""
 FEW = 6
 """Most sides of such a hole: one that is alone may be where half a body ends."""
 BACK = -0.5
@@ -60,7 +60,7 @@ def lost_faces(
     --------
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> lost_faces(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])).tolist()
-    [[3, 2, 1]]
+    [[2, 3, 1]]
     """
     holes = _small_holes(vertices, faces, sheets)
     lids = [_lids(some, FOLDED if some.sides == 3 else BENT) for some in holes]

@@ -90,8 +90,8 @@ class FaceBand:
         feet, faces = feet_of_nodes(features.rows, nearest, steps)
         return cls(nearest, squares, feet, faces)
 
-    def leave(self, edges: NDArray[np.int32], field: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which of some crossed edges of the grid may be crossed farther than half a cell outside the band.
+    def leave(self, edges: NDArray[np.int32], field: NDArray[np.float64], ends: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which of some crossed edges of the grid may be crossed outside the band, or beside (m,) faces with an end.
 
         (e, 5) edges as `crossed_edges` gives them, of a field with four axes. A crossing lies at most half a cell from
         the nearer end of its edge; where that is in the band, so nearly is the crossing.
@@ -99,9 +99,9 @@ class FaceBand:
         near, far = edges[:, :4], edges[:, :4].copy()
         far[np.arange(len(edges)), edges[:, 4]] += 1
         swap = np.abs(field[tuple(near.T)]) > np.abs(field[tuple(far.T)])
-        ends = np.where(swap[:, None], far, near)[:, 1:]
-        feet: NDArray[np.int32] = self.nearest[tuple(ends.T)]
-        return feet < 0
+        nearer = np.where(swap[:, None], far, near)[:, 1:]
+        feet: NDArray[np.int32] = self.nearest[tuple(nearer.T)]
+        return (feet < 0) | ends[self.faces[feet]] if len(ends) else feet < 0
 
     def search(self, features: FaceFeatures, points: NDArray[np.float64], steps: NDArray[np.float64]) -> NearestFaces:
         """Nearest face of each of (n, 3) points, among those near the nodes of its cell and one layer around; or −1."""
