@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .directions import unit
 from .edges import EdgeTable, edge_keys, edge_table
+from .virtual_refinement import area_vectors
 
 SHARP = np.deg2rad(25.0)
 """Angle between two faces from which on the edge between them is looked at."""
@@ -21,7 +23,7 @@ GAIN = 1e-9
 ROUNDS = 12
 """Times that edges are flipped at most; what one flip makes better for another is nearly done after four."""
 MOST = 4_000_000
-"""Faces beyond which creases stay as they are: their teeth are too small to be seen."""
+"""Faces beyond which creases stay as they are, lest looking for them takes more memory than the surface itself."""
 
 
 def flipped_along_creases(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -171,6 +173,4 @@ def _unit_normals(
     vertices: NDArray[np.float64], a: NDArray[np.int64], b: NDArray[np.int64], c: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """(m, 3) of triangles; 0 where they are flat."""
-    vectors = np.cross(vertices[b] - vertices[a], vertices[c] - vertices[a])
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(lengths > 0, lengths, 1.0)
+    return unit(area_vectors(vertices[a], vertices[b], vertices[c]))

@@ -14,8 +14,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .directions import unit
 from .edges import edge_keys, edge_table
 from .hole_filling import next_around_gap
+from .virtual_refinement import area_vectors
 
 MOST_SIDES = 16
 """Sides of a hole from which on vertices, too, may be lost."""
@@ -29,8 +31,8 @@ FEW = 6
 """Most sides of such a hole: one that is alone may be where half a body ends."""
 BACK = -0.5
 """Cosine with the mean normal at the rim from which on down a triangle looks back, and is folded over what is there."""
-CRACK = 1e-4
-"""Twice the area of a lid over its squared rim up to which it only sews up a crack, however it bends."""
+CRACK = 5e-5
+"""Area of a lid over its squared rim up to which it only sews up a crack, however it bends."""
 TOGETHER = 4096
 """Holes that are triangulated at once."""
 
@@ -79,9 +81,9 @@ def _small_holes(
     if not len(owners):
         return []
     tails, heads = faces[owners, sides], faces[owners, (sides + 1) % 3]
-    face_normals = _unit(_area_vectors(vertices[faces]))
+    face_normals = unit(_area_vectors(vertices[faces]))
     sums = [np.bincount(faces.ravel(), np.repeat(column, 3), len(vertices)) for column in face_normals.T]
-    following = next_around_gap(vertices, _unit(np.stack(sums, axis=1)), tails, heads)
+    following = next_around_gap(vertices, unit(np.stack(sums, axis=1)), tails, heads)
     touching = np.zeros(len(vertices), dtype=bool)
     touching[tails] = True
     known = table.vertices[touching[table.vertices].all(axis=1)]
@@ -178,7 +180,7 @@ def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
     for span in range(2, n):
         for i in range(n - span):
             j = i + span
-            made = np.array([_unit(_area_vectors(holes.vertices[holes.loops[:, [i, k, j]]])) for k in range(i + 1, j)])
+            made = np.array([unit(_area_vectors(holes.vertices[holes.loops[:, [i, k, j]]])) for k in range(i + 1, j)])
             before, behind = _angles(made, normals[i, i + 1 : j]), _angles(made, normals[i + 1 : j, j])
             sums = bends[i, i + 1 : j] + holes.lengths[i, i + 1 : j] * before
             sums += bends[i + 1 : j, j] + holes.lengths[i + 1 : j, j] * behind
@@ -197,8 +199,8 @@ def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
     vectors = _area_vectors(holes.vertices[triangles])
     closed = at_rim <= steepest**2 * around
     if n > 3:
-        ahead = _unit(holes.beside.sum(axis=1))[of_hole]
-        closed[of_hole[np.einsum("ij,ij->i", _unit(vectors), ahead) < BACK]] = False
+        ahead = unit(holes.beside.sum(axis=1))[of_hole]
+        closed[of_hole[np.einsum("ij,ij->i", unit(vectors), ahead) < BACK]] = False
     lid_areas = np.bincount(of_hole, np.linalg.norm(vectors, axis=1), count)
     closed |= lid_areas <= CRACK * around**2
     result: NDArray[np.int64] = triangles[closed[of_hole]]
@@ -227,12 +229,5 @@ def _angles(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.
 
 
 def _area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) twice the area vectors of (n, 3, 3) triangles."""
-    vectors: NDArray[np.float64] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return vectors
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) vectors of length 1, or 0."""
-    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(lengths > 0, lengths, 1.0)
+    """(n, 3) area vectors of (n, 3, 3) triangles."""
+    return area_vectors(corners[:, 0], corners[:, 1], corners[:, 2])
