@@ -260,3 +260,21 @@ def test_folded_faces_make_no_specks(missing):
     vertices = field.offset(away).vertices
     off = np.abs(distance_to(noisy, vertices) - away) / field.grid.spacing.max()
     assert np.quantile(off, 0.99) < 0.01 and off.max() < 0.3  # nodes may have a face that is but nearly the nearest
+
+
+def test_noise_is_told_from_shape_beside_open_sheets():
+    """Layers of sheets are no noise, those of loose triangles around a body are."""
+    noisy = samples.soup(samples.sphere(4), jitter=0.04)
+    corners = np.array([[2.0, -1, -1], [4, -1, -1], [4, 1, -1], [2, 1, -1]])
+    two = np.concatenate([corners, corners + (0, 0, 0.02), corners + (0, 0, 0.04)])
+    sheets = sh.TriangleMesh(two, np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + k for k in (0, 4, 8)]))
+    both = samples.union(noisy, sheets)
+    grid = sh.Grid.around(both.bounds, resolution=64)
+    field = sh.solid_distance(both, grid, as_oriented=True)
+    near = np.linalg.norm(grid.points, axis=-1) < 1.4
+    truth = np.linalg.norm(grid.points, axis=-1) - 1.0
+    assert root_mean_square((field.values - truth)[near]) < 0.5 * root_mean_square(
+        (distance_to(noisy, grid.points) * np.sign(truth) - truth)[near]
+    )
+    beside = np.abs(grid.points - (3, 0, -0.98)).max(axis=-1) < 0.6
+    np.testing.assert_allclose(field.values[beside], distance_to(sheets, grid.points[beside]), atol=1e-9)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy
 
 import signedheat as sh
 from signedheat import samples
@@ -56,6 +57,18 @@ def test_it_stays_a_closed_surface_on_the_same_vertices(field):
     assert len(np.unique(made.faces)) == made.n_vertices
     again = flipped_along_creases(made.vertices, made.faces)
     assert np.array_equal(again, made.faces)
+
+
+@pytest.mark.parametrize("width", [0.5, 0.8])
+def test_narrow_necks_of_noise_stay_closed_and_manifold(width):
+    rough = scipy.ndimage.gaussian_filter(np.random.default_rng(1).normal(size=(24, 24, 24)), width)
+    vertices, faces = closed_surface(rough, np.zeros(3), np.ones(3), 0.0)
+    flipped = flipped_along_creases(vertices, faces.astype(np.int64))
+    assert (flipped != faces).any()
+    table = edge_table(flipped)
+    assert (table.face_counts == 2).all()
+    assert (np.bincount(table.face_edges.ravel(), np.where(table.forward.ravel(), 1, -1)) == 0).all()
+    assert (flipped != np.roll(flipped, 1, axis=1)).all()
 
 
 def test_no_flip_makes_it_bend_more():

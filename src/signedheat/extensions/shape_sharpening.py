@@ -89,7 +89,7 @@ def assemble(
     parts: Sequence[Shape],
     grid: Grid,
     sides: NDArray[np.float64],
-    fit: Fit,
+    fit: Fit | Literal["alone"],
     phi: Callable[[], NDArray[np.float64]] | None = None,
     tells: Callable[[NDArray[np.float64]], NDArray[np.bool_]] | None = None,
     restored: NDArray[np.bool_] | None = None,
@@ -97,7 +97,8 @@ def assemble(
     """Signed distance to shapes, and to the zero set of `sides` where they are missing.
 
     1. The zero set is fitted to the points of clouds (`fitted_to_points`); points far from it stand for themselves.
-    2. Faces that lie in layers are left out (`layered_faces`), as all are where the fit is to be smooth.
+    2. Faces that lie in layers are left out (`layered_faces`), as all are where the fit is to be smooth; where it is
+       "alone", only those that touch no other.
     3. Crossings of the zero set away from the others, or beyond their ends, stand in for what is missing (`stands_in`).
     4. All nodes find the nearest of both (`sampled_surface`), and the sides from faces nearby or from `sides`.
 
@@ -121,8 +122,10 @@ def assemble(
     band = FaceBand.of(features, grid.shape, steps)
     whole, n_faces = features, len(features.rows)
     left_out = np.full(n_faces, fit == "smooth")
-    if fit == "auto" and n_faces:
+    if fit in ("auto", "alone") and n_faces:
         left_out = layered_faces(features, band, middle, steps)
+        if fit == "alone":
+            left_out &= np.all(features.across < 0, axis=1)
     if left_out.any():
         if phi is not None:
             there = middle()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import overload
+from typing import Literal, overload
 
 import numpy as np
 import scipy
@@ -347,8 +347,10 @@ def _sharpened(
         np.copyto(given, sides.function, where=refused)
         return given
 
-    fit = "exact" if sides.open_sheets else "auto"  # layers of sheets are no noise
-    return assemble([shape], grid, sides.function, fit, None if phi is None else accepted, tells, merged.restored)
+    layers: Fit | Literal["alone"] = "auto"
+    if sides.open_sheets:  # layers of sheets are no noise
+        layers = "exact" if sides.bounds_nothing else "alone"
+    return assemble([shape], grid, sides.function, layers, None if phi is None else accepted, tells, merged.restored)
 
 
 def _guarded(phi: NDArray[np.float64], sides: Sides, cloud: PointCloud, grid: Grid) -> NDArray[np.float64]:

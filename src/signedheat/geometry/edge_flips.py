@@ -57,7 +57,7 @@ def flipped_along_creases(vertices: NDArray[np.float64], faces: NDArray[np.int64
     result: NDArray[np.int64] = faces.copy()
     for _ in range(ROUNDS):
         creases = _Creases.of(vertices, result[some])
-        first, second, one, other = _flips(vertices, creases)
+        first, second, one, other = _flips(vertices, creases, near)
         if not len(first):
             break
         result[some[first]], result[some[second]] = one, other
@@ -114,11 +114,12 @@ class _Creases:
 
 
 def _flips(
-    vertices: NDArray[np.float64], creases: _Creases
+    vertices: NDArray[np.float64], creases: _Creases, whole: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of faces to replace, (k,) each, none beside another, and what replaces them, (k, 3) each.
 
-    The edge from a to b has c and d across; the edge from c to d takes its place.
+    The edge from a to b has c and d across; the edge from c to d takes its place, unless there is one already: of the
+    vertices that are `whole`, one of which it needs, all faces are here.
     """
     faces, around = creases.faces, creases.table.face_edges
     sides = creases.sides[creases.edges]
@@ -144,7 +145,8 @@ def _flips(
         gain += np.where(there, before - _bend(vertices, tail, head, made[new], normals[other]), 0.0)
     taken = np.sort(edge_keys(*creases.table.vertices.T))
     keys = edge_keys(c, d)
-    gain[taken[np.minimum(np.searchsorted(taken, keys), len(taken) - 1)] == keys] = 0.0
+    present = taken[np.minimum(np.searchsorted(taken, keys), len(taken) - 1)] == keys
+    gain[present | ~(whole[c] | whole[d]) | (c == d)] = 0.0
     order = np.argsort(gain, kind="stable")
     rank = np.empty(len(gain), dtype=np.int64)
     rank[order] = np.arange(1, len(gain) + 1)
@@ -152,7 +154,8 @@ def _flips(
     best = np.zeros(len(faces), dtype=np.int64)
     for face in beside:
         np.maximum.at(best, face, rank)
-    won = (rank > 0) & np.all([best[face] == rank for face in beside], axis=0)  # so none is beside another
+    won = np.flatnonzero((rank > 0) & np.all([best[face] == rank for face in beside], axis=0))  # none beside another
+    won = won[np.unique(keys[won], return_index=True)[1]]  # two of them may want the same edge
     return first[won], second[won], np.stack([a, d, c], axis=1)[won], np.stack([d, b, c], axis=1)[won]
 
 
