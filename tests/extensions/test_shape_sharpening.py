@@ -266,7 +266,7 @@ def test_noise_is_told_from_shape_beside_open_sheets():
     """Layers of sheets are no noise, those of loose triangles around a body are."""
     noisy = samples.soup(samples.sphere(4), jitter=0.04)
     corners = np.array([[2.0, -1, -1], [4, -1, -1], [4, 1, -1], [2, 1, -1]])
-    two = np.concatenate([corners, corners + (0, 0, 0.02), corners + (0, 0, 0.04)])
+    two = np.concatenate([corners + np.array([0, 0, height]) for height in (0, 0.02, 0.04)])
     sheets = sh.TriangleMesh(two, np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + k for k in (0, 4, 8)]))
     both = samples.union(noisy, sheets)
     grid = sh.Grid.around(both.bounds, resolution=64)
@@ -278,3 +278,30 @@ def test_noise_is_told_from_shape_beside_open_sheets():
     )
     beside = np.abs(grid.points - (3, 0, -0.98)).max(axis=-1) < 0.6
     np.testing.assert_allclose(field.values[beside], distance_to(sheets, grid.points[beside]), atol=1e-9)
+
+
+def scattered(mesh, scale):
+    """Its triangles, each corner of each moved for itself."""
+    corners = mesh.vertices[mesh.faces]
+    corners = corners + np.random.default_rng(2).normal(scale=scale, size=corners.shape)
+    return sh.TriangleMesh(corners.reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
+
+
+def test_large_loose_triangles_are_noise_where_their_corners_are_scattered():
+    """Faces of ten cells hardly overlap; what sticks out of them brings the distance outside too near."""
+    ball = samples.sphere(1)
+    noisy = scattered(ball, 0.025)
+    grid = sh.Grid.around(noisy.bounds, resolution=48)
+    truth = sh.solid_distance(ball, grid).values
+    errors = {
+        fit: root_mean_square(sharpened(noisy, grid, fit=fit).values - truth) for fit in ("auto", "exact", "smooth")
+    }
+    assert errors["auto"] < 1.05 * errors["smooth"] < 0.9 * errors["exact"]
+
+
+def test_thin_plates_of_loose_triangles_stay():
+    noisy = scattered(box((1.0, 1.0, 0.03)), 0.01)
+    grid = sh.Grid.around(noisy.bounds, resolution=48)
+    field = sh.solid_distance(noisy, grid)
+    truth = box_distance(grid.points, (1.0, 1.0, 0.03))
+    assert root_mean_square(field.values - truth) < 0.03

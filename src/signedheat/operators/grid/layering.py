@@ -30,7 +30,7 @@ BLOCK = 2
 """Cells along each side of the blocks in which probes are counted; blocks count with those around them."""
 LAYERED = 0.03
 """Mean gap between layers, in cells, from which on a place is layered."""
-CENTRED = 0.3
+CENTRED = 0.15
 """Ratio of the mean of φ at faces to that gap, below which φ = 0 is taken to run in the middle of layers."""
 APART = 0.15
 """Mean gap between layers, in cells, from which on φ = 0 is the better surface in any case."""
@@ -41,12 +41,14 @@ def layered_faces(
 ) -> NDArray[np.bool_]:
     """(m,) faces that lie where faces contradict each other and φ = 0 runs in their middle.
 
-    φ is asked for where there are such faces only.
+    φ is asked for where there are such faces only. Triangles that touch no other need not overlap: their corners tell,
+    which are scattered where they were one.
     At edges sharper than a cell φ = 0 is rounder than the faces are, and leaves them all on one side: there faces stay,
     layered or not.
     """
     layered = np.zeros(len(features.rows), dtype=bool)
-    if not _gaps(features, band, _some(len(band.faces), FEW), steps).any():
+    scatter = _scatter(features) / float(steps.min())
+    if not scatter.any() and not _gaps(features, band, _some(len(band.faces), FEW), steps).any():
         return layered
     samples = _some(len(band.faces), MANY)
     gaps = _gaps(features, band, samples, steps)
@@ -58,7 +60,8 @@ def layered_faces(
     shape = tuple(-(-n // BLOCK) for n in phi.shape)
     gap = _around(blocks[samples], shape, gaps)[tuple(blocks.T)]
     mean = _around(blocks, shape, heights)[tuple(blocks.T)] / float(steps.min())
-    chosen = (gap > APART) | ((gap > LAYERED) & (np.abs(mean) < CENTRED * gap))
+    wide = np.maximum(gap, np.where(scatter > APART, scatter, 0.0)[band.faces])
+    chosen = (gap > APART) | ((wide > LAYERED) & (np.abs(mean) < CENTRED * wide))
     table = _around(blocks, shape, chosen.astype(np.float64), 5)  # by vote, lest single faces remain
     chosen = table[tuple(blocks.T)] > 0.5
     counts = np.bincount(band.faces, minlength=len(layered))
@@ -70,6 +73,26 @@ def layered_faces(
         where = np.clip(middles.astype(np.int64), 0, np.array(shape) - 1)
         layered[rest] = table[tuple(where.T)] > 0.5
     return layered
+
+
+def _scatter(features: FaceFeatures) -> NDArray[np.float64]:
+    """(m,) distance of the corners of triangles that touch no other from the nearest corners of others.
+
+    What was one vertex is as many as it had faces in a soup with noise. 0 where the next is farther than a quarter of
+    the longest side: these were never together.
+    """
+    result = np.zeros(len(features.rows))
+    alone = np.flatnonzero(np.all(features.across < 0, axis=1))
+    if len(alone) < 2:
+        return result
+    corners = features.corners[alone].reshape(-1, 3, 3).astype(np.float64)
+    points = corners.reshape(-1, 3)
+    near, ids = scipy.spatial.cKDTree(points).query(points, 4, workers=-1)
+    others = ids // 3 != np.arange(len(points))[:, None] // 3
+    near = np.where(others, near, np.inf).min(axis=1).reshape(-1, 3)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    result[alone] = np.where(near < 0.25 * longest[:, None], near, 0.0).mean(axis=1)
+    return result
 
 
 def _some(n: int, wanted: int) -> NDArray[np.int64]:
