@@ -10,7 +10,7 @@ import signedheat as sh
 from refusals import refused
 from shapes.surface_cases import sphere
 from signedheat.discretization import discretize
-from signedheat.linear import available_backends, elimination_order, factorize, upper_triangle, whole
+from signedheat.linear import available_backends, elimination_order, factorize, pardiso, upper_triangle, whole
 from signedheat.operators.crouzeix_raviart import vector_heat_matrix
 
 backends = pytest.mark.parametrize("backend", available_backends())
@@ -153,3 +153,12 @@ def test_factors_like_others_are_independent_of_them(surface, backend):
     del factors[0]
     gc.collect()
     np.testing.assert_allclose(factors[0].solve(whole(matrices[1]) @ truth), truth, atol=1e-9)
+
+
+def test_libraries_that_cannot_make_a_factor_anew_are_not_asked_to(surface, monkeypatch):
+    """As all of MKL before 2026.2: the answer would be that of the first matrix."""
+    if not pardiso.is_available():
+        pytest.skip("needs MKL")
+    first = sparse.csr_matrix(sparse.triu(surface.stiffness + sparse.identity(surface.triangles.n_vertices)))
+    monkeypatch.setattr(pardiso, "_makes_factors_anew", lambda: False)
+    assert pardiso.PardisoFactor(first).like_this(first * 2.0) is None

@@ -56,8 +56,11 @@ class PardisoFactor:
 
         The two share memory: the one that did not solve last is factorised again when it is asked to.
         """
-        if not self._analysis.fits(upper):
+        if not self._analysis.fits(upper) or not _makes_factors_anew():
             return None
+        return self._again(upper)
+
+    def _again(self, upper: sparse.csr_matrix) -> PardisoFactor:
         other = object.__new__(PardisoFactor)
         other._take(self._analysis, upper)
         return other
@@ -185,6 +188,13 @@ def _library() -> ctypes.CDLL:
         except OSError:
             continue
     raise ImportError("the library mkl_rt was not found: install the package mkl")
+
+
+@cache
+def _makes_factors_anew() -> bool:
+    """Whether the library can: before 2026.2 a factor in two levels stays that of the first matrix, in silence."""
+    one, two = (sparse.csr_matrix(np.array([[diagonal]])) for diagonal in (1.0, 2.0))
+    return bool(PardisoFactor(one)._again(two).solve(np.ones(1))[0] == 0.5)
 
 
 def is_available() -> bool:
