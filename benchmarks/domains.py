@@ -152,7 +152,7 @@ def measured(program: str, kind: str, name: str, size: int) -> dict:
             exact = np.arcsin(np.clip(unit @ TILT, -1, 1)) - np.arcsin(HEIGHT)
             source = surface.level_set(exact)
             begin = time.process_time()
-            return sh.SignedHeatSolver(surface).distance(source).values, exact, begin
+            return sh.SignedHeatSolver(surface, 1.0).distance(source).values, exact, begin
     else:
         vertices, about, ring, exact = (POLYGONS if kind == "polygons" else CLOUDS)[name](size)
         closed = kind == "points" or "sphere" in name
@@ -163,7 +163,8 @@ def measured(program: str, kind: str, name: str, size: int) -> dict:
                 import signedheat as sh
 
                 domain = sh.PolygonMesh(vertices, about) if kind == "polygons" else sh.PointCloud(vertices, about)
-                return sh.SignedHeatSolver(domain).distance(domain.path(ring, closed=closed)).values, exact, begin
+                solver = sh.SignedHeatSolver(domain, 1.0)
+                return solver.distance(domain.path(ring, closed=closed)).values, exact, begin
             import potpourri3d
 
             nodes = [int(i) for i in ring] + [int(ring[0])] * closed

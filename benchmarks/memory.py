@@ -50,7 +50,7 @@ def case(kind: str, size: int) -> tuple[object, object, float]:
     if kind == "polygons":
         vertices, quads = globe(size)
         polygons = sh.PolygonMesh(vertices, quads)
-        return polygons, polygons.path(quads[len(quads) // 2, :2]), surface_estimate(4 * len(quads))
+        return polygons, polygons.points_at(0), surface_estimate(4 * len(quads))
     if kind == "points":
         k = np.arange(size) + 0.5
         polar, azimuth = np.arccos(1 - 2 * k / size), np.pi * (1 + 5**0.5) * k
@@ -60,7 +60,7 @@ def case(kind: str, size: int) -> tuple[object, object, float]:
         along = (np.arange(size) - size / 2 + 0.5) ** 2
         volume = along[:, None, None] + along[:, None] + along < (0.45 * size) ** 2
         surface = sh.DigitalSurface(volume, 1 / size)
-        return surface, [0, 1], surface_estimate(4 * count_surfels(volume)) + BYTES_PER_VOXEL * size**3
+        return surface, surface.points_at(0), surface_estimate(4 * count_surfels(volume)) + BYTES_PER_VOXEL * size**3
     diagonal = sh.TriangleMesh([[-1, -1, -1], [1, 1, 1], [-1, 1, 0]], [[0, 1, 2]])
     mesh = sh.tetrahedralize(diagonal, resolution=size, padding=0, grading=np.inf)
     return mesh, samples.sphere(3, radius=0.7), tet_estimate(mesh.n_tets)
@@ -76,8 +76,8 @@ def measure(kind: str, size: int) -> dict[str, float]:
     """Peak of a first distance above what was held before it, and its estimate."""
     domain, source, estimate = case(kind, size)
     before, loading = resident("VmRSS"), libraries()
-    if isinstance(source, list) and isinstance(source[0], int):
-        source = domain.path(source) if kind == "voxels" else domain.points_at(source)
+    if kind == "points":
+        source = domain.points_at(source)  # makes the triangles
     sh.SignedHeatSolver(domain).distance(source)
     return {"measured": resident("VmHWM") - before, "estimated": estimate + loading}
 

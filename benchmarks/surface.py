@@ -3,8 +3,9 @@
     python benchmarks/surface.py [--levels 5 6 7 8] [--peer-up-to 7]
 
 Each program runs in a process of its own, one after the other, on the same mesh and curves: a bumpy sphere and level
-sets that cross its faces, nothing imposed but where said. CPU seconds of all threads; memory in megabytes above what
-imports and input take.
+sets that cross its faces, nothing imposed but where said. Seconds of all threads or, with --wall, on the clock; memory
+in megabytes above what imports and input take. "ours" is the scheme of the peer, one diffusion time; "default" is
+`SignedHeatSolver(mesh)`, which combines three.
 """
 
 from __future__ import annotations
@@ -29,27 +30,30 @@ def main() -> None:
     parser.add_argument("--levels", type=int, nargs="+", default=[5, 6, 7], help="subdivisions of an icosahedron")
     parser.add_argument("--peer-up-to", type=int, default=7)
     parser.add_argument("--repeats", type=int, default=3, help="rounds of all programs in turn; the best times count")
+    parser.add_argument("--wall", action="store_true", help="seconds on the clock instead of those of all threads")
     parser.add_argument("--worker", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.worker:
         program, file = arguments.worker
-        print(json.dumps({"ours": ours, "peer": peer, "bare": bare}[program](np.load(file))))
+        clock = Clock(time.perf_counter if arguments.wall else time.process_time)
+        print(json.dumps({"ours": ours, "default": default, "peer": peer, "bare": bare}[program](np.load(file), clock)))
         return
-    columns = ["first", "next", "next zero set", "batched", "memory"]
+    columns = ["first", "next", "next zero set", "batched", "batched zero", "memory"]
     print(f"{'vertices':>9} {'':>10}" + "".join(f"{c:>15}" for c in columns))
     with tempfile.TemporaryDirectory() as folder:
         for level in arguments.levels:
             file = Path(folder) / f"{level}.npz"
             n = write_input(file, level)
-            run("ours", file)  # compiles and warms the file cache
-            programs = ("bare", "ours") + (("peer",) if level <= arguments.peer_up_to else ())
-            rounds = [{p: run(p, file) for p in programs} for _ in range(arguments.repeats)]
+            run("ours", file, arguments.wall)  # compiles and warms the file cache
+            programs = ("bare", "ours", "default") + (("peer",) if level <= arguments.peer_up_to else ())
+            rounds = [{p: run(p, file, arguments.wall) for p in programs} for _ in range(arguments.repeats)]
             results = {p: {c: min(r[p][c] for r in rounds) for c in rounds[0][p]} for p in programs}
             for program, row in results.items():
                 print(f"{n:>9} {program:>10}" + "".join(f"{row.get(c, np.nan):>15.3f}" for c in columns), flush=True)
-            for other in (p for p in results if p != "ours"):
-                ratios = [results[other].get(c, np.nan) / results["ours"][c] for c in columns]
-                print(f"{'':>9} {other + '/ours':>10}" + "".join(f"{r:>15.2f}" for r in ratios), flush=True)
+            pairs = [(other, mine) for mine in ("ours", "default") for other in ("bare", "peer") if other in results]
+            for other, mine in pairs:
+                ratios = [results[other].get(c, np.nan) / results[mine][c] for c in columns]
+                print(f"{'':>9} {other + '/' + mine:>12}" + "".join(f"{r:>15.2f}" for r in ratios), flush=True)
             if "peer" in results:
                 fields = [np.load(f"{file}.{p}.npy") for p in ("ours", "peer")]
                 print(
@@ -57,9 +61,9 @@ def main() -> None:
                 )
 
 
-def run(program: str, file: Path) -> dict[str, float]:
+def run(program: str, file: Path, wall: bool) -> dict[str, float]:
     """One worker's figures."""
-    command = [sys.executable, __file__, "--worker", program, str(file)]
+    command = [sys.executable, __file__, "--worker", program, str(file), *(["--wall"] if wall else [])]
     out = subprocess.run(command, capture_output=True, text=True, check=False)
     if out.returncode:
         raise SystemExit(f"{program} failed on {file.name}:\n{out.stderr}")
@@ -94,7 +98,11 @@ def write_input(file: Path, level: int) -> int:
     return len(points)
 
 
-def ours(data) -> dict[str, object]:
+def default(data, clock) -> dict[str, object]:
+    return ours(data, clock, None)
+
+
+def ours(data, clock, diffusion=1.0) -> dict[str, object]:
     import signedheat as sh
 
     curves = [sh.Curve(data[f"faces{k}"], data[f"barycentric{k}"], closed=True) for k in range(BATCH + 2)]
@@ -102,8 +110,8 @@ def ours(data) -> dict[str, object]:
     small = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
     for constraint in (sh.Free(), sh.ZeroSet()):  # load compiled kernels and libraries
         sh.SignedHeatSolver(small).distance(sh.Curve([0, 0], [[0.5, 0.5, 0], [0, 0.5, 0.5]]), constraint)
-    before, clock = memory(), Clock()
-    solver = sh.SignedHeatSolver(sh.TriangleMesh(vertices, faces))
+    before, _ = memory(), clock.lap()
+    solver = sh.SignedHeatSolver(sh.TriangleMesh(vertices, faces), diffusion)
     phi = solver.distance(curves[0], sh.Free()).values
     row = {"first": clock.lap(), "phi": phi.tolist()}
     solver.distance(curves[1], sh.Free())
@@ -114,10 +122,12 @@ def ours(data) -> dict[str, object]:
     row["next zero set"] = clock.lap()
     solver.distance_many(curves[2:], sh.Free())
     row["batched"] = clock.lap() / BATCH
+    solver.distance_many(curves[2 : 2 + TOGETHER])
+    row["batched zero"] = clock.lap() / TOGETHER
     return row
 
 
-def peer(data) -> dict[str, object]:
+def peer(data, clock) -> dict[str, object]:
     import potpourri3d as pp3d
 
     curves = []
@@ -125,7 +135,7 @@ def peer(data) -> dict[str, object]:
         nodes = [(int(e), [float(t)]) for e, t in zip(data[f"edge{k}"], data[f"t{k}"], strict=True)]
         curves.append([*nodes, nodes[0]])
     vertices, faces = data["vertices"], data["faces"]
-    before, clock = memory(), Clock()
+    before, _ = memory(), clock.lap()
     solver = pp3d.MeshSignedHeatSolver(vertices, faces)
     phi = np.asarray(solver.compute_distance([curves[0]], level_set_constraint="None"))
     row = {"first": clock.lap(), "phi": phi.tolist()}
@@ -134,14 +144,14 @@ def peer(data) -> dict[str, object]:
     row["memory"] = peak() - before
     clock.lap()
     solver.compute_distance([curves[1]], level_set_constraint="ZeroSet")
-    row["next zero set"] = clock.lap()
+    row["next zero set"] = row["batched zero"] = clock.lap()
     for curve in curves[2:6]:
         solver.compute_distance([curve], level_set_constraint="None")
     row["batched"] = clock.lap() / 4  # it has no batches: one after the other
     return row
 
 
-def bare(data) -> dict[str, object]:
+def bare(data, clock) -> dict[str, object]:
     """Order, factorise and solve M + tL and C, assembled beforehand, as the solver library does it by itself."""
     import signedheat as sh
     from signedheat.linear import factorize
@@ -151,7 +161,7 @@ def bare(data) -> dict[str, object]:
     heat, stiffness = vector_heat_matrix(surface.triangles, surface.spacing**2), surface.stiffness.copy()
     stiffness.data[0] *= 2
     ones = [np.ones(heat.shape[0], dtype=complex), np.ones(stiffness.shape[0])]
-    before, clock = memory(), Clock()
+    before, _ = memory(), clock.lap()
     factors = [factorize(heat), factorize(stiffness)]
     for factor, rhs in zip(factors, ones, strict=True):
         factor.solve(rhs)
@@ -194,11 +204,11 @@ def status(name: str) -> float:
 class Clock:
     """Seconds since the last lap."""
 
-    def __init__(self) -> None:
-        self.begin = time.process_time()
+    def __init__(self, now) -> None:
+        self.now, self.begin = now, now()
 
     def lap(self) -> float:
-        begin, self.begin = self.begin, time.process_time()
+        begin, self.begin = self.begin, self.now()
         return self.begin - begin
 
 

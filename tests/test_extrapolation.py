@@ -5,7 +5,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
-from signedheat.extrapolation import EXPONENTS, blended, times_of
+from signedheat.extrapolation import EXPONENTS, blended, default_diffusion
 
 ROUND = (1.2, 0.6)  # half axes of an ellipse
 
@@ -46,15 +46,14 @@ def test_errors_of_both_kinds_cancel(times):
         assert times.weights @ tau**power == pytest.approx(0, abs=1e-9)
     assert np.allclose(tau[1:] / tau[:-1], times.ratio)
     angles = 0.3 + 0.02 / tau + 0.01 * np.sqrt(tau)
-    blend = blended(times, [np.exp(1j * a) for a in angles[:, None]])
+    blend = blended(times, [np.exp(1j * a) for a in angles[:, None]], source=None)
     assert np.abs(blend) == pytest.approx(1)
     assert np.angle(blend) == pytest.approx(0.3, abs=0.3 * np.abs(angles - 0.3).max())
 
 
 def test_one_time_is_itself():
     directions = np.array([0.6 + 0.8j])
-    assert times_of(2.0) == (2.0,)
-    assert blended(2.0, [directions]) is directions
+    assert blended(2.0, [directions], source=None) is directions
 
 
 def test_many_sources_give_what_each_gives():
@@ -80,3 +79,29 @@ def test_scale_and_side():
 def test_times_that_make_no_sense_are_refused(arguments):
     with refused(sh.SignedHeatError, "middle" if len(arguments) == 1 else "ratio"):
         sh.Extrapolated(*arguments)
+
+
+def test_the_default_is_extrapolated_on_surfaces_alone():
+    mesh = lattice(10, 0.3)
+    assert default_diffusion(mesh) == sh.Extrapolated() == default_diffusion(sh.PointCloud(mesh.vertices))
+    assert default_diffusion(sh.Grid((0, 0), 1.0, (8, 8))) == 1.0
+    curve = mesh.level_set(np.hypot(*mesh.vertices[:, :2].T), 0.9)
+    values = sh.SignedHeatSolver(mesh).distance(curve).values
+    assert np.array_equal(values, sh.SignedHeatSolver(mesh, sh.Extrapolated()).distance(curve).values)
+    assert not np.allclose(values, sh.SignedHeatSolver(mesh, 1.0).distance(curve).values, atol=1e-6)
+    assert np.array_equal(values, sh.signed_distance(curve, mesh).values)
+
+
+@pytest.mark.parametrize("rim", [True, False])
+def test_where_curves_end_inside_one_time_is_taken(rim):
+    """Beyond an end heat completes what is missing; at the boundary of the surface nothing is."""
+    mesh = lattice(16, 0.3)
+    line = mesh.level_set(mesh.vertices[:, 1] - 0.4 * np.sin(mesh.vertices[:, 0]), 0.1)
+    if not rim:
+        line = [sh.Curve(c.faces[3:], c.barycentric[3:]) for c in line]
+    solver = sh.SignedHeatSolver(mesh)
+    one = np.array_equal(solver.distance(line).values, solver.with_diffusion(1.0).distance(line).values)
+    assert one is not rim
+    together = solver.distance_many([line, mesh.points_at(3), line])
+    for curves, field in zip([line, mesh.points_at(3), line], together, strict=True):
+        assert np.allclose(field.values, solver.distance(curves).values, rtol=0, atol=1e-9)

@@ -1,31 +1,39 @@
-"""Richardson extrapolation of directions in the diffusion time t: what a short t and a long t spoil cancels."""
+"""Diffusion times: one, or Richardson's extrapolation from three, in which what short and long ones spoil cancels."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .discretization import Discretization, SourceTerm
+from .domains.kinds import SurfaceDomain
 from .domains.validation import positive_number
 from .errors import SignedHeatError
 from .geometry.directions import unit
+from .lowering.surface.source import SurfaceSource
 
 EXPONENTS = (-1.0, 0.5)
 """Powers of τ in the error of Y: cells that do not resolve exp(−r/√t) give h²/t, smoothing gives √t."""
 
+SURFACES = get_args(SurfaceDomain)
+
 
 @dataclass(frozen=True)
 class Extrapolated:
-    """Directions extrapolated from three diffusion times, in the place of one τ.
+    """Directions extrapolated from three diffusion times, in the place of one τ: the default on surfaces.
 
     Heat falls by the factor e within √t. At τ = 1 that is about a cell, too little for the cells to resolve: the
     directions of step 1 keep an error of the size h²/t, which does not fall as the cells get smaller. A larger τ
     smooths the source, with an error of the size √t. Of the directions Y at three τ, the combination in which both
-    cancel is taken. On triangles the error then falls about like their size, and is about half as large on fine
-    meshes; on coarse ones there is little to gain, and step 1 takes three times as long.
+    cancel is taken. On triangles the error then falls about like their size, and is less than half as large on fine
+    meshes; on the coarsest there is little to gain. Step 1 takes three times as long, but for the order of unknowns.
+
+    Where an oriented curve on a surface ends, away from its boundary, heat completes what is missing, and Y depends on
+    t by more than an error: in that connected part of the surface the first τ is taken alone.
 
     Parameters
     ----------
@@ -43,17 +51,17 @@ class Extrapolated:
     --------
     >>> import signedheat as sh
     >>> sh.Extrapolated().times
-    (1.0, 4.0, 16.0)
+    (1.0, 3.0, 9.0)
     >>> from signedheat.samples import sphere
     >>> ball = sphere(3)
-    >>> solver = sh.SignedHeatSolver(ball, sh.Extrapolated())
+    >>> solver = sh.SignedHeatSolver(ball, sh.Extrapolated(middle=4, ratio=2))
     >>> equator = ball.level_set(ball.vertices[:, 2], 0.0)
     >>> bool(abs(solver.distance(equator).values - np.arcsin(ball.vertices[:, 2])).max() < 0.05)
     True
     """
 
-    middle: float = 4.0
-    ratio: float = 4.0
+    middle: float = 3.0
+    ratio: float = 3.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "middle", positive_number(self.middle, "middle"))
@@ -82,18 +90,32 @@ Diffusion = float | Extrapolated
 """τ in ``t = τ h²``, or several."""
 
 
-def times_of(diffusion: Diffusion) -> tuple[float, ...]:
-    """All τ, the first one of which is the shortest."""
-    return diffusion.times if isinstance(diffusion, Extrapolated) else (diffusion,)
+def default_diffusion(domain: object) -> Diffusion:
+    """`Extrapolated` on surfaces, where directions limit the accuracy; 1 in space."""
+    return Extrapolated() if isinstance(domain, SURFACES) else 1.0
 
 
-def blended(diffusion: Diffusion, directions: Iterable[NDArray[Any]]) -> NDArray[Any]:
-    """Y, from that at each of `times_of`."""
-    first, *others = directions
+def lowered_for_times(discretization: Discretization, sources: Sequence[Any], diffusion: Diffusion) -> list[SourceTerm]:
+    """The sources lowered for each τ that is to be used, the shortest first: see `Extrapolated`."""
     if not isinstance(diffusion, Extrapolated):
+        return [discretization.lower(sources, diffusion)]
+    first, *others = diffusion.times
+    source = discretization.lower(sources, first)
+    if isinstance(source, SurfaceSource) and source.ends_everywhere:
+        return [source]
+    return [source, *(discretization.lower(sources, tau) for tau in others)]
+
+
+def blended(diffusion: Diffusion, directions: Iterable[NDArray[Any]], source: SourceTerm) -> NDArray[Any]:
+    """Y, from that at each τ; that at the first one in parts of a surface where curves of the source end."""
+    first, *others = directions
+    if not isinstance(diffusion, Extrapolated) or not others:
         return first
     weights = diffusion.weights
     total = weights[0] * first
     for weight, other in zip(weights[1:], others, strict=True):
         total += weight * other
-    return unit(total)
+    total = unit(total)
+    if isinstance(source, SurfaceSource) and source.ending.any():
+        total[source.ending] = first[source.ending]
+    return total

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
-from operator import itemgetter
 from typing import Any, Generic, Literal, TypeVar, overload
 
 from .constraints import Constraint, ZeroSet
@@ -20,7 +19,7 @@ from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, Space
 from .domains.tet_mesh import TetMesh
 from .domains.validation import positive_number
 from .errors import SourceError, UnsupportedTypeError
-from .extrapolation import Diffusion, Extrapolated, blended, times_of
+from .extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
 from .fields.band_field import BandField
 from .fields.grid_field import GridField
 from .fields.tet_field import TetField
@@ -33,7 +32,7 @@ from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .progress import Progress, Stopwatch
 from .slots import Slot
 
-band_of_phi: Slot[[Any, Grid, float, float, Progress | None], BandField] = Slot("band_of_phi")
+band_of_phi: Slot[[Any, Grid, float, Diffusion | None, Progress | None], BandField] = Slot("band_of_phi")
 """`signed_distance` in a band."""
 
 _BATCH = 16  # sources diffused at a time
@@ -52,9 +51,9 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     ----------
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid
         Where distance is measured.
-    diffusion : float or Extrapolated
-        τ in ``t = τ h²``, h the mean distance between unknowns. Larger values close gaps in broken sources along
-        rounder lines. `Extrapolated` takes three, and is more accurate on fine meshes.
+    diffusion : float or Extrapolated, optional
+        τ in ``t = τ h²``, h the mean distance between unknowns; the paper's is 1. Larger values close gaps in broken
+        sources along rounder lines. By default 1 in space and, on surfaces, `Extrapolated`, which takes three.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
     intrinsic : "auto", True or False
@@ -70,13 +69,13 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     """
 
     domain: AnyDomain
-    diffusion: Diffusion = 1.0
+    diffusion: Diffusion | None = None
     progress: Progress | None = field(default=None, repr=False)
     intrinsic: bool | Literal["auto"] = "auto"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "domain", converted(self.domain))
-        if not isinstance(self.diffusion, Extrapolated):
+        if not isinstance(self.diffusion, Extrapolated | None):
             object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
 
     @cached_property
@@ -89,7 +88,11 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             return refined
         return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)
 
-    def with_diffusion(self, diffusion: Diffusion) -> SignedHeatSolver[AnyDomain]:
+    @property
+    def _times(self) -> Diffusion:
+        return default_diffusion(self.domain) if self.diffusion is None else self.diffusion
+
+    def with_diffusion(self, diffusion: Diffusion | None) -> SignedHeatSolver[AnyDomain]:
         """The same solver with another τ; shares everything that does not depend on τ, such as the factor of C.
 
         Examples
@@ -149,13 +152,13 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             discretization = self.discretization
         with stopwatch("sources"):
             discretization, adapted = discretization.adapt(as_list(sources))
-            sources_by_time = [discretization.lower(adapted, tau) for tau in times_of(self.diffusion)]
+            sources_by_time = lowered_for_times(discretization, adapted, self._times)
         with stopwatch("diffuse"):
             vectors = [diffuse(discretization, source) for source in sources_by_time]
         with stopwatch("normalize"):
-            directions = blended(self.diffusion, (normalize(discretization, each) for each in vectors))
+            source = sources_by_time[0]
+            directions = blended(self._times, (normalize(discretization, each) for each in vectors), source)
             del vectors
-        source = sources_by_time[0]
         with stopwatch("integrate"):
             values = integrate(discretization, directions, source, constraint)
         diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time)
@@ -196,9 +199,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             batch = []
             for entry in sources[begin : begin + _BATCH]:
                 discretization, adapted = self.discretization.adapt(as_list(entry))
-                times = times_of(self.diffusion)
-                batch.append((discretization, [discretization.lower(adapted, tau) for tau in times]))
-            for discretization, run in groupby(batch, key=itemgetter(0)):
+                batch.append((discretization, lowered_for_times(discretization, adapted, self._times)))
+            for (discretization, _), run in groupby(batch, key=lambda entry: (entry[0], len(entry[1]))):
                 by_time = list(zip(*(sources for _, sources in run), strict=True))
                 lowered = by_time[0]
                 stopwatch = Stopwatch(None, steps=1)
@@ -206,7 +208,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
                     diffused = [diffuse_many(discretization, each) for each in by_time]
                     together = zip(*diffused, strict=True)
                     cells = ([normalize(discretization, vectors) for vectors in each] for each in together)
-                    directions = (blended(self.diffusion, each) for each in cells)
+                    pairs = zip(cells, lowered, strict=True)
+                    directions = (blended(self._times, each, source) for each, source in pairs)
                     solved = list(integrate_many(discretization, directions, lowered, constraint))
                 seconds = {step: total / len(lowered) for step, total in stopwatch.seconds.items()}
                 for source, values in zip(lowered, solved, strict=True):
@@ -246,7 +249,7 @@ def signed_distance(
     resolution: int = 128,
     padding: float | None = None,
     constraint: Constraint | None = None,
-    diffusion: float = 1.0,
+    diffusion: Diffusion | None = None,
     progress: Progress | None = None,
 ) -> GridField[Literal[3]]: ...
 @overload
@@ -257,7 +260,7 @@ def signed_distance(
     resolution: int = 128,
     padding: float | None = None,
     constraint: Constraint | None = None,
-    diffusion: float = 1.0,
+    diffusion: Diffusion | None = None,
     progress: Progress | None = None,
 ) -> GridField[Literal[2]]: ...
 @overload
@@ -269,7 +272,7 @@ def signed_distance(
     padding: float | None = None,
     band: float,
     constraint: None = None,
-    diffusion: float = 1.0,
+    diffusion: Diffusion | None = None,
     progress: Progress | None = None,
 ) -> BandField: ...
 @overload
@@ -278,7 +281,7 @@ def signed_distance(
     domain: Grid[Dimension],
     *,
     constraint: Constraint | None = None,
-    diffusion: float = 1.0,
+    diffusion: Diffusion | None = None,
     progress: Progress | None = None,
 ) -> GridField[Dimension]: ...
 @overload
@@ -287,7 +290,7 @@ def signed_distance(
     domain: TetMesh,
     *,
     constraint: Constraint | None = None,
-    diffusion: float = 1.0,
+    diffusion: Diffusion | None = None,
     progress: Progress | None = None,
 ) -> TetField: ...
 @overload
@@ -296,7 +299,7 @@ def signed_distance(
     domain: AnySurface,
     *,
     constraint: Constraint | None = None,
-    diffusion: float = 1.0,
+    diffusion: Diffusion | None = None,
     progress: Progress | None = None,
 ) -> VertexField[AnySurface]: ...
 @overload
@@ -307,7 +310,7 @@ def signed_distance(
     resolution: int = 128,
     padding: float | None = None,
     constraint: Constraint | None = None,
-    diffusion: float = 1.0,
+    diffusion: Diffusion | None = None,
     progress: Progress | None = None,
 ) -> Field: ...
 def signed_distance(
@@ -318,7 +321,7 @@ def signed_distance(
     padding: float | None = None,
     band: float | None = None,
     constraint: Constraint | None = None,
-    diffusion: float = 1.0,
+    diffusion: Diffusion | None = None,
     progress: Progress | None = None,
 ) -> Field | BandField:
     """Signed distance to a shape, however broken, in one call.
@@ -339,8 +342,9 @@ def signed_distance(
         φ then vanishes at the shape in the mean of each connected part of the band; there is no other constraint.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
         Imposed on φ at the source; `ZeroSet` by default.
-    diffusion : float
-        τ in ``t = τ h²``. Larger values close gaps in broken shapes along rounder surfaces.
+    diffusion : float or Extrapolated, optional
+        τ in ``t = τ h²``. Larger values close gaps in broken shapes along rounder surfaces. By default as that of
+        `SignedHeatSolver`.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
 

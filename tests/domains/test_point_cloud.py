@@ -202,7 +202,7 @@ def test_a_mobius_strip_of_points_is_like_one_of_triangles():
     for domain in (mesh, cloud):
         path = domain.path(ids[0])
         curve = sh.Curve(path.faces, path.barycentric, normals=np.tile([0.0, 1, 0], (path.n_segments, 1)))
-        fields.append(sh.SignedHeatSolver(domain).distance(curve).values)
+        fields.append(sh.SignedHeatSolver(domain, 1.0).distance(curve).values)
     assert fields[1] == pytest.approx(fields[0], abs=0.02)
     assert fields[0].max() > 0.5
 

@@ -387,7 +387,7 @@ def test_on_points_it_is_closer_to_the_truth(noise):
     points /= np.linalg.norm(points, axis=1)[:, None]
     cloud = sh.PointCloud(points * (1 + noise * rng.normal(size=(3000, 1))))
     exact = latitudes(points)
-    plain = sh.SignedHeatSolver(cloud).distance(cloud.level_set(exact))
+    plain = sh.SignedHeatSolver(cloud, 1.0).distance(cloud.level_set(exact))
     assert error(sh.sharpen(plain).values, exact) < 0.7 * error(plain.values, exact)
 
 

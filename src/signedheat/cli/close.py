@@ -29,7 +29,7 @@ def run(arguments: Namespace) -> Summary:
                 surface,
                 curves,
                 constraint,
-                arguments.diffusion,
+                arguments.diffusion or 1.0,
                 progress,
                 arguments.as_oriented,
                 arguments.every_piece,

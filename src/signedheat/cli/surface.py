@@ -48,7 +48,7 @@ def measured(surface: Any, curves: Any, arguments: Namespace) -> VertexField:
                 surface,
                 curves,
                 constraint=constraint,
-                diffusion=arguments.diffusion,
+                diffusion=arguments.diffusion or 1.0,
                 intrinsic=intrinsic,
                 as_oriented=arguments.as_oriented,
                 every_piece=arguments.every_piece,

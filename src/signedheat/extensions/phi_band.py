@@ -16,6 +16,7 @@ from ..domains.grid import Grid
 from ..domains.kinds import Shapes
 from ..domains.validation import positive_number
 from ..errors import GeometryError, UnsupportedTypeError
+from ..extrapolation import Diffusion
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..lowering.area_elements import AreaSamples, sample_on_grid
@@ -32,20 +33,21 @@ COARSE = 0.6
 
 @band_of_phi.provide
 def phi_in_band(
-    source: Shapes, grid: Grid, band: float, diffusion: float, progress: Progress | None = None
+    source: Shapes, grid: Grid, band: float, diffusion: Diffusion | None, progress: Progress | None = None
 ) -> BandField:
     """`signed_distance` in a band; see there."""
     if grid.dimension != 3 or grid.mask is not None:
         raise UnsupportedTypeError("a band lies on a grid in space without walls", remedy="leave out the band")
     width = max(positive_number(band, "band"), LEAST * float(grid.spacing.max()))
-    solver = SignedHeatSolver(coarse_grid(grid), diffusion, within(progress, 0.0, COARSE))
+    tau = 1.0 if diffusion is None else positive_number(diffusion, "diffusion")
+    solver = SignedHeatSolver(coarse_grid(grid), tau, within(progress, 0.0, COARSE))
     coarse = solver.distance(source, Free())
     samples = sample_on_grid(as_list(source), grid, SAMPLE_SIZE)
     coarse = coarse.with_values(coarse.values - _mean_height(coarse, grid, samples))
     blocks = _blocks_near(coarse, grid, samples.positions, width)
     nodes = SomeNodes.of_blocks(blocks)
     rounds = int(np.ceil((width / float(grid.spacing.min())) + 2 * SIDE))
-    sources = BlockSources(nodes, samples.positions, samples.vectors, grid.spacing, diffusion, rounds)
+    sources = BlockSources(nodes, samples.positions, samples.vectors, grid.spacing, tau, rounds)
     directions, arrived = sources.directions()
     points = grid.origin + nodes.nodes * grid.spacing
     rest = np.flatnonzero(~arrived)

@@ -44,6 +44,7 @@ def factorize(
     order: NDArray[np.integer] | None = None,
     reused: bool = False,
     like: Factor | None = None,
+    together: int = 1,
 ) -> Factor:
     """Factorise a sparse Hermitian positive definite matrix.
 
@@ -58,7 +59,9 @@ def factorize(
     reused : bool
         Whether many systems will be solved. PARDISO then finds an order of its own, with which it solves on all cores.
     like : Factor, optional
-        Of a matrix with entries at the same places: PARDISO then takes half the time.
+        Of a matrix with entries at the same places: PARDISO then takes half the time or less.
+    together : int
+        How many factors like each other PARDISO keeps; it makes them anew where there are more.
 
     Returns
     -------
@@ -87,7 +90,7 @@ def factorize(
     if isinstance(like, PardisoFactor) and name == "pardiso" and (again := like.like_this(upper)):
         return again
     if name == "pardiso":
-        return PardisoFactor(upper, None if reused else order)
+        return PardisoFactor(upper, None if reused else order, together)
     if name == "cholmod":
         return CholmodFactor(upper, order)
     return SuperLUFactor(upper, order)

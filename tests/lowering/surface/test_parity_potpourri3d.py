@@ -85,7 +85,7 @@ def test_curves_along_edges(name, constraint):
     curves = mesh.region_boundary(above > level) + mesh.region_boundary(above > level + 0.45)
     curves = [c for c in curves if c.n_points > 8][:2]
     theirs = peer(mesh, curves, constraint)
-    ours = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curves, CONSTRAINTS[constraint])
+    ours = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves, CONSTRAINTS[constraint])
     shift = (
         ours.source.weights @ (ours.source.interpolation @ theirs) / ours.source.weights.sum()
     )  # theirs is centred otherwise
@@ -115,11 +115,11 @@ def test_our_soft_constraint_keeps_its_meaning_when_scaled():
     curve, scale = curves[0], 1000.0
     large = sh.TriangleMesh(scale * mesh.vertices, mesh.faces)
     turned = sh.Curve(np.roll(curve.faces, 20), np.roll(curve.barycentric, 20, axis=0), closed=True)
-    phi = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, sh.Soft(10.0)).values
-    scaled = sh.SignedHeatSolver(large, intrinsic=False).distance(curve, sh.Soft(10.0 / scale)).values
+    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Soft(10.0)).values
+    scaled = sh.SignedHeatSolver(large, 1.0, intrinsic=False).distance(curve, sh.Soft(10.0 / scale)).values
     np.testing.assert_allclose(scaled, scale * phi, atol=1e-9 * scale)
     np.testing.assert_allclose(
-        sh.SignedHeatSolver(mesh, intrinsic=False).distance(turned, sh.Soft(10.0)).values, phi, atol=1e-10
+        sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(turned, sh.Soft(10.0)).values, phi, atol=1e-10
     )
     theirs = peer(mesh, [curve], "ZeroSet", soft_level_set_weight=10.0)
     theirs_scaled = peer(large, [curve], "ZeroSet", soft_level_set_weight=10.0 / scale)

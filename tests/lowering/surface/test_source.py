@@ -42,7 +42,7 @@ def loop_of(mesh, height=0.31):
 def test_oriented_edge_curves_match_the_published_code():
     mesh = bumpy()
     vertices, _ = loop_of(mesh)
-    phi = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.path(vertices[:40]), sh.Free()).values
+    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(mesh.path(vertices[:40]), sh.Free()).values
     ref = peer(mesh, [vertices[:40]])
     assert np.abs(phi - ref).max() < 1e-10 * np.ptp(ref)
 
@@ -54,20 +54,21 @@ def test_oriented_curves_across_faces_match_the_published_code():
     nodes = [(int(e), [float(s)]) for e, s in zip(places.elements, places.along, strict=True)]
     peer_solver = pp3d.MeshSignedHeatSolver(np.array(mesh.vertices), np.array(mesh.faces))
     ref = peer_solver.compute_distance([[*nodes, nodes[0]]], level_set_constraint="None")
-    phi = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, sh.Free()).values
+    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Free()).values
     assert np.abs(phi - ref).max() < 1e-10 * np.ptp(ref)
 
 
 def test_points_match_the_published_code():
     mesh = bumpy()
-    phi = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.points_at([5, 900, 1200]), sh.Free()).values
+    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(mesh.points_at([5, 900, 1200]), sh.Free()).values
     assert difference(phi, peer(mesh, points=[5, 900, 1200])) < 1e-10
 
 
 def test_unoriented_edge_curves_match_the_published_code_on_the_plane():
     mesh = square(14, 0.15)
     for vertices in ([60, 74, 88, 102], [60, 74, 89, 90, 104]):
-        phi = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.path(vertices, oriented=False), sh.Free()).values
+        curve = mesh.path(vertices, oriented=False)
+        phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Free()).values
         assert difference(phi, peer(mesh, [vertices], [False])) < 1e-10
 
 
@@ -75,12 +76,12 @@ def test_unoriented_ends_on_curved_vertices_are_symmetric_and_near_the_published
     """There the published code measures one limit of the arc in scaled angles, the other in plain ones."""
     mesh = bumpy()
     vertices = loop_of(mesh)[0][:30]
-    phi = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.path(vertices, oriented=False), sh.Free()).values
+    curve = mesh.path(vertices, oriented=False)
+    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Free()).values
     assert difference(phi, peer(mesh, [vertices], [False])) < 1e-3
     mirror = sh.TriangleMesh(mesh.vertices * np.array([1, 1, -1]), mesh.faces[:, ::-1])
-    other = (
-        sh.SignedHeatSolver(mirror, intrinsic=False).distance(mirror.path(vertices, oriented=False), sh.Free()).values
-    )
+    curve = mirror.path(vertices, oriented=False)
+    other = sh.SignedHeatSolver(mirror, 1.0, intrinsic=False).distance(curve, sh.Free()).values
     assert np.abs(phi - other).max() < 1e-12
 
 
@@ -262,14 +263,14 @@ def test_unoriented_circles_inside_faces_converge():
 
 
 def test_embedding_on_a_nonmanifold_surface():
-    pages = book(3, 8)
+    pages = book(3, 16)
     line = pages.polyline([[0.33, 0, 0.21], [0.33, 0, 0.83]], oriented=False)
     phi = sh.SignedHeatSolver(pages, intrinsic=False).distance(line).values
     radius = np.hypot(pages.vertices[:, 0], pages.vertices[:, 1])
     on_page = pages.vertices[:, 0] > 1e-9
     exact = np.where(on_page, np.abs(radius - 0.33), radius + 0.33)
     middle = np.abs(pages.vertices[:, 2] - 0.5) < 0.2
-    assert np.abs(phi - exact)[middle].max() < 0.1
+    assert np.abs(phi - exact)[middle].max() < 0.06
 
 
 def test_an_oriented_curve_that_meets_an_embedded_one_is_the_same_curve():

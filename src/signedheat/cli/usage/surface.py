@@ -47,9 +47,9 @@ def add_curves_and_output(parser: Parser, output: str) -> None:
     parser.add_argument(
         "--diffusion",
         type=positive,
-        default=1.0,
         metavar="T",
-        help="diffusion time in squared spacings (1); larger values close gaps more roundly",
+        help="diffusion time in squared spacings (1; with --plain three, extrapolated, unless curves end); larger "
+        "values close gaps more roundly",
     )
     parser.add_argument(
         "--globe",

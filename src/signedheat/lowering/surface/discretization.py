@@ -22,13 +22,13 @@ from ...geometry.curve_segments import CurveSegments
 from ...geometry.intrinsic.conforming_refinement import refine_to_conform
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import laid_out
-from ...linear import elimination_order, factorize
+from ...linear import Factor, elimination_order, factorize
 from ...operators.cotan import cotan_matrix, divergence
 from .integration import STRENGTH, SurfaceIntegration
 from .memory import refuse_too_many
 from .nonmanifold_frames import nonmanifold_frames
 from .source import surface_source
-from .vector_heat import VectorHeat
+from .vector_heat import TIMES, VectorHeat
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,8 @@ class SurfaceDiscretization:
     triangulation: IntrinsicTriangulation | None = None
     spacing: float = math.nan
     notes: tuple[Note, ...] = ()
-    _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(3), init=False, repr=False)
+    _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(TIMES), init=False, repr=False)
+    _like: list[Factor] = field(default_factory=list, init=False, repr=False)
     _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -140,7 +141,8 @@ class SurfaceDiscretization:
         return heat.solve([source.vectors for source in sources])
 
     def _vector_heat(self, time: float) -> VectorHeat:
-        return VectorHeat(self.triangles, time, self.triangles.edges.elimination_order(self.vertex_order))
+        order = self.triangles.edges.elimination_order(self.vertex_order)
+        return VectorHeat(self.triangles, time, order, self._like)
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
         """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from ...geometry.components import connected_components
 from ...geometry.curve_segments import CurveSegments, interpolation_at
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.surface_points import (
+    EDGE,
     VERTEX,
     LocatedPoints,
     concatenated,
@@ -62,6 +64,29 @@ class SurfaceSource(Frozen):
     oriented: bool
     triangles: IntrinsicMesh
     parts: Sequence[CurveSegments]
+
+    @cached_property
+    def ending(self) -> NDArray[np.bool_]:
+        """(m,) faces of those connected parts of the surface in which an oriented curve ends, but at the boundary."""
+        triangles = self.triangles
+        oriented = [part for part in self.parts if part.oriented]
+        if not oriented:
+            return np.zeros(triangles.n_faces, dtype=bool)
+        nodes, ends = joined(oriented)
+        free = nodes[np.flatnonzero(np.bincount(ends.ravel(), minlength=len(nodes)) % 2)]
+        rim = triangles.edges.face_counts == 1
+        at_rim = np.zeros(triangles.n_vertices, dtype=bool)
+        at_rim[triangles.edges.vertices[rim]] = True
+        outer = ((free.kinds == VERTEX) & at_rim[free.elements % triangles.n_vertices]) | (
+            (free.kinds == EDGE) & rim[free.elements % triangles.n_edges]
+        )
+        parts = triangles.face_components
+        return np.isin(parts, parts[incident_faces(triangles, free[~outer])[1]])
+
+    @property
+    def ends_everywhere(self) -> bool:
+        """Whether there is no connected part of the surface in which all curves are closed."""
+        return all(self.ending[part.nodes.faces].all() for part in self.parts)
 
 
 def surface_source(
@@ -237,12 +262,25 @@ def line_elements(part: CurveSegments, spacing: float) -> NDArray[np.float64]:
     return 0.5 * np.bincount(part.ends.ravel(), np.repeat(part.lengths, 2), len(part.nodes))
 
 
+def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, NDArray[np.int64]]:
+    """The distinct points of all sources, and the two at the ends of every segment."""
+    nodes = concatenated([p.nodes for p in parts])
+    first, who = unique_points(nodes)
+    return nodes[first], ends_among(parts, who)
+
+
+def ends_among(parts: Sequence[CurveSegments], who: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k, 2) points at the ends of every segment, from the number of each node's point."""
+    offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
+    ends: NDArray[np.int64] = np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])
+    result: NDArray[np.int64] = who[ends]
+    return result
+
+
 def connected(parts: Sequence[CurveSegments]) -> NDArray[np.int64]:
     """(s,) connected component of every node, over all sources, in order of first appearance."""
     first, who = unique_points(concatenated([p.nodes for p in parts]))
-    offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
-    ends = who[np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])]
-    labels = connected_components(len(first), *ends.T)
+    labels = connected_components(len(first), *ends_among(parts, who).T)
     seen, order = np.unique(labels, return_index=True)
     rank = np.empty(len(seen), dtype=np.int64)
     rank[np.argsort(order)] = np.arange(len(seen))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,9 @@ from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...linear import Factor, factorize
 from ...linear.restarts import Stage, restart, scaled
 from ...operators.crouzeix_raviart import vector_heat_forces, vector_heat_matrix
+
+TIMES = 3
+"""Diffusion times whose factors are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,18 +34,24 @@ class VectorHeat:
         t.
     order : (n_edges,) int
         Fill-reducing order of the edges.
+    like : list of Factor
+        The factor for another t, if there is one; the new one takes its place.
     """
 
     triangles: IntrinsicMesh
     time: float
     order: NDArray[np.int64]
+    like: list[Factor] = field(default_factory=list)
 
     @cached_property
     def factor(self) -> Factor:
         """The factor of M + tL."""
         matrix = vector_heat_matrix(self.triangles, self.time)
         parts = np.arange(matrix.shape[0] // self.triangles.n_edges)  # real and imaginary part, or one complex number
-        return factorize(matrix, order=(len(parts) * self.order[:, None] + parts).ravel(), reused=True)
+        order = (len(parts) * self.order[:, None] + parts).ravel()
+        like = self.like[0] if self.like else None
+        self.like[:] = [factorize(matrix, order=order, reused=True, like=like, together=TIMES)]
+        return self.like[0]
 
     @cached_property
     def _smallest_mass(self) -> float:
