@@ -7,12 +7,12 @@ import pytest
 
 from signedheat import samples
 from signedheat.geometry.box_tree import BoxTree
-from signedheat.geometry.winding_tree import winding_numbers_of_points
+from signedheat.geometry.winding_tree import WindingTree
 
 
 def winding(triangles, points):
     tree = BoxTree.of(triangles.min(axis=1), triangles.max(axis=1))
-    return winding_numbers_of_points(triangles, tree, np.asarray(points, dtype=float))
+    return WindingTree(triangles, tree).numbers(np.asarray(points, dtype=float))
 
 
 def test_closed_surfaces_have_whole_numbers():

@@ -16,13 +16,18 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..lowering.area_elements import sample_on_grid
 from ..operators.grid.block_method import BlockSources, SomeNodes
-from ..operators.grid.blocks import SIDE, Blocks
+from ..operators.grid.blocks import SIDE, Blocks, block_points
 from .band_plan import BandPlan
+from .sides import LEVEL, MIDDLE, SLOPE, doubt_beside
 
 FULL, NONE = 1.5, 2.5
 """Coarse cells from faces up to which the fine solution counts in full, and from which on it does not at all."""
 APART = 0.75
 """Coarse cells by which fine and coarse may differ; twice that, and the coarse field has decided otherwise."""
+BEND = 4.0
+"""How fast guards give way to φ, per cell."""
+WITHIN = 6.0
+"""Coarse cells within which the level of the coarse field's completed surface counts."""
 SAMPLE_SIZE = 0.5
 """Longest edge, in cells, of the pieces into which faces are cut."""
 ROUNDS = 12
@@ -50,10 +55,43 @@ def completed_function(
         return
     there = fine.reshape(len(fine), -1)
     coarse, away = function[active], distances[active] / plan.coarse_cell
-    share = np.clip((NONE - away) / (NONE - FULL), 0.0, 1.0)
-    share *= np.clip(2.0 - np.abs(there - coarse) / (APART * plan.coarse_cell), 0.0, 1.0)
-    share *= doubtful[active] & np.isfinite(there)
-    function[active] = np.where(share > 0, share * np.nan_to_num(there) + (1 - share) * coarse, coarse)
+    weight = np.clip((NONE - away) / (NONE - FULL), 0.0, 1.0)
+    weight *= doubtful[active] & np.isfinite(there)
+    asked = (weight > 0) & (np.abs(coarse) < 2 * APART * plan.coarse_cell)
+    points = block_points(blocks.places[active], plan.steps)[asked.ravel()]
+    there[asked] = _guarded(plan, points, there[asked], distances[active][asked])
+    weight *= np.clip(2.0 - np.abs(there - coarse) / (APART * plan.coarse_cell), 0.0, 1.0)
+    function[active] = np.where(weight > 0, weight * np.nan_to_num(there) + (1 - weight) * coarse, coarse)
+
+
+def _guarded(
+    plan: BandPlan, points: NDArray[np.float64], phi: NDArray[np.float64], distances: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """φ at (n, 3) points, guarded by winding numbers as on a whole grid (`choose_sides`).
+
+    Where the coarse field fills a missing side farther than that, the winding number of what completes it there is the
+    level.
+    """
+    if plan.winding is None or not len(points):
+        return phi
+    winding = plan.winding.numbers(points) / plan.share
+    doubt = np.full(len(points), 0.5 - LEVEL)
+    if plan.rims is not None:
+        planes = np.flatnonzero((np.abs(winding - 0.5) < MIDDLE) & (distances > plan.cell))
+        if len(planes):
+            doubt[planes] *= doubt_beside(plan.rims, points[planes])
+    low, high = 0.5 - doubt, 0.5 + doubt
+    if plan.levels is not None:
+        tree, levels = plan.levels
+        found, nearest = tree.query(points, distance_upper_bound=WITHIN * plan.coarse_cell)
+        known = np.isfinite(found)
+        level = levels[nearest[known]]
+        low[known], high[known] = np.minimum(low[known], level), np.maximum(high[known], level)
+    least, most = SLOPE * (low - winding), SLOPE * (high - winding)
+    least -= np.where(least < 0, BEND * least**2, 0.0)  # where the guard agrees with φ, that stays a distance
+    most += np.where(most > 0, BEND * most**2, 0.0)
+    result: NDArray[np.float64] = np.minimum(np.maximum(phi, plan.cell * least), plan.cell * most)
+    return result
 
 
 def _near_ends(plan: BandPlan, blocks: Blocks) -> NDArray[np.bool_]:

@@ -10,12 +10,15 @@ import scipy
 from numpy.typing import NDArray
 
 from ..domains.grid import Grid
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
 from ..geometry.box_tree import BoxTree
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
+from ..geometry.winding_tree import WindingTree
 from ..operators.grid.blocks import CUBE, SIDE
+from .rims import Rims, rims_of
 
 TILE = SIDE * CUBE
 """Nodes along each edge of a tile."""
@@ -50,7 +53,11 @@ class BandPlan:
     telling : (m,) bool
         Those that tell a side.
     ends : (e, 3) float
-        Places where the surface ends or tells no side, at most half a coarse cell apart, around the first node.
+        Places where the surface ends or bounds nothing, at most half a coarse cell apart, around the first node.
+    asked : (m,) bool
+        Those that do not, but beside which winding numbers do.
+    share : float
+        Of the surface that is there, by which winding numbers are divided.
     tree : BoxTree, optional
         Over the boxes of the faces; made when it is first needed.
     """
@@ -61,6 +68,8 @@ class BandPlan:
     features: FaceFeatures
     telling: NDArray[np.bool_]
     ends: NDArray[np.float64]
+    asked: NDArray[np.bool_]
+    share: float = 1.0
     tree: BoxTree | None = None
 
     @property
@@ -84,6 +93,31 @@ class BandPlan:
         if not len(self.features.rows):
             return None
         return FaceTree.of(self.features) if self.tree is None else FaceTree(self.features, self.tree)
+
+    @cached_property
+    def winding(self) -> WindingTree | None:
+        """Winding numbers of the faces; None if there are none."""
+        if self.faces is None:
+            return None
+        return WindingTree(self.features.corners.reshape(-1, 3, 3), self.faces.tree)
+
+    @cached_property
+    def rims(self) -> Rims | None:
+        """Those of the faces."""
+        if not len(self.features.rows):
+            return None
+        mesh = TriangleMesh(self.features.vertices, self.features.faces)
+        return rims_of(mesh, Grid(np.zeros(3), self.coarse.grid.spacing, self.coarse.grid.shape))
+
+    @cached_property
+    def levels(self) -> tuple[scipy.spatial.cKDTree, NDArray[np.float64]] | None:
+        """Places of the completed surface of the coarse field, far from faces, and their winding numbers."""
+        surface = self.coarse.surface
+        if surface is None or self.faces is None or self.winding is None or not len(surface.crossings):
+            return None
+        places = np.ascontiguousarray(surface.crossings[:, 1:4])
+        places = places[self.faces.distances(places) > FAR * self.coarse_cell]
+        return (scipy.spatial.cKDTree(places), self.winding.numbers(places) / self.share) if len(places) else None
 
     @cached_property
     def open_places(self) -> scipy.spatial.cKDTree | None:
@@ -213,8 +247,9 @@ def plan_band(coarse: GridField, grid: Grid, band: float) -> BandPlan:
     telling = np.ones(len(features.rows), dtype=bool) if surface.telling is None else surface.telling
     telling = telling | _closed_parts(features)
     width = max(float(band), LEAST * float(grid.spacing.max()))
-    ends = _ends(features, telling, 0.5 * float(coarse.grid.spacing.max()))
-    return BandPlan(grid, coarse, width, features, telling, ends)
+    asked = np.zeros_like(telling) if surface.asked is None else surface.asked & ~telling
+    ends = _ends(features, telling | asked, 0.5 * float(coarse.grid.spacing.max()))
+    return BandPlan(grid, coarse, width, features, telling, ends, asked, surface.share)
 
 
 def _closed_parts(features: FaceFeatures) -> NDArray[np.bool_]:

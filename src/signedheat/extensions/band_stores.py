@@ -56,7 +56,7 @@ def save_plan(plan: BandPlan, folder: Path, fingerprint: str) -> None:
     place.mkdir(parents=True, exist_ok=True)
     surface = plan.coarse.surface
     arrays = {f"feature_{each.name}": getattr(plan.features, each.name) for each in fields(FaceFeatures)}
-    arrays |= {"telling": plan.telling, "ends": plan.ends, "coarse_values": plan.coarse.values}
+    arrays |= {"telling": plan.telling, "asked": plan.asked, "ends": plan.ends, "coarse_values": plan.coarse.values}
     arrays["crossings"] = np.zeros((0, 18)) if surface is None else surface.crossings
     if plan.coarse.confidence is not None:
         arrays["coarse_confidence"] = plan.coarse.confidence
@@ -71,6 +71,7 @@ def save_plan(plan: BandPlan, folder: Path, fingerprint: str) -> None:
         "shape": list(plan.grid.shape),
         "coarse_spacing": plan.coarse.grid.spacing.tolist(),
         "width": plan.width,
+        "share": plan.share,
     }
     temporary = place / "about.part"
     temporary.write_text(json.dumps(about))
@@ -107,7 +108,8 @@ def load_plan(folder: Path) -> BandPlan:
         coarse = GridField(grid, values, confidence=confidence, surface=surface)
         tree = BoxTree(arrays["bounds"], arrays["items"]) if "bounds" in arrays else None
         fine = Grid(origin, about["spacing"], about["shape"])
-        return BandPlan(fine, coarse, about["width"], features, arrays["telling"], arrays["ends"], tree)
+        faces = arrays["telling"], arrays["ends"], arrays["asked"]
+        return BandPlan(fine, coarse, about["width"], features, *faces, about["share"], tree)
     except (OSError, ValueError, KeyError) as error:
         raise FileFormatError(
             f"the plan of its tiles cannot be read ({error})", remedy="remove the folder and start anew", path=folder

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..geometry.nearest_faces import NearestFaces
 from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points, off_grid
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
 from .band_completion import NONE, completed_function, halo
@@ -19,6 +20,12 @@ from .shape_sharpening import stands_in
 
 TOGETHER = 512
 """Blocks whose faces are searched at a time."""
+CONTRARY = 0.5
+"""Coarse cells by which the nearest face and the coarse field differ at least to contradict each other."""
+LEVEL = 0.5
+"""Winding number of places inside, where no face tells."""
+COVERED, CLEAR = 0.75, 0.25
+"""The same where the nearest face says that they are outside, and where it says that they are inside."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,25 +101,45 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
     distances, function = np.full((n, NODES), np.inf), np.empty((n, NODES))
     doubtful, trusted = np.zeros((n, NODES), dtype=bool), np.ones((n, NODES), dtype=np.float16)
     at_ends = np.zeros((n, NODES), dtype=bool)
-    near = min(NEAR * plan.coarse_cell, plan.open_reach)
     for begin in range(0, n, TOGETHER):
         here = slice(begin, begin + TOGETHER)
         points = block_points(blocks.places[here], plan.steps)
+        coarse = plan.coarse_function(points)
         if plan.faces is None:
-            function[here] = plan.coarse_function(points).reshape(-1, NODES)
+            function[here] = coarse.reshape(-1, NODES)
             continue
         found = plan.faces.search(points)
-        told = found.regular & (found.distances < near) & plan.telling[found.faces]
-        signed = np.where(found.cosines < 0, -found.distances, found.distances)
-        if not told.all():
-            signed[~told] = plan.coarse_function(points[~told])
+        signed, told = _told(plan, points, found, coarse)
         distances[here] = found.distances.reshape(-1, NODES)
         function[here] = signed.reshape(-1, NODES)
-        doubtful[here] = (~told & plan.telling[found.faces]).reshape(-1, NODES)
+        doubtful[here] = (~told & (plan.telling | plan.asked)[found.faces]).reshape(-1, NODES)
         trusted[here] = plan.features.trusted[found.faces].reshape(-1, NODES)
         at_ends[here] = ~found.regular.reshape(-1, NODES)
     completed_function(plan, blocks, distances, function, doubtful)
     return _Sides(blocks, distances, function, trusted, at_ends)
+
+
+def _told(
+    plan: BandPlan, points: NDArray[np.float64], found: NearestFaces, coarse: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(n,) signed functions, and whether faces tell them: the nearest, or all together by their winding number.
+
+    All are asked around walls that the coarse grid does not see, and where the nearest face and the coarse field
+    contradict each other: it may be folded over, or lie in what is inside.
+    """
+    near = min(NEAR * plan.coarse_cell, plan.open_reach)
+    by_face = found.regular & (found.distances < near) & plan.telling[found.faces]
+    by_all = found.regular & (found.distances < near) & plan.asked[found.faces]
+    outside = found.cosines >= 0
+    signed = np.where(outside, found.distances, -found.distances)
+    contrary = by_face & (np.abs(signed - coarse) > CONTRARY * plan.coarse_cell) & ((coarse >= 0) != outside)
+    asked = np.flatnonzero(by_all | contrary)
+    if len(asked) and plan.winding is not None:
+        winding = plan.winding.numbers(points[asked]) / plan.share
+        level = np.where(by_all[asked], LEVEL, np.where(outside[asked], COVERED, CLEAR))
+        signed[asked] = np.where(winding > level, -found.distances[asked], found.distances[asked])
+    told = by_face | by_all
+    return np.where(told, signed, coarse), told
 
 
 def _crossings(plan: BandPlan, sides: _Sides, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -175,13 +202,14 @@ def _completed(
         some = rows[begin : begin + TOGETHER]
         block, node = np.nonzero(gap[some, None] - inner < distances[some])  # the others are nearer to faces
         points = block_points(places[some], plan.steps).reshape(-1, NODES, 3)[block, node]
-        _, nearest = tree.query(points)
+        block = some[block]
+        found, nearest = tree.query(points)
+        nearer = found < distances[block, node]  # not its circle, which is no surface far from where it touches
+        block, node, points, nearest = block[nearer], node[nearer], points[nearer], nearest[nearer]
         other = np.empty(len(points))
         distances_to_crossings(points, nearest.astype(np.int32), crossings, reach, other)
-        block = some[block]
-        nearer = other < distances[block, node]
-        taken = block[nearer], node[nearer]
-        distances[taken], confidence[taken] = other[nearer], trusted[nearest[nearer]]
+        taken = block, node
+        distances[taken], confidence[taken] = np.minimum(other, distances[taken]), trusted[nearest]
 
 
 def _trusted(plan: BandPlan, crossings: NDArray[np.float64]) -> NDArray[np.float32]:

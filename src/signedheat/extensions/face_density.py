@@ -27,10 +27,12 @@ ONE_SIDED = 0.6
 """Sum of the winding numbers on both sides over their difference, 1 on solids and 0 on sheets, that is asked for."""
 
 
-def as_if_whole(winding: NDArray[np.float64], samples: AreaSamples) -> tuple[NDArray[np.float64], AreaSamples]:
-    """Winding numbers, and samples with the areas, that the whole surface would have of which these are a share."""
+def as_if_whole(winding: NDArray[np.float64], samples: AreaSamples) -> tuple[NDArray[np.float64], AreaSamples, float]:
+    """Winding numbers, and samples with the areas, that the whole surface would have; and the share that these are."""
     share = face_density(winding, samples.positions, samples.vectors)
-    return (winding, samples) if share == 1.0 else (winding / share, replace(samples, vectors=samples.vectors / share))
+    if share == 1.0:
+        return winding, samples, share
+    return winding / share, replace(samples, vectors=samples.vectors / share), share
 
 
 def face_density(winding: NDArray[np.float64], positions: NDArray[np.float64], vectors: NDArray[np.float64]) -> float:

@@ -19,7 +19,7 @@ from ..errors import SourceError
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.nearest_faces import NearestFaces
-from ..geometry.winding_tree import winding_numbers_of_points
+from ..geometry.winding_tree import WindingTree
 from ..operators.grid.closest_points import crossed_edges, crossings_at
 from ..operators.grid.exact_surface import ExactSurface
 from ..operators.grid.fitted_points import REACH, fitted_to_points, mean_gap, points_as_crossings
@@ -169,7 +169,7 @@ def _unfold(values: NDArray[np.float64], inside: NDArray[np.bool_], surface: Exa
     if not len(doubtful):
         return
     triangles = surface.features.corners.reshape(-1, 3, 3)
-    winding = winding_numbers_of_points(triangles, surface.tree.tree, doubtful * surface.steps)
+    winding = WindingTree(triangles, surface.tree.tree).numbers(doubtful * surface.steps)
     doubtful = doubtful[np.where(inside[tuple(doubtful.T)], winding > COVERED, winding < CLEAR)]
     values[tuple(doubtful.T)] *= -1.0
 

@@ -273,9 +273,15 @@ def _doubt(
         over_slabs(planes, winding.shape)
         nodes = np.argwhere(chosen)
         if len(nodes):
-            bend = np.sin(0.5 * np.arcsin(rims.going_on_at(nodes * steps)))
-            doubt[tuple(nodes.T)] *= np.minimum((bend / CURVED) ** 2, 1.0)
+            doubt[tuple(nodes.T)] *= doubt_beside(rims, nodes * steps)
     return doubt
+
+
+def doubt_beside(rims: Rims, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) from 0, where the nearest rim is that of a hole in a flat face, to 1: share of the doubt that remains."""
+    bend = np.sin(0.5 * np.arcsin(rims.going_on_at(places)))
+    share: NDArray[np.float64] = np.minimum((bend / CURVED) ** 2, 1.0)
+    return share
 
 
 def _bodies(scene: _Scene, function: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:

@@ -27,13 +27,13 @@ from ..lowering.area_elements import AreaSamples, bounds_around, sample_on_grid
 from ..lowering.grid.discretization import refuse_beyond_memory
 from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
-from ..operators.grid.face_values import values_at
 from ..operators.grid.fitted_points import mean_gap
 from ..operators.grid.line_winding import closed_winding_numbers
 from ..progress import Progress, Stopwatch, within
 from ..solver import SignedHeatSolver, checked
 from .band_plan import coarse_grid
 from .bands import band_around
+from .exact_uniting import overlap_between_nodes, union_for
 from .face_density import as_if_whole
 from .inside import Sides, closed_sides
 from .joining import Shape, joined_shape
@@ -45,7 +45,8 @@ from .shape_sides import sides_of_shape
 from .sharpening import sharpen
 from .sides import FAR
 from .steps import Steps
-from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of, without_covered
+from .thin_walls import telling_at, with_thin_walls
+from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of
 
 STEPS = 7
 """Steps that are timed."""
@@ -53,9 +54,6 @@ BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 54, 42, 31
 """Measured peak memory: of points and shapes with holes or overlaps; of φ alone; of shapes whose parts are closed."""
 GAPS = 1.5
 """Mean gaps between points, besides `FAR` cells, within which φ tells the sides of a cloud."""
-BOUNDING = 0.22
-"""Mean winding number of a face's two sides from which it tells inside from outside: 0 on a sheet, ½ on a solid, ¼ on
-one half a cell thick."""
 
 
 @overload
@@ -194,7 +192,7 @@ def solid_distance(
 
 def coarse_distance(shape: Shape, domain: Grid, steps: Steps, progress: Progress | None) -> GridField:
     """Distance on the coarse grid of a band; cells of its size do not tell thin walls from layers of noise."""
-    return _on_grid(shape, coarse_grid(domain), replace(steps, closed="exact"), progress)
+    return _on_grid(shape, coarse_grid(domain), replace(steps, finest=float(domain.spacing.min())), progress)
 
 
 def _oriented(shape: Shape, steps: Steps, notes: list[Note]) -> tuple[Merged, bool]:
@@ -261,14 +259,15 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     if not steps.sharpen and phi is not None:
         return GridField(grid, phi, _diagnostics(notes, stopwatch, time))
     with stopwatch("sides"):
+        share = 1.0
         if samples is not None and not closed:
-            winding, samples = as_if_whole(winding, samples)
+            winding, samples, share = as_if_whole(winding, samples)
         cell = float(grid.spacing.max())
         sides = closed_sides(winding, cell) if closed else sides_of_shape(merged.shape, phi, winding, samples, grid)
         known = None if phi is None else _known(phi) if closed else sides.phi
         del phi
     with stopwatch("sharpen"):
-        sharpened = _sharpened(merged, known, sides, closed, winding, grid, steps.closed)
+        sharpened = _sharpened(merged, known, sides, closed, winding, share, grid, steps)
     notes += [note for note in (sides.completed, sides.reaches_box, sides.bounds_nothing) if note is not None]
     return _solid(sharpened, grid, notes, stopwatch, time)
 
@@ -284,7 +283,9 @@ def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwa
     with stopwatch("unite"):
         vertices, faces = triangles_of(shape)
         winding = closed_winding_numbers(((vertices - grid.origin) / grid.spacing)[faces], grid.shape)
-        if winding is None or (steps.unite and winding.max() > 1):
+        if winding is None or (
+            steps.unite and (winding.max() > 1 or overlap_between_nodes(merged, grid, steps.finest))
+        ):
             return None
     if merged.count:
         notes.append(LeftOut(merged_faces=merged.count))
@@ -305,7 +306,7 @@ def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwa
 
     stopwatch.skip(4)
     with stopwatch("sharpen"):
-        sharpened = assemble([shape], grid, function, steps.closed, phi, restored=merged.restored)
+        sharpened = assemble([shape], grid, function, steps.fit, phi, restored=merged.restored)
     return _solid(sharpened, grid, notes, stopwatch, float("nan"))
 
 
@@ -325,22 +326,17 @@ def _sharpened(
     sides: Sides,
     closed: bool,
     winding: NDArray[np.float64],
+    share: float,
     grid: Grid,
-    fit: Fit,
+    steps: Steps,
 ) -> Assembled:
-    """Distance to the shape; faces beside which nothing is solid do not tell sides. The fit is for closed shapes."""
+    """Distance to the shape, of whose surface a share is there; faces beside which nothing is solid tell no sides."""
     shape = merged.shape
     if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
         return assemble([shape], grid, _guarded(phi(), sides, shape, grid), "auto")
     if phi is not None and closed:
-        return assemble([shape], grid, sides.function, fit, phi, restored=merged.restored)
+        return assemble([shape], grid, sides.function, steps.fit, phi, restored=merged.restored)
     refused = _widened(sides.refused)
-    upper = np.array(grid.shape) - 1
-
-    def tells(feet: NDArray[np.float64]) -> NDArray[np.bool_]:
-        nodes = tuple(np.clip(np.rint(feet).astype(np.int64), 0, upper).T)
-        told: NDArray[np.bool_] = (values_at(winding, feet) > BOUNDING) & ~refused[nodes]
-        return told
 
     def accepted() -> NDArray[np.float64]:
         given = sides.phi()
@@ -350,7 +346,12 @@ def _sharpened(
     layers: Fit | Literal["alone"] = "auto"
     if sides.open_sheets:  # layers of sheets are no noise
         layers = "exact" if sides.bounds_nothing else "alone"
-    return assemble([shape], grid, sides.function, layers, None if phi is None else accepted, tells, merged.restored)
+    given = None if phi is None else accepted
+    tells = telling_at(winding, refused)
+    assembled = assemble([shape], grid, sides.function, layers, given, tells, merged.restored)
+    if steps.finest is None:
+        return assembled
+    return replace(assembled, surface=with_thin_walls(assembled.surface, refused, share))
 
 
 def _guarded(phi: NDArray[np.float64], sides: Sides, cloud: PointCloud, grid: Grid) -> NDArray[np.float64]:
@@ -381,7 +382,7 @@ def _united(
     samples, winding = _wound(merged.shape, grid)
     if not steps.unite:
         return merged, samples, winding
-    united = without_covered(merged, winding, grid)
+    united = union_for(merged, winding, grid, steps.finest)
     if united.left_out.merged_faces or united.left_out.covered_faces:
         notes.append(united.left_out)
     if united.shape is merged.shape:

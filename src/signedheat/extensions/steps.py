@@ -20,9 +20,9 @@ class Steps:
         On φ at the faces.
     diffusion : float
         τ in ``t = τ h²``.
-    closed : {"auto", "exact"}
-        Whether faces of closed shapes that lie in layers are left out (`assemble`); a grid that is coarse on purpose
-        takes thin walls for layers.
+    finest : float, optional
+        Spacing of the band that the grid is coarse for, on purpose: what is thinner than its cells counts, and is not
+        layered, and faces are cut as finely as that.
     """
 
     orient: bool = True
@@ -30,4 +30,9 @@ class Steps:
     sharpen: bool = True
     constraint: Constraint = field(default_factory=ZeroSet)
     diffusion: float = 1.0
-    closed: Fit = "auto"
+    finest: float | None = None
+
+    @property
+    def fit(self) -> Fit:
+        """Whether faces of closed shapes that lie in layers are left out: see `assemble`."""
+        return "auto" if self.finest is None else "exact"

@@ -209,7 +209,7 @@ def without_covered(merged: Merged, winding: NDArray[np.float64], grid: Grid) ->
         return _points_left(shape, covered)
     mesh = shape.triangulation
     flags = merged.walls if mesh is shape else np.zeros(mesh.n_faces, dtype=bool)
-    return _faces_left(merged, mesh, flags, depth, grid)
+    return what_is_left(merged, mesh, flags, *_cut_where_covered(mesh, flags, depth, grid))
 
 
 def _points_left(cloud: PointCloud, covered: NDArray[np.bool_]) -> Union:
@@ -221,12 +221,27 @@ def _points_left(cloud: PointCloud, covered: NDArray[np.bool_]) -> Union:
     return Union(left, LeftOut(int(covered.sum()), share))
 
 
-def _faces_left(
-    merged: Merged, mesh: TriangleMesh, walls: NDArray[np.bool_], depth: NDArray[np.float64], grid: Grid
+def what_is_left(
+    merged: Merged,
+    mesh: TriangleMesh,
+    walls: NDArray[np.bool_],
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    origins: NDArray[np.int64],
+    covered: NDArray[np.bool_],
 ) -> Union:
-    """Faces of a mesh that are not covered, cut where they are in part."""
+    """Faces that are not covered of those, (k, 3), into which a mesh was cut.
+
+    Parameters
+    ----------
+    merged, mesh, walls
+        The shape, its triangles, and which of them are doubled walls.
+    vertices, faces : arrays
+        The triangles that it was cut into.
+    origins, covered : (k,)
+        The triangle that each is part of, and whether it lies inside other bodies.
+    """
     duplicates = LeftOut(merged_faces=merged.count, doubled_walls=int(walls.sum()) // 2)
-    vertices, faces, origins, covered = _cut_where_covered(mesh, walls, depth, grid)
     if not covered.any() or covered.all():  # of bodies that bury each other nothing would be left
         return Union(merged.shape, duplicates)
     left_out, kept = np.zeros(mesh.n_faces, dtype=bool), np.zeros(mesh.n_faces, dtype=bool)

@@ -5,6 +5,9 @@ Faces near a point count by the solid angles that they are seen under, what is f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,36 +15,66 @@ from ..compiled import compiled
 from ..parallel import in_chunks
 from .box_tree import LEAF, BoxTree
 
+DEPTH, INWARDS = 1e-5, 0.02
+"""Size of a face by which what is behind it lies behind it; share of the way to its centre by which it is inside."""
 OPENING = 2.0
 """Distance over radius from which on one area vector stands for what is below a node."""
 
 
-def winding_numbers_of_points(
-    triangles: NDArray[np.float64], tree: BoxTree, points: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(n,) winding numbers of (m, 3, 3) triangles around (n, 3) points, to some hundredths, in time O(n log m).
+@dataclass(frozen=True, eq=False)
+class WindingTree:
+    """Triangles, and what is known of those far away below each node of a tree.
 
-    Parameters
+    Attributes
     ----------
     triangles : (m, 3, 3) float
         Their corners, counterclockwise from outside.
     tree : BoxTree
         Over their boxes.
-    points : (n, 3) float
-        Positions; on a face it is the mean of both sides, nearly.
 
     Examples
     --------
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> faces = corners[np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])]
-    >>> tree = BoxTree.of(faces.min(axis=1), faces.max(axis=1))
-    >>> winding_numbers_of_points(faces, tree, np.array([[0.2, 0.2, 0.2], [1, 1, 1]])).round(2).tolist()
+    >>> tree = WindingTree.of(faces)
+    >>> tree.numbers(np.array([[0.2, 0.2, 0.2], [1, 1, 1]])).round(2).tolist()
     [1.0, 0.0]
+    >>> tree.behind(np.arange(4), faces.mean(axis=1)).round(2).tolist()
+    [1.0, 1.0, 1.0, 1.0]
     """
-    moments = _moments(triangles, tree)
-    corners = np.ascontiguousarray(triangles).reshape(-1, 9)
-    (numbers,) = in_chunks(lambda chunk: (_winding(corners, tree.items, moments, chunk),), points)
-    return numbers
+
+    triangles: NDArray[np.float64]
+    tree: BoxTree
+
+    @classmethod
+    def of(cls, triangles: NDArray[np.float64]) -> WindingTree:
+        """A tree of its own over (m, 3, 3) triangles."""
+        return cls(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
+
+    def numbers(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) winding numbers around (n, 3) points, to some hundredths, in time O(n log m).
+
+        On a face it is that of one of its sides: take `behind`.
+        """
+        corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
+        (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
+        return numbers
+
+    def behind(self, faces: NDArray[np.integer], places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) winding numbers just behind places (n, 3) on faces (n,): 1 more than in front, where no other face lies.
+
+        Places at the rims of their faces are moved inwards a little, where other faces do not meet them.
+        """
+        corners = self.triangles[faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas = np.linalg.norm(normals, axis=1)
+        depth = DEPTH * np.sqrt(areas) / np.where(areas > 0, areas, 1.0)
+        inner = places + INWARDS * (corners.mean(axis=1) - places)
+        return self.numbers(inner - depth[:, None] * normals)
+
+    @cached_property
+    def _moments(self) -> NDArray[np.float64]:
+        return _moments(self.triangles, self.tree)
 
 
 def _moments(triangles: NDArray[np.float64], tree: BoxTree) -> NDArray[np.float64]:

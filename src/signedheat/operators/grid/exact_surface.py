@@ -86,6 +86,10 @@ class ExactSurface(Frozen):
         Faces that tell a side; those of open sheets do not.
     nodes : (*shape) int, optional
         What is nearest to each node of the grid: a face, or −1 minus a crossing.
+    asked : (m,) bool, optional
+        Faces beside which a winding number does, of the place itself.
+    share : float
+        Of the surface that is there, by which winding numbers are divided.
     """
 
     features: FaceFeatures
@@ -94,6 +98,8 @@ class ExactSurface(Frozen):
     steps: NDArray[np.float64]
     telling: NDArray[np.bool_] | None = None
     nodes: NDArray[np.int32] | None = None
+    asked: NDArray[np.bool_] | None = None
+    share: float = 1.0
 
     @cached_property
     def tree(self) -> FaceTree:

@@ -1,0 +1,38 @@
+"""What lies inside other bodies, where no node of a grid tells."""
+
+import numpy as np
+import pytest
+
+from shapes.bodies import box
+from signedheat import samples
+from signedheat.extensions.exact_uniting import exactly_without_covered
+from signedheat.extensions.uniting import merge_duplicates
+
+
+def left_of(mesh, apart, finest):
+    return exactly_without_covered(merge_duplicates(mesh), apart, finest)
+
+
+@pytest.mark.parametrize("gap", [1.0, 1.9, 1.99])
+def test_two_spheres_keep_what_is_outside_the_other(gap):
+    """Each keeps 2π (1 + gap / 2), however thin the lens in which they overlap; facets are 0.2 % smaller."""
+    found = left_of(samples.union(samples.sphere(4), samples.sphere(4, center=(gap, 0, 0))), 0.2, 0.01)
+    assert found.shape.face_areas.sum() == pytest.approx(4 * np.pi * (1 + gap / 2), rel=0.003)
+    assert found.left_out.covered_faces > 0
+    middles = found.shape.vertices[found.shape.faces].mean(axis=1)
+    assert np.linalg.norm(middles, axis=1).min() > 1 - 0.005
+    assert np.linalg.norm(middles - [gap, 0, 0], axis=1).min() > 1 - 0.005
+
+
+def test_few_large_faces_are_cut_where_they_enter():
+    cross = samples.union(box((-2, -0.5, -0.5), (2, 0.5, 0.5)), box((-0.4, -2, -0.4), (0.4, 2, 0.4)))
+    found = left_of(cross, 0.1, 0.02)
+    area = 2 + 16 - 2 * 0.64 + 2 * 0.64 + 8 * 0.8 * 1.5
+    assert found.shape.face_areas.sum() == pytest.approx(area, rel=0.005)
+    assert found.shape.n_faces < 20_000
+
+
+def test_bodies_that_touch_and_bodies_apart_are_left_as_they_are():
+    for shift in (1.0, 1.2):
+        pair = samples.union(box((0, 0, 0), (1, 1, 1)), box((shift, 0.2, 0.2), (shift + 1, 0.8, 0.8)))
+        assert left_of(pair, 0.1, 0.02).shape is pair
