@@ -9,25 +9,27 @@ Importing this imports Numba.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from inspect import iscode
 from types import BuiltinFunctionType
 from typing import Any
 
+from .kernel_lowering import Lower
+from .kernel_steps import REPLACED, makes_references
+
 codegen: Any = import_module("numba.core.codegen")  # as far as type checkers are concerned, all of it is untyped
 compiler: Any = import_module("numba.core.compiler")
 environments: Any = import_module("numba.core.environment")
-ir: Any = import_module("numba.core.ir")
 llvm: Any = import_module("llvmlite.binding")
 machinery: Any = import_module("numba.core.compiler_machinery")
 make_function: Any = import_module("numba._dynfunc").make_function
 typed_passes: Any = import_module("numba.core.typed_passes")
 untyped_passes: Any = import_module("numba.core.untyped_passes")
 types: Any = import_module("numba.core.types")
-
-VIEWS = {"getitem", "static_getitem", "getattr", "build_tuple", "cast", "phi", "getiter", "iternext", "exhaust_iter"}
-VIEWS |= {"pair_first", "pair_second"}
-"""Expressions whose value, if it is an array, is one that was there before, or a part of it."""
+templates: Any = import_module("numba.core.typing.templates")
+compiler_lock: Any = import_module("numba.core.compiler_lock").global_compiler_lock
 
 OF_THE_CALLER = {"no_cpython_wrapper", "no_cfunc_wrapper", "release_gil"}
 UNNESTED = untyped_passes.InlineClosureLikes, untyped_passes.WithLifting
@@ -73,7 +75,32 @@ class Typing:
         return found
 
 
-class LinkedLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
+class Library(codegen.JITCodeLibrary):  # type: ignore[misc]
+    """Code of a kernel, optimised as a whole, once."""
+
+    has_references = True
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Only make variables of what lies on the stack: the rest of the work is done again for the whole."""
+        module.data_layout = self._codegen._data_layout
+        builder = self._codegen._pass_builder()
+        for function in module.functions:
+            if not function.is_declaration:
+                steps = llvm.create_new_function_pass_manager()
+                steps.add_sroa_pass()
+                steps.add_simplify_cfg_pass()
+                steps.add_instruction_combine_pass()
+                steps.run(function, builder)
+
+    def _optimize_final_module(self) -> None:
+        if self.has_references:
+            super()._optimize_final_module()
+        else:
+            steps, builder = self._codegen._module_pass_manager()
+            steps.run(self._final_module, builder)
+
+
+class LinkedLibrary(Library):
     """Code that is only linked into other code, where it is optimised."""
 
     def _optimize_final_module(self) -> None:
@@ -102,12 +129,21 @@ class Lowering(typed_passes.NativeLowering):  # type: ignore[misc]
 
     _name = "signedheat_lowering"
 
+    @property
+    def lowering_class(self) -> Any:
+        """From statements to LLVM's."""
+        return Lower
+
     def run_pass(self, state: Any) -> bool:
         """Replace the step of Numba."""
-        if not makes_references(state):
+        has_references = makes_references(state)
+        if not has_references:
             state.targetctx = state.targetctx.subtarget(enable_nrt=False)
         if state.flags.no_cpython_wrapper:
             return self._link_only(state)
+        state.library = Library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.has_references = has_references
+        state.library.enable_object_caching()
         done = super().run_pass(state)
         for variable in state.library._final_module.global_variables:
             environment = variable.name.startswith("_ZN08NumbaEnv") and environments.lookup_environment(variable.name)
@@ -127,32 +163,29 @@ class Lowering(typed_passes.NativeLowering):  # type: ignore[misc]
         return True
 
 
+@contextmanager
+def our_steps() -> Iterator[None]:
+    """While one of our kernels is compiled: what it calls of Numba's own is only linked, and nobody times LLVM."""
+    lock = getattr(getattr(llvm.ffi.lib, "_lock", None), "_cblist", [])
+    decorator = templates._OverloadFunctionTemplate._get_jit_decorator
+
+    def linked(self: Any) -> Any:
+        jit = decorator(self)
+        return lambda **options: jit(**{**options, "pipeline_class": Pipeline, "no_cpython_wrapper": True})
+
+    with compiler_lock:
+        told, lock[:] = list(lock), []
+        templates._OverloadFunctionTemplate._get_jit_decorator = linked
+        try:
+            yield
+        finally:
+            templates._OverloadFunctionTemplate._get_jit_decorator = decorator
+            lock[:] = told
+
+
 def handle(description: Any, environment: Any) -> Any:
     """What other kernels know a linked function by; it cannot be called."""
     return make_function(description.lookup_module(), description.qualname, "", 0, environment, ())
-
-
-def makes_references(state: Any) -> bool:
-    """Whether a function makes or returns arrays, or uses lists and the like."""
-
-    def counted(kind: Any) -> bool:
-        return bool(state.targetctx.data_model_manager[kind].contains_nrt_meminfo())
-
-    def borrowed(kind: Any) -> bool:
-        return isinstance(kind, types.Array | types.ArrayIterator | types.Pair) or (
-            isinstance(kind, types.BaseTuple) and all(borrowed(part) or not counted(part) for part in kind)
-        )
-
-    if counted(state.return_type) or any(counted(t) and not borrowed(t) for t in state.typemap.values()):
-        return True
-    for block in state.func_ir.blocks.values():
-        for assignment in block.find_insts(ir.Assign):
-            value = assignment.value
-            if isinstance(value, ir.Expr) and counted(state.typemap[assignment.target.name]):
-                index = value.op == "getitem" and state.typemap[value.index.name]
-                if value.op not in VIEWS or (index and counted(index)):
-                    return True
-    return False
 
 
 class Pipeline(compiler.CompilerBase):  # type: ignore[misc]
@@ -166,11 +199,12 @@ class Pipeline(compiler.CompilerBase):  # type: ignore[misc]
         self.state.typingctx = Typing(typing, flags)
 
     def define_pipelines(self) -> list[Any]:
-        """Numba's, with another last step, and without those for functions within functions where there are none."""
+        """Numba's, with other steps in places, and without those for functions within functions where there are none."""
         steps = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state, "signedheat")
         left_out = () if any(map(iscode, self.state.func_id.code.co_consts)) else UNNESTED
         kept = [(step, about) for step, about in steps.passes if step not in left_out]
-        steps.passes = [(Lowering if step is typed_passes.NativeLowering else step, about) for step, about in kept]
+        replaced = {**REPLACED, typed_passes.NativeLowering: Lowering}
+        steps.passes = [(replaced.get(step, step), about) for step, about in kept]
         steps._finalized = False
         steps.finalize()
         return [steps]
