@@ -14,7 +14,18 @@ from import_graph import circles, import_graph, upward_imports
 PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
-    {"cache", "compiled", "diagnostics", "errors", "frozen", "kernel_cache", "kernel_compiler", "memory"}
+    {
+        "cache",
+        "compiled",
+        "diagnostics",
+        "errors",
+        "frozen",
+        "kernel_cache",
+        "kernel_compiler",
+        "kernel_lowering",
+        "kernel_steps",
+        "memory",
+    }
     | {"packages", "parallel", "progress", "reprs", "slots"},
     {"geometry"},
     {"linear"},

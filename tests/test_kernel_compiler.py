@@ -132,3 +132,67 @@ def test_what_one_process_has_linked_another_finds(tmp_path, monkeypatch):
         printed.append(done.stdout.strip())
     assert printed == ["9.0", "12.0"]
     assert len(list((tmp_path / "cache" / "signedheat").glob("callers.inner-*.nbc"))) == 1
+
+
+@compiled
+def elements(a, flat, i, k):
+    """Elements from the front and the end, parts, and what is written to them."""
+    row = a[i]
+    row[k] += 2.0
+    a[-1, 0] = a[i, -2] - a[0][-1]
+    flat[-1] = i
+    flat[k] *= 3
+    b = a[i, k:]
+    return row[0] + row[-k], len(b), b[-1] > a[0, 0], flat[i - 3]
+
+
+@compiled
+def counted(a, n):
+    """Ranges of one, two and three bounds, none, and within one another."""
+    out = []
+    for i in range(n):
+        for j in range(i, 3):
+            out.append(10 * i + j)
+    for i in range(n, -n, -2):
+        out.append(i)
+    for _ in range(2, n - 5):
+        out.append(99)
+    for i in range(a[0]):
+        a[0] = 7  # the bound was taken before
+        out.append(i + 0)
+    return out
+
+
+@compiled
+def arithmetic(x, y, m, n):
+    return x + y * x - y, m * n - m + n, x < y, x != y, y == y, m <= n, m != n, m % n, m // n, 2 - m, 0.5 * m
+
+
+@pytest.mark.parametrize("layout", ["C", "F", "every other", "a part of numbers"])
+@pytest.mark.parametrize("kind", [float, np.float32, np.int32])
+def test_elements_are_those_of_plain_python(layout, kind):
+    found = []
+    for run in (elements, elements.function):
+        a = np.arange(24).reshape(4, 6).astype(kind)
+        if layout == "every other":
+            a = a[:, ::2]
+        elif layout == "a part of numbers":
+            a = (a + 1j).astype(complex).real
+        else:
+            a = np.array(a, order=layout)
+        flat = np.arange(5)
+        values = run(a, flat, 2, 1)
+        found.append((*map(float, values), *a.ravel().tolist(), *flat.tolist()))
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("n", [-1, 0, 1, 3, 7])
+@pytest.mark.parametrize("kind", [np.int64, np.int32, np.uint8])
+def test_loops_are_those_of_plain_python(n, kind):
+    assert counted(np.array([3], kind), n) == counted.function(np.array([3], kind), n)
+
+
+@pytest.mark.parametrize("x, y", [(1.5, -2.25), (np.nan, 1.0), (np.inf, np.inf), (-0.0, 0.0)])
+@pytest.mark.parametrize("m, n", [(7, -3), (-7, 3), (4, 4)])
+def test_arithmetic_is_that_of_plain_python(x, y, m, n):
+    np.testing.assert_array_equal(arithmetic(x, y, m, n), arithmetic.function(x, y, m, n))

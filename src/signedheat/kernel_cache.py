@@ -29,7 +29,7 @@ caching = lazy_module("numba.core.caching", "compiled kernels")
 kernel_compiler = lazy_module("signedheat.kernel_compiler", "compiled kernels")
 serialize = lazy_module("numba.core.serialize", "compiled kernels")
 
-FORMAT = 2
+FORMAT = 3
 """To be raised when the same kernels are compiled otherwise."""
 DAYS = 30
 """After so many, files of other versions of a kernel are removed when one is written."""
@@ -73,7 +73,7 @@ class KernelCache:
         """Keep what was compiled, unless it refers to this process alone; that no folder can be written is no error."""
         if any(not lifted.can_cache for lifted in result.lifted) or result.library.has_dynamic_globals:
             return
-        data = serialize.dumps(result._reduce())
+        data = serialize.dumps(result._replace(type_annotation="")._reduce())
         for folder in folders():
             if _written(folder / self._file_name(signature, result.codegen), hashlib.sha256(data).digest() + data):
                 self._remove_others(folder)

@@ -1,7 +1,9 @@
-"""How kernels are compiled: Numba's steps, without what kernels do not need, in two thirds of the time.
+"""How kernels are compiled: Numba's steps, without what kernels do not need, in half of the time.
 
 * The type of ``a + b`` for types that another kernel has added is not searched for again.
 * References are counted only in kernels that make arrays. Others borrow those of their caller.
+* Elements of arrays, loops and sums have short ways to LLVM (`kernel_lowering`), and analyses that only generators
+  and references need are left out (`kernel_steps`).
 * Kernels that are called by kernels alone are linked into these, and never become machine code of their own.
 
 Importing this imports Numba.
@@ -31,9 +33,11 @@ types: Any = import_module("numba.core.types")
 templates: Any = import_module("numba.core.typing.templates")
 compiler_lock: Any = import_module("numba.core.compiler_lock").global_compiler_lock
 
+LINKED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 OF_THE_CALLER = {"no_cpython_wrapper", "no_cfunc_wrapper", "release_gil"}
 UNNESTED = untyped_passes.InlineClosureLikes, untyped_passes.WithLifting
 """Steps that do nothing where no function is within another, nor objects of Python are used."""
+NEW_PASSES = hasattr(llvm, "create_new_function_pass_manager")
 
 _KNOWN: dict[Any, Any] = {}
 
@@ -76,12 +80,15 @@ class Typing:
 
 
 class Library(codegen.JITCodeLibrary):  # type: ignore[misc]
-    """Code of a kernel, optimised as a whole, once."""
+    """Code of a kernel, optimised as a whole, once; older versions of LLVM do as Numba says."""
 
     has_references = True
 
     def _optimize_functions(self, module: Any) -> None:
         """Only make variables of what lies on the stack: the rest of the work is done again for the whole."""
+        if not NEW_PASSES:
+            super()._optimize_functions(module)
+            return
         module.data_layout = self._codegen._data_layout
         builder = self._codegen._pass_builder()
         for function in module.functions:
@@ -93,7 +100,7 @@ class Library(codegen.JITCodeLibrary):  # type: ignore[misc]
                 steps.run(function, builder)
 
     def _optimize_final_module(self) -> None:
-        if self.has_references:
+        if self.has_references or not NEW_PASSES:
             super()._optimize_final_module()
         else:
             steps, builder = self._codegen._module_pass_manager()
@@ -171,7 +178,7 @@ def our_steps() -> Iterator[None]:
 
     def linked(self: Any) -> Any:
         jit = decorator(self)
-        return lambda **options: jit(**{**options, "pipeline_class": Pipeline, "no_cpython_wrapper": True})
+        return lambda **options: jit(**{**options, **LINKED, "pipeline_class": Pipeline})
 
     with compiler_lock:
         told, lock[:] = list(lock), []
@@ -199,7 +206,7 @@ class Pipeline(compiler.CompilerBase):  # type: ignore[misc]
         self.state.typingctx = Typing(typing, flags)
 
     def define_pipelines(self) -> list[Any]:
-        """Numba's, with other steps in places, and without those for functions within functions where there are none."""
+        """Numba's, some replaced, and without those for functions within functions where there are none."""
         steps = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state, "signedheat")
         left_out = () if any(map(iscode, self.state.func_id.code.co_consts)) else UNNESTED
         kept = [(step, about) for step, about in steps.passes if step not in left_out]

@@ -28,7 +28,6 @@ COMPARED = {
     operator.ne: "!=",
 }
 IN_PLACE = {operator.iadd: operator.add, operator.isub: operator.sub, operator.imul: operator.mul}
-FIELDS = "meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides"
 
 
 class Lower(lowering.Lower):  # type: ignore[misc]
@@ -89,42 +88,48 @@ class Lower(lowering.Lower):  # type: ignore[misc]
         """The value of a call."""
         value = super().lower_call(kind, expression)
         function = self.typeof(expression.func.name)
-        if isinstance(kind, types.RangeType) and getattr(function, "typing_key", None) is range:
-            given = [self._cast_var(one, kind.dtype) for one in expression.args]
-            zero, one = llvm.Constant(given[0].type, 0), llvm.Constant(given[0].type, 1)
-            if len(given) < 3:
-                start, stop = (zero, given[0]) if len(given) == 1 else given
-                self._ranges[id(value)] = start, stop, value
+        is_range = isinstance(kind, types.RangeType) and getattr(function, "typing_key", None) is range
+        if is_range and kind.dtype.signed and len(expression.args) < 3:
+            given = [self._cast_var(argument, kind.dtype) for argument in expression.args]
+            start, stop = given if len(given) == 2 else (llvm.Constant(given[0].type, 0), given[0])
+            self._ranges[id(value)] = start, stop, value
         return value
 
     def _of_range(self, op: str, expression: Any) -> Any:
         kind = self.typeof(expression.value.name)
-        builder = self.builder
+        value = self.loadvar(expression.value.name)
         if op == "getiter":
-            value = self.loadvar(expression.value.name)
-            if id(value) not in self._ranges:
+            known = self._ranges.get(id(value))
+            return None if known is None else self._begin(known, self.fndesc.calltypes[expression].return_type)
+        if op == "iternext":
+            if not isinstance(kind, types.RangeIteratorType):
                 return None
-            start, stop, _ = self._ranges[id(value)]
-            count = builder.sub(stop, start)
-            zero = llvm.Constant(count.type, 0)
-            count = builder.select(builder.icmp_signed(">", stop, start), count, zero)
-            places = [cgutils.alloca_once(builder, count.type) for _ in range(2)]
-            builder.store(start, places[0])
-            builder.store(count, places[1])
-            iterator = self.fndesc.calltypes[expression].return_type
-            return self._struct(iterator, iter=places[0], count=places[1], stop=stop, step=llvm.Constant(count.type, 1))
-        if op == "iternext" and isinstance(kind, types.RangeIteratorType):
-            iterator = self.loadvar(expression.value.name)
-            place, step, left = (self._field(iterator, kind, name) for name in ("iter", "step", "count"))
-            value, count = builder.load(place), builder.load(left)
-            is_valid = builder.icmp_signed(">", count, llvm.Constant(count.type, 0))
-            builder.store(builder.sub(count, llvm.Constant(count.type, 1), flags=["nsw"]), left)
-            builder.store(builder.add(value, step), place)
-            pair = self.context.get_constant_undef(self.fndesc.calltypes[expression].return_type)
-            return builder.insert_value(builder.insert_value(pair, value, 0), is_valid, 1)
-        if op.startswith("pair") and isinstance(kind, types.Pair) and not self.is_counted(kind):
-            return builder.extract_value(self.loadvar(expression.value.name), int(op == "pair_second"))
+            return self._next(value, kind, self.fndesc.calltypes[expression].return_type)
+        if isinstance(kind, types.Pair) and not self.is_counted(kind):
+            return self.builder.extract_value(value, int(op == "pair_second"))
         return None
+
+    def _begin(self, known: tuple[Any, Any, Any], kind: Any) -> Any:
+        """The iterator of a range whose steps are 1."""
+        start, stop, _ = known
+        builder = self.builder
+        is_any = builder.icmp_signed(">", stop, start)
+        count = builder.select(is_any, builder.sub(stop, start), llvm.Constant(stop.type, 0))
+        places = [cgutils.alloca_once(builder, count.type) for _ in range(2)]
+        builder.store(start, places[0])
+        builder.store(count, places[1])
+        return self._struct(kind, iter=places[0], count=places[1], stop=stop, step=llvm.Constant(count.type, 1))
+
+    def _next(self, iterator: Any, kind: Any, pair_kind: Any) -> Any:
+        """The next number of a range, and whether there is one."""
+        builder = self.builder
+        place, step, left = (self._field(iterator, kind, name) for name in ("iter", "step", "count"))
+        value, count = builder.load(place), builder.load(left)
+        is_valid = builder.icmp_signed(">", count, llvm.Constant(count.type, 0))
+        builder.store(builder.sub(count, llvm.Constant(count.type, 1), flags=["nsw"]), left)
+        builder.store(builder.add(value, step), place)
+        pair = self.context.get_constant_undef(pair_kind)
+        return builder.insert_value(builder.insert_value(pair, value, 0), is_valid, 1)
 
     def _field(self, value: Any, kind: Any, name: str) -> Any:
         model = self.context.data_model_manager[kind]
@@ -204,7 +209,10 @@ class Lower(lowering.Lower):  # type: ignore[misc]
         several = isinstance(asked[1], types.BaseTuple)
         parts = [self.builder.extract_value(value, k) for k in range(len(kinds))] if several else [value]
         whole = self.loadvar(variable.name)
-        steps = [self._wrapped(part, one, whole, array, axis) for axis, (part, one) in enumerate(zip(parts, kinds, strict=True))]
+        steps = [
+            self._wrapped(part, one, whole, array, axis)
+            for axis, (part, one) in enumerate(zip(parts, kinds, strict=True))
+        ]
         return whole, self._pointer(whole, array, steps), len(kinds)
 
     def _wrapped(self, index: Any, kind: Any, whole: Any, array: Any, axis: int) -> Any:
@@ -212,8 +220,9 @@ class Lower(lowering.Lower):  # type: ignore[misc]
         if not kind.signed:
             return self.context.cast(self.builder, index, kind, types.uintp)
         index = self.context.cast(self.builder, index, kind, types.intp)
-        if isinstance(index, llvm.Constant) and isinstance(index.constant, int) and index.constant >= 0:
-            return index
+        known = kind.literal_value if isinstance(kind, types.IntegerLiteral) else getattr(index, "constant", None)
+        if isinstance(known, int) and known >= 0:
+            return llvm.Constant(index.type, known)
         from_end = self.builder.add(index, self._size(whole, array, "shape", axis))
         is_negative = self.builder.icmp_signed("<", index, llvm.Constant(index.type, 0))
         return self.builder.select(is_negative, from_end, index)
