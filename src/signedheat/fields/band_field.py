@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING
@@ -19,10 +20,11 @@ from ..geometry.edge_flips import flipped_along_creases
 from ..operators.grid.block_contours import block_contour
 from ..operators.grid.blocks import NODES, SIDE, Blocks
 from ..operators.grid.exact_surface import ExactSurface
+from ..operators.grid.streamed_contours import contour_parts
 from ..parallel import in_chunks
 from .booleans import Combinable
 from .closest_points import ClosestPoints, closest_points
-from .files import save_field
+from .files import save_field, save_parts
 from .grid_field import GridField
 
 if TYPE_CHECKING:
@@ -209,21 +211,46 @@ class BandField(Displayed, Combinable):
         OutsideError
             If the level is not within the band, or φ does not take it.
         """
-        if abs(level) > self.width:
-            raise OutsideError(
-                f"level {level:g} lies outside the band, which reaches to {self.width:g}",
-                remedy=f"use a band of at least {abs(level):g}",
-                element=f"level {level:g}",
-            )
-        origin, spacing = self.grid.origin, self.grid.spacing
-        surface = self.surface
+        self._refuse_beyond(level)
+        vertices, faces = block_contour(self.blocks, self.values, self.grid.spacing, level, self._refined(level))
+        return TriangleMesh(vertices, faces if self.surface is None else flipped_along_creases(vertices, faces))
 
-        def refine(cells: NDArray[np.float64]) -> NDArray[np.float64]:
-            points = origin + cells * spacing
-            return points if surface is None else surface.on_level(points, _NodeValues(self), level)
+    def save_contour(self, path: str | PathLike[str], level: float = 0.0) -> tuple[int, int]:
+        """Write the level set φ = level to a file part by part: it may be larger than memory.
 
-        vertices, faces = block_contour(self.blocks, self.values, spacing, level, refine)
-        return TriangleMesh(vertices, faces if surface is None else flipped_along_creases(vertices, faces))
+        Parameters
+        ----------
+        path : str or path
+            A ``.ply`` file. An existing one survives a failure.
+        level : float
+            See `contour`. Creases are left as the cells cut them.
+
+        Returns
+        -------
+        vertices, faces : int
+            How many there are.
+
+        Raises
+        ------
+        OutsideError
+            As `contour`.
+        FileFormatError
+            If the file is of another kind, or cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> from signedheat import samples
+        >>> ball = sh.solid_distance(samples.sphere(4), spacing=0.02, band=0.1)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     vertices, faces = ball.save_contour(f"{folder}/ball.ply", 0.05)
+        >>> 2 * vertices - faces  # closed, without handles
+        4
+        """
+        self._refuse_beyond(level)
+        refined = self._refined(level)
+        return save_parts(contour_parts(self.blocks, self.values, self.grid.spacing, level, refined), path)
 
     def offset(self, distance: float) -> TriangleMesh:
         """The offset of the shape at a signed distance: `contour`, but refused if the grid is too small for it.
@@ -266,6 +293,24 @@ class BandField(Displayed, Combinable):
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format given by its extension: ``.npz`` or ``.vdb``."""
         save_field(self, path)
+
+    def _refuse_beyond(self, level: float) -> None:
+        if abs(level) > self.width:
+            raise OutsideError(
+                f"level {level:g} lies outside the band, which reaches to {self.width:g}",
+                remedy=f"use a band of at least {abs(level):g}",
+                element=f"level {level:g}",
+            )
+
+    def _refined(self, level: float) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+        """Places of points in cells, on the level exactly where the surface is known."""
+        values = _NodeValues(self)
+
+        def refine(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+            points = self.grid.origin + cells * self.grid.spacing
+            return points if self.surface is None else self.surface.on_level(points, values, level)
+
+        return refine
 
     def _values_of_chunk(self, places: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
         values = self._fine(places)

@@ -3,6 +3,7 @@
 from . import interop as _interop  # noqa: F401  provides the exchange with other packages
 from . import pyvista_objects as _pyvista_objects  # noqa: F401  provides objects of PyVista
 from . import samples as _samples  # noqa: F401  provides the writing of samples
+from . import streamed_meshes as _streamed_meshes  # noqa: F401  provides the writing of large contours
 from .bands import ensure_band_writable
 from .curves import CURVE_FORMATS, read_curves, write_curves
 from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field

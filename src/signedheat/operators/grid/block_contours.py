@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ measure = lazy_module("skimage.measure", "contours")
 
 WINDOW = 8
 """Blocks along each edge of a window."""
+BITS = 20
+"""Of the number of a node along an axis."""
 
 Refine = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -57,9 +59,33 @@ def block_contour(
     OutsideError
         If the values do not take the level.
     """
+    parts, triangles, count = [], [], 0
+    for _, points, cells in window_surfaces(blocks, values, spacing, level):
+        parts.append(points)
+        triangles.append(cells + count)
+        count += len(points)
+    if not parts:
+        raise no_level(level)
+    vertices, faces = merged(np.concatenate(parts), np.concatenate(triangles))
+    return (vertices if refine is None else refine(vertices)), faces
+
+
+def no_level(level: float) -> OutsideError:
+    """That the values do not take a level."""
+    return OutsideError(
+        f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"
+    )
+
+
+def window_surfaces(
+    blocks: Blocks, values: NDArray[np.float32], spacing: NDArray[np.float64], level: float
+) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]:
+    """The place of each window of `WINDOW` blocks through which the level set goes, in order, with that part of it.
+
+    Vertices are in cells from the first node of the grid, and those on walls between windows are in each of these.
+    """
     least = CLEARANCE * float(spacing.min())
     capped = _reaches_walls(blocks, values, level)
-    parts, triangles, count = [], [], 0
     for window in np.unique(blocks.places // WINDOW, axis=0).astype(np.int64):
         first = window * WINDOW * SIDE
         shape = np.full(3, WINDOW * SIDE + 1)
@@ -74,15 +100,7 @@ def block_contour(
         height[(height < 0) & (height > -least)] = -least
         found = _window_surface(height)
         if found is not None:
-            parts.append(found[0] + first)
-            triangles.append(found[1].astype(np.int64) + count)
-            count += len(found[0])
-    if not parts:
-        raise OutsideError(
-            f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"
-        )
-    vertices, faces = _merged(np.concatenate(parts), np.concatenate(triangles))
-    return (vertices if refine is None else refine(vertices)), faces
+            yield window, found[0] + first, found[1].astype(np.int64)
 
 
 def _window_surface(height: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
@@ -106,21 +124,25 @@ def _window_surface(height: NDArray[np.float32]) -> tuple[NDArray[np.float64], N
     return vertices.astype(np.float64), faces
 
 
-def _merged(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def merged(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices on the same edge of the grid as one. Those inside cells belong to one window anyway."""
-    base = np.floor(vertices)
-    fractions = vertices - base
-    crossed = fractions > 0
-    on_edge = crossed.sum(axis=1) == 1
-    axis = np.where(on_edge, crossed.argmax(axis=1), 3)
+    on_edge, keys = edges_of(vertices)
     own = np.where(on_edge, 0, np.arange(1, len(vertices) + 1))  # each of the others is itself alone
-    keys = np.concatenate([base.astype(np.int64), axis[:, None], own[:, None]], axis=1)
-    order = np.lexsort(keys.T)
+    order = np.lexsort((keys, own))
     new = np.ones(len(keys), dtype=bool)
-    new[1:] = (keys[order[1:]] != keys[order[:-1]]).any(axis=1)
+    new[1:] = (keys[order[1:]] != keys[order[:-1]]) | (own[order[1:]] != own[order[:-1]])
     number = np.empty(len(keys), dtype=np.int64)
     number[order] = np.cumsum(new) - 1
     return vertices[order[new]], number[faces]
+
+
+def edges_of(vertices: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """(n,) whether vertices, in cells, lie on edges of the grid, and numbers that those on the same edge share."""
+    base = np.floor(vertices)
+    crossed = vertices > base
+    on_edge = crossed.sum(axis=1) == 1
+    a, b, c = base.astype(np.int64).T + 1  # −1 beside walls
+    return on_edge, ((a << BITS | b) << BITS | c) * 4 + np.where(on_edge, crossed.argmax(axis=1), 3)
 
 
 def _reaches_walls(blocks: Blocks, values: NDArray[np.float32], level: float) -> bool:
