@@ -17,10 +17,10 @@ from ..errors import SourceError
 from ..lowering.area_elements import sample_on_grid
 from ..operators.grid.block_method import BlockSources, SomeNodes
 from ..operators.grid.blocks import SIDE, Blocks, block_points
-from .band_plan import BandPlan
+from .band_plan import ENDS, BandPlan
 from .sides import LEVEL, MIDDLE, SLOPE, doubt_beside
 
-FULL, NONE = 1.5, 2.5
+FULL, NONE = 1.5, ENDS
 """Coarse cells from faces up to which the fine solution counts in full, and from which on it does not at all."""
 APART = 0.75
 """Coarse cells by which fine and coarse may differ; twice that, and the coarse field has decided otherwise."""
@@ -47,7 +47,7 @@ def completed_function(
     doubtful: NDArray[np.bool_],
 ) -> None:
     """Replace the coarse function, in place, at doubtful nodes of blocks, (n, 512) each, near the ends of faces."""
-    active = _near_ends(plan, blocks) if doubtful.any() else np.zeros(len(blocks), dtype=bool)
+    active = _are_near_ends(plan, blocks.places) if doubtful.any() else np.zeros(len(blocks), dtype=bool)
     if not active.any():
         return
     fine = _fine_function(plan, SomeNodes.of_blocks(Blocks(blocks.places[active], blocks.shape)))
@@ -94,11 +94,15 @@ def _guarded(
     return result
 
 
-def _near_ends(plan: BandPlan, blocks: Blocks) -> NDArray[np.bool_]:
-    """Blocks around places where the surface ends."""
+def near_ends(plan: BandPlan, places: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Those of the blocks at (n, 3) places that the method is repeated in, around the ends of the surface."""
+    return places[_are_near_ends(plan, places)].astype(np.int64)
+
+
+def _are_near_ends(plan: BandPlan, places: NDArray[np.integer]) -> NDArray[np.bool_]:
     if plan.end_tree is None:
-        return np.zeros(len(blocks), dtype=bool)
-    centres = (blocks.places.astype(np.int64) * SIDE + 0.5 * (SIDE - 1)) * plan.steps
+        return np.zeros(len(places), dtype=bool)
+    centres = (places.astype(np.int64) * SIDE + 0.5 * (SIDE - 1)) * plan.steps
     within = NONE * plan.coarse_cell + 0.5 * float(np.linalg.norm((SIDE - 1) * plan.steps))
     return np.asarray(plan.end_tree.query(centres, distance_upper_bound=within)[0] <= within)
 

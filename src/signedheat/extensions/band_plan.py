@@ -32,6 +32,10 @@ RATIO = 4
 """Spacing of the coarse grid over that of the band, where nothing speaks against it."""
 FEWEST, MOST = 64, 257
 """Nodes of the coarse grid along its longest side: with fewer it misses what it must complete, with more it is slow."""
+SLACK = 0.75
+"""Coarse cells by which distance may be off between the nodes of the coarse field."""
+ENDS = 2.5
+"""Coarse cells from ends of the surface up to which the fine solution counts."""
 LEAST = 2.0
 """Cells that a band is wide on either side at least."""
 
@@ -156,23 +160,22 @@ class BandPlan:
 
     def is_open(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> bool:
         """Whether surface may have to be completed within reach of a box of blocks."""
-        if self.open_places is None:
+        return self._is_near(self.open_places, low, high, self.open_reach)
+
+    def has_ends(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> bool:
+        """Whether the surface ends so near to a box of blocks that the fine solution counts there."""
+        return self._is_near(self.end_tree, low, high, ENDS * self.coarse_cell)
+
+    def _is_near(
+        self, tree: scipy.spatial.cKDTree | None, low: NDArray[np.int64], high: NDArray[np.int64], reach: float
+    ) -> bool:
+        if tree is None:
             return False
         centre = 0.5 * (low + high) * SIDE * self.steps
         radius = 0.5 * float(np.linalg.norm((high - low) * SIDE * self.steps))
-        near = self.open_places.query_ball_point(centre, radius + self.open_reach + 2 * SIDE * self.cell)
-        places = self.open_places.data[near]
+        places = tree.data[tree.query_ball_point(centre, radius + reach + 2 * SIDE * self.cell)]
         excess = np.maximum(np.maximum(low * SIDE * self.steps - places, places - high * SIDE * self.steps), 0.0)
-        return bool((np.linalg.norm(excess, axis=1) <= self.open_reach + SIDE * self.cell).any())
-
-    def near_open(self, places: NDArray[np.int64], reach: float) -> NDArray[np.int64]:
-        """Those of the blocks at (n, 3) places that have nodes within a distance of open places."""
-        if self.open_places is None or not len(places):
-            return places[:0]
-        within = reach + 0.5 * float(np.linalg.norm((SIDE - 1) * self.steps))
-        centres = (places * SIDE + 0.5 * (SIDE - 1)) * self.steps
-        near: NDArray[np.bool_] = self.open_places.query(centres, distance_upper_bound=within)[0] <= within
-        return places[near]
+        return bool((np.linalg.norm(excess, axis=1) <= reach + SIDE * self.cell).any())
 
     @property
     def reach(self) -> float:
@@ -196,7 +199,12 @@ class BandPlan:
         if self.open_places is not None:
             rest = np.flatnonzero(~near)
             within = self.open_reach + radius
-            near[rest] = self.open_places.query(centres[rest], distance_upper_bound=within)[0] <= within
+            rest = rest[self.open_places.query(centres[rest], distance_upper_bound=within)[0] <= within]
+            height = np.abs(self.coarse_function(centres[rest]))
+            near[rest] = height <= self.reach + radius + SLACK * self.coarse_cell
+            if self.end_tree is not None:  # where the fine surface need not be where the coarse one is
+                rest = rest[~near[rest]]
+                near[rest] = self.end_tree.query(centres[rest], distance_upper_bound=within)[0] <= within
             walls = np.flatnonzero(~near & self.at_walls(places, size))
             near[walls] = self.coarse_function(centres[walls]) < self.reach + radius
         return places[near]

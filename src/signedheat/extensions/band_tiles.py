@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..geometry.nearest_faces import NearestFaces
 from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points, off_grid
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
-from .band_completion import NONE, completed_function, halo
+from .band_completion import NONE, completed_function, halo, near_ends
 from .band_plan import FAR, NEAR, BandPlan
 from .shape_sharpening import stands_in
 
@@ -70,10 +70,11 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     high = low + CUBE
     is_open = plan.is_open(low, high)
     reach = min(plan.reach / (SIDE * float(plan.steps.min())), float(max(plan.grid.shape)))
-    wide = max(2 + int(reach), halo(plan)) if is_open else 0
+    beside = 2 + int(reach) if is_open else 0  # whose crossings matter
+    wide = max(beside, halo(plan)) if is_open and plan.has_ends(low - beside, high + beside) else beside
     held = plan.blocks_in(low - wide, high + wide)
-    beside = ~((held >= low) & (held < high)).all(axis=1)  # these matter only where surface is missing
-    needed = np.concatenate([held[~beside], plan.near_open(held[beside], NONE * plan.coarse_cell)])
+    far = ~((held >= low - beside) & (held < high + beside)).all(axis=1)
+    needed = np.concatenate([held[~far], near_ends(plan, held[far])])
     blocks = Blocks.of(needed, plan.grid.shape)
     sides = _sides(plan, blocks)
     own = ((blocks.places >= low) & (blocks.places < high)).all(axis=1)
@@ -101,15 +102,18 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
     distances, function = np.full((n, NODES), np.inf), np.empty((n, NODES))
     doubtful, trusted = np.zeros((n, NODES), dtype=bool), np.ones((n, NODES), dtype=np.float16)
     at_ends = np.zeros((n, NODES), dtype=bool)
+    reached = _reached(plan, blocks)
     for begin in range(0, n, TOGETHER):
-        here = slice(begin, begin + TOGETHER)
-        points = block_points(blocks.places[here], plan.steps)
+        some = slice(begin, begin + TOGETHER)
+        points = block_points(blocks.places[some], plan.steps)
         coarse = plan.coarse_function(points)
-        if plan.faces is None:
-            function[here] = coarse.reshape(-1, NODES)
+        function[some] = coarse.reshape(-1, NODES)
+        here = begin + np.flatnonzero(reached[some])
+        if plan.faces is None or not len(here):
             continue
+        points = points.reshape(-1, NODES, 3)[here - begin].reshape(-1, 3)
         found = plan.faces.search(points)
-        signed, told = _told(plan, points, found, coarse)
+        signed, told = _told(plan, points, found, coarse.reshape(-1, NODES)[here - begin].ravel())
         distances[here] = found.distances.reshape(-1, NODES)
         function[here] = signed.reshape(-1, NODES)
         doubtful[here] = (~told & (plan.telling | plan.asked)[found.faces]).reshape(-1, NODES)
@@ -117,6 +121,16 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
         at_ends[here] = ~found.regular.reshape(-1, NODES)
     completed_function(plan, blocks, distances, function, doubtful)
     return _Sides(blocks, distances, function, trusted, at_ends)
+
+
+def _reached(plan: BandPlan, blocks: Blocks) -> NDArray[np.bool_]:
+    """Blocks with nodes for which faces may matter: in the middle of large holes all are too far away."""
+    if plan.faces is None:
+        return np.zeros(len(blocks), dtype=bool)
+    centres = (blocks.places.astype(np.int64) * SIDE + 0.5 * (SIDE - 1)) * plan.steps
+    radius = 0.5 * (SIDE - 1) * float(np.linalg.norm(plan.steps))
+    far = max(NONE, NEAR) * plan.coarse_cell + plan.reach + 2 * radius
+    return np.asarray(plan.faces.distances(centres) <= far)
 
 
 def _told(
@@ -192,7 +206,8 @@ def _completed(
     radius = 0.5 * (SIDE - 1) * float(np.linalg.norm(plan.steps))
     centres = (places.astype(np.int64) * SIDE + 0.5 * (SIDE - 1)) * plan.steps
     gap, _ = tree.query(centres)
-    rows = np.flatnonzero(gap - radius < np.minimum(distances.max(axis=1), plan.reach + 2 * radius))
+    in_band = np.minimum(gap - radius, distances.min(axis=1)) <= plan.reach  # the others are not kept
+    rows = np.flatnonzero(in_band & (gap - radius < distances.max(axis=1)))
     trusted = _trusted(plan, crossings)
     reach = float(np.linalg.norm(plan.steps))
     inner = np.linalg.norm(
