@@ -11,6 +11,7 @@ from refusals import refused
 from shapes.degenerate_meshes import stretched_square, with_caps, with_needles
 from shapes.surface_cases import band, book, flipped, sphere, square
 from signedheat.diagnostics import IntrinsicTriangles
+from signedheat.domains.common_subdivision import cut
 from signedheat.geometry.intrinsic.delaunay import flip_to_delaunay
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
 
@@ -405,3 +406,35 @@ def test_what_cannot_be_done_is_said():
     for face in -1, mesh.n_faces:
         with refused(sh.GeometryError, "point 0"):
             better.locate([face], [[1, 0, 0]])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_polygons_are_cut_along_all_chords(seed):
+    """Random chords that do not cross: the parts are joined along each of them, and have the sides of the polygon."""
+    random = np.random.default_rng(seed)
+    n, waiting, chords = 40, [list(range(40))], []
+    while waiting:
+        part = waiting.pop()
+        if len(part) > 3:
+            i, j = sorted(random.choice(len(part), 2, replace=False).tolist())
+            if 1 < j - i < len(part) - 1:
+                chords.append((part[i], part[j])[:: random.choice([-1, 1])])
+                waiting += [part[i : j + 1], part[j:] + part[: i + 1]]
+    chords = [chords[k] for k in random.permutation(len(chords))]
+    ignored = [(3, 4), (0, n - 1), chords[0], (5, 99)]
+    parts = cut(list(range(n)), chords + ignored)
+    sides = sorted((a, b) for part in parts for a, b in zip(part, part[1:] + part[:1], strict=True))
+    expected = [(k, (k + 1) % n) for k in range(n)] + [ends for a, b in chords for ends in ((a, b), (b, a))]
+    assert sides == sorted(expected)
+
+
+def test_cutting_takes_time_that_grows_with_the_chords():
+    n = 20_000
+    parts = cut(list(range(2 * n)), [(k, 2 * n - 1 - k) for k in range(1, n - 1)])
+    assert len(parts) == n - 1
+    assert {len(part) for part in parts} == {4}
+
+
+def test_of_chords_that_cross_the_shorter_is_taken():
+    parts = cut([7, 8, 9, 10, 11, 12], [(7, 10), (8, 11), (9, 11)])
+    assert sorted(map(sorted, parts)) == [[7, 8, 11, 12], [8, 9, 11], [9, 10, 11]]

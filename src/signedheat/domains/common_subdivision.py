@@ -104,16 +104,34 @@ def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], 
 
 
 def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
-    """Cut a convex polygon along chords between its corners, which must not cross each other."""
-    parts = [outline]
-    for a, b in chords:
-        for k, part in enumerate(parts):
-            if a in part and b in part:
-                i, j = sorted((part.index(a), part.index(b)))
-                if 1 < j - i < len(part) - 1:
-                    parts[k : k + 1] = [part[i : j + 1], part[j:] + part[: i + 1]]
-                break
-    return parts
+    """Cut a convex polygon along chords between its corners; of chords that cross each other, along the shorter.
+
+    Short chords come first, so that each cuts off what others have left between its ends: in linear time.
+    """
+    if not chords:
+        return [outline]
+    places = defaultdict(list)
+    for k, corner in enumerate(outline):
+        places[corner].append(k)
+    known = [(a, b) for a, b in chords if a in places and b in places]
+    known.sort(key=lambda ends: abs(places[ends[0]][0] - places[ends[1]][0]))
+    following = [*range(1, len(outline)), 0]
+    alive = [True] * len(outline)
+    parts, left = [], len(outline)
+    for chord in known:
+        ends = [next((k for k in places[corner] if alive[k]), -1) for corner in chord]
+        first, last = min(ends), max(ends)
+        if first < 0 or following[first] == last:
+            continue
+        part = [first]
+        while part[-1] != last:
+            part.append(following[part[-1]])
+        if len(part) < left:  # else it is a side of what is left
+            parts.append([outline[k] for k in part])
+            for k in part[1:-1]:
+                alive[k] = False
+            following[first], left = last, left - len(part) + 2
+    return [*parts, [corner for corner, is_left in zip(outline, alive, strict=True) if is_left]]
 
 
 def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> NDArray[np.float64]:

@@ -39,8 +39,7 @@ class _Depths:
         """Of a shape with faces."""
         assert not isinstance(merged.shape, PointCloud)
         mesh = merged.shape.triangulation
-        walls = merged.walls if mesh is merged.shape else np.zeros(mesh.n_faces, dtype=bool)
-        return cls(mesh, walls, WindingTree.of(mesh.vertices[mesh.faces]))
+        return cls(mesh, merged.walls_among_triangles(), WindingTree.of(mesh.vertices[mesh.faces]))
 
     def covered(self, faces: NDArray[np.int64], places: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(n,) whether places on faces lie inside other bodies."""

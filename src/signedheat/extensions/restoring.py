@@ -57,7 +57,10 @@ def restored(found: Orientation) -> Restored:
     if not len(faces):
         return as_found(found)
     mesh = TriangleMesh(shape.vertices, np.concatenate([shape.faces, faces]))
-    share = float(mesh.face_areas[-len(faces) :].sum() / mesh.face_areas.sum())
+    area = float(mesh.face_areas.sum())
+    if not 0.0 < area < np.inf:  # lengths whose squares leave the range: refused where distance is measured
+        return as_found(found)
+    share = float(mesh.face_areas[-len(faces) :].sum()) / area
     added = np.arange(mesh.n_faces) >= shape.n_faces
     return Restored(
         mesh,

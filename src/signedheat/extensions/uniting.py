@@ -91,7 +91,13 @@ class Merged:
         if union.origins is None:
             return replace(self, shape=union.shape)
         restored = None if self.restored is None else self.restored[union.origins]
-        return replace(self, shape=union.shape, walls=self.walls[union.origins], restored=restored)
+        return replace(self, shape=union.shape, walls=self.walls_among_triangles()[union.origins], restored=restored)
+
+    def walls_among_triangles(self) -> NDArray[np.bool_]:
+        """(t,) which triangles are faces of doubled walls: none of those of polygons."""
+        if isinstance(self.shape, PolygonMesh):
+            return np.zeros(self.shape.triangulation.n_faces, dtype=bool)
+        return self.walls
 
 
 def unite(shape: Shape | ForeignShape, domain: Grid | None = None, *, resolution: int = 128) -> Shape:
@@ -208,7 +214,7 @@ def without_covered(merged: Merged, winding: NDArray[np.float64], grid: Grid) ->
         covered = values_at(depth, (shape.points - grid.origin) / grid.spacing) > COVERED
         return _points_left(shape, covered)
     mesh = shape.triangulation
-    flags = merged.walls if mesh is shape else np.zeros(mesh.n_faces, dtype=bool)
+    flags = merged.walls_among_triangles()
     return what_is_left(merged, mesh, flags, *_cut_where_covered(mesh, flags, depth, grid))
 
 

@@ -101,7 +101,8 @@ class FaceBand:
         swap = np.abs(field[tuple(near.T)]) > np.abs(field[tuple(far.T)])
         nearer = np.where(swap[:, None], far, near)[:, 1:]
         feet: NDArray[np.int32] = self.nearest[tuple(nearer.T)]
-        return (feet < 0) | ends[self.faces[feet]] if len(ends) else feet < 0
+        outside: NDArray[np.bool_] = feet < 0
+        return outside | ends[self.faces[feet]] if len(ends) and not outside.all() else outside
 
     def search(self, features: FaceFeatures, points: NDArray[np.float64], steps: NDArray[np.float64]) -> NearestFaces:
         """Nearest face of each of (n, 3) points, among those near the nodes of its cell and one layer around; or −1."""
