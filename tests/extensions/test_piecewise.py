@@ -212,6 +212,7 @@ def test_intrinsic_triangulation_equals_the_mesh():
     )
     middle = sh.SurfacePoints(np.arange(mesh.n_faces), np.full((mesh.n_faces, 3), 1 / 3))
     assert np.abs(plain(middle) - intrinsic(middle)).max() < 1e-6
+    assert np.abs(plain.gradient(middle) - intrinsic.gradient(middle)).max() < 1e-4
     assert intrinsic.diagnostics.note(Jumps).cut_length == pytest.approx(plain.diagnostics.note(Jumps).cut_length)
     split = intrinsic.split()
     assert split.domain.n_vertices == plain.split().domain.n_vertices
@@ -240,6 +241,12 @@ def test_intrinsic_triangulation_of_a_bad_mesh(refine, tmp_path):
     assert 0.97 * 0.8 * np.pi < sum(cut.length for cut in phi.cut) < 1.3 * 0.8 * np.pi
     assert sum(cut.height * cut.length for cut in phi.cut) / (0.8 * np.pi) > 1.2 * np.pi - 0.5
     assert np.abs(phi(curve)).max() < mesh.edge_lengths.mean()
+    step = 1e-6 * np.array([-1.0, 0.5, 0.5])  # so short that hardly any leads into another triangle
+    here, there = (
+        sh.SurfacePoints(range(mesh.n_faces), np.full((mesh.n_faces, 3), 1 / 3) + s) for s in (0 * step, step)
+    )
+    risen = phi.gradient(here) * np.einsum("k,fkd->fd", step, mesh.vertices[mesh.faces])
+    assert np.median(np.abs(risen.sum(axis=1) - (phi(there) - phi(here)))) < 1e-10
     split = phi.split()  # flat, in space, cut open, with slope one
     assert split.domain.triangulation.face_areas.sum() == pytest.approx(mesh.face_areas.sum(), rel=1e-6)
     slope = np.linalg.norm(split.face_gradients, axis=1)

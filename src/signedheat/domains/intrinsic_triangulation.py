@@ -173,9 +173,15 @@ class IntrinsicTriangulation(Displayed, Frozen):
         self, values: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """(p, 3) gradients in space, at points given on the mesh, of a function linear on these triangles."""
+        return self.gradient_of_corners(values[self.faces], faces, barycentric)
+
+    def gradient_of_corners(
+        self, corners: NDArray[np.float64], faces: NDArray[np.int64], barycentric: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """The same of a function that may jump between these triangles, from its values (m, 3) at their corners."""
         sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(faces), 2, 3))
         found, _, moves = self._forward(faces, barycentric, sides)
-        rises = np.einsum("psk,pk->ps", moves, values[self.faces[found]])
+        rises = np.einsum("psk,pk->ps", moves, corners[found])
         return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[faces]]), rises)
 
     def _forward(

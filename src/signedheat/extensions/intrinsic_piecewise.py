@@ -32,12 +32,12 @@ class IntrinsicPiecewiseField(PiecewiseField):
         """Not defined in space, since intrinsic triangles bend over the edges of the mesh: raises `GeometryError`."""
         raise GeometryError(
             "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each",
-            remedy="use split().face_gradients",
+            remedy="use gradient(points), or split().face_gradients",
         )
 
     def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
-        """Not defined in space: raises the error of `face_gradients`."""
-        return self.face_gradients
+        """(n, 3) ∇φ in space at points of the mesh, in the triangles on which φ is linear."""
+        return self.domain.gradient_of_corners(self.values, points.faces, points.barycentric)
 
     def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
         """(n,) φ at points of the mesh."""
