@@ -134,16 +134,35 @@ def test_pieces_near_a_smooth_surface_turn_with_their_neighbours():
     assert right.mean() > 0.99
 
 
-def test_pieces_without_any_hint_are_left_to_whom_it_is_given():
-    soup = samples.soup(samples.sphere(4), jitter=0.002)
-    which = np.random.default_rng(2).random(soup.n_faces) < 0.5
+@pytest.mark.parametrize("name, jitter", [("sphere", 0.002), ("torus", 0.01), ("torus", 0.02)])
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_soups_that_face_either_way_are_oriented_from_scratch(name, jitter, share):
+    """Triangles that touch nothing and agree with nobody."""
+    soup = samples.soup(CLOSED[name], jitter=jitter)
+    which = np.random.default_rng(2).random(soup.n_faces) < share
+    right = sh.orientation(turned(soup, which)).turned == which
+    assert right.mean() > 0.99
 
-    def outward(points, vectors, areas):
-        np.testing.assert_allclose(np.linalg.norm(vectors, axis=1), areas)
-        return np.sign(np.einsum("ij,ij->i", points, vectors))
 
-    found = sh.orientation(turned(soup, which), outward)
+def test_loose_pieces_of_several_triangles_turn_as_one():
+    """The quadrilaterals of a torus, half of them turned, beside a ball that is whole."""
+    torus, pieces = samples.torus(), []
+    for k, faces in enumerate(torus.faces.reshape(-1, 2, 3)):
+        corners = torus.vertices[faces] + np.random.default_rng(k).normal(scale=0.003, size=3)
+        pieces.append(sh.TriangleMesh(corners.reshape(-1, 3), [[0, 1, 2], [3, 4, 5]]))
+    shape = samples.union(*pieces, samples.sphere(3, center=(3.0, 0, 0)))
+    which = np.zeros(shape.n_faces, dtype=bool)
+    which[: torus.n_faces] = np.repeat(np.random.default_rng(1).random(torus.n_faces // 2) < 0.5, 2)
+    found = sh.orientation(turned(shape, which))
     assert (found.turned == which).mean() > 0.99
+    assert (found.turned[: torus.n_faces : 2] == found.turned[1 : torus.n_faces : 2]).all()
+
+
+def test_leaves_that_enclose_nothing_stay_as_they_are():
+    rng = np.random.default_rng(0)
+    leaves = rng.normal(size=(400, 1, 3)) + 0.2 * rng.normal(size=(400, 3, 3))
+    found = sh.orientation(sh.TriangleMesh(leaves.reshape(-1, 3), np.arange(1200).reshape(-1, 3)))
+    assert found.turned_faces < 0.1 * len(leaves)
 
 
 @pytest.mark.parametrize("inside_out", [False, True])

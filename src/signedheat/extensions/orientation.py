@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -14,16 +13,14 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..frozen import Frozen
-from ..geometry.orientation_votes import votes
+from ..geometry.orientation_votes import imbalance, votes
 from ..geometry.part_orientation import PartOrientation, Parts, orient_parts
-from ..geometry.soup_orientation import disagreeing_with_neighbors, odds_at_corners
+from ..geometry.soup_orientation import agreement, disagreeing_with_neighbors, odds_at_corners
 from ..geometry.stabbing_lines import LineCrossings, aimed_lines, joined, stabbing_lines
 from ..geometry.surface_parts import SurfaceParts
 from ..reprs import ShortRepr
 from .mesh_faces import Mesh, MeshFaces
-
-SoupSigns = Callable[[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.integer]]
-"""Signs (n,) that orient pieces from their centroids (n, 3), area vectors up to sign (n, 3) and areas (n,)."""
+from .point_orientation import orient_triangles
 
 N_LINES = 30_000
 """Lines laid through a shape to see which way its parts face."""
@@ -35,10 +32,18 @@ FEW = 0.75
 """Logarithm of the odds from which parts turn that have but a hint: that all other parts must turn."""
 NEARLY_CLOSED = 0.8
 """Share of votes (see `LEAST_VOTE`) from which a doubled part is a solid drawn from both sides, no wall."""
-CONTESTED = 0.5
-"""Share of pieces with contradicting neighbours from which pieces are oriented from scratch."""
 SMALL = 0.03
 """Share of the area up to which a part that lines tell nothing of asks its neighbours."""
+SOUP = 0.1
+"""Share of the area of small loose parts from which a shape is a soup, in part."""
+UNEVEN = 0.04
+"""Imbalance of the lines through a soup from which on it is oriented from scratch."""
+MENDED = 0.96
+"""Share of that imbalance below which it must come by it; or it must not grow, and pieces must agree so much more:"""
+AGREEING = 1.8
+"""Ratio of the length of sums of area vectors of neighbours, after to before."""
+MOST = 200_000
+"""Loose parts up to which a soup is oriented from scratch: it takes half a minute."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,13 +119,15 @@ class Orientation(Frozen, ShortRepr):
         return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
 
 
-def orientation(shape: Mesh | ForeignShape, soup_signs: SoupSigns | None = None) -> Orientation:
+def orientation(shape: Mesh | ForeignShape) -> Orientation:
     """Orient a mesh, and tell what was turned, merged and left.
 
     Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Across edges of two faces
     orientation is carried on, and each part so found takes that of the most of its area. Lines laid through the whole
     shape then tell which way each part faces (`orient_parts`). Small pieces that touch other parts at corners face as
-    they do; of those that touch nothing, each turns only if its neighbours clearly disagree with it.
+    they do; of those that touch nothing, each turns only if its neighbours clearly disagree with it. Where most of the
+    shape is such pieces, and lines do not leave it as often as they enter it, points on them tell which way they face,
+    all together (`orient_triangles`): that is taken if lines find far fewer contradictions then.
 
     A part that is there twice, once facing each way, is a doubled wall: both its sides stay. If it is closed, or holes
     make up less than a ninth of its area, it is a solid drawn from both sides, and one side goes.
@@ -131,9 +138,6 @@ def orientation(shape: Mesh | ForeignShape, soup_signs: SoupSigns | None = None)
     ----------
     shape : TriangleMesh or PolygonMesh
         Any mesh, however broken.
-    soup_signs : callable, optional
-        Orients pieces that touch nothing where their own orientation is no hint, from centroids, area vectors up to
-        sign, and areas. By default such pieces stay as they are.
 
     Raises
     ------
@@ -161,15 +165,16 @@ def orientation(shape: Mesh | ForeignShape, soup_signs: SoupSigns | None = None)
     faces = MeshFaces.of(shape)
     surface = faces.surface
     lines, crossed = _crossings(faces)
-    walls = _doubled_walls(surface, lines, crossed)
+    walls = _doubled_walls(surface, lines, surface.orientation.parts[crossed])
     parts = _table(faces, walls)
     if walls.any():
-        lines, crossed = _without(lines, crossed, walls)
-    found = orient_parts(parts, lines, crossed)
+        lines, crossed = _without(lines, crossed, walls[surface.orientation.parts[crossed]])
+    found = orient_parts(parts, lines, surface.orientation.parts[crossed])
     undecided = surface.is_part & ~found.decided & ~parts.fixed
-    odds, undecided = _ask_neighbors(
-        faces, found.odds, undecided, surface.is_part & ~parts.closed & ~parts.fixed & (found.nested < 0)
+    small = (
+        surface.is_part & ~parts.closed & ~parts.fixed & (found.nested < 0) & (parts.areas <= SMALL * parts.areas.sum())
     )
+    odds, undecided = _ask_neighbors(faces, found.odds, undecided, small)
     wrong = odds < np.where(undecided, -FEW, 0.0)
     turned = surface.orientation.turned != wrong[surface.orientation.parts]
     alone = (
@@ -178,12 +183,17 @@ def orientation(shape: Mesh | ForeignShape, soup_signs: SoupSigns | None = None)
         & (parts.areas <= SMALL * parts.areas.sum())[surface.orientation.parts]
     )
     if alone.any():
-        turned = _orient_soup(faces, turned, alone, soup_signs)
+        wrong_here, _ = disagreeing_with_neighbors(
+            faces.centroids, faces.normals(turned) * surface.is_first[:, None], alone
+        )
+        turned = turned != wrong_here
+    if 0 < small.sum() <= MOST and parts.areas[small].sum() > SOUP * parts.areas.sum():
+        turned = _turned_together(faces, turned, small, lines, crossed)
     return _oriented(shape, surface, found, turned, wrong, walls, undecided)
 
 
 def _crossings(faces: MeshFaces) -> tuple[LineCrossings, NDArray[np.int64]]:
-    """Lines through first faces as they agree with their neighbours, and the parts they cross."""
+    """Lines through first faces as they agree with their neighbours, and the faces they cross."""
     surface = faces.surface
     parts, turned = surface.orientation.parts, surface.orientation.turned
     drawn = np.flatnonzero(surface.is_first[faces.triangle_faces])
@@ -195,7 +205,7 @@ def _crossings(faces: MeshFaces) -> tuple[LineCrossings, NDArray[np.int64]]:
         aims = _middles_of_largest(faces, missed)
         lines = joined(lines, aimed_lines(faces.positions, triangles, faces.bounds, aims))
     crossed = owners[lines.triangles]
-    return replace(lines, entering=lines.entering != turned[crossed]), parts[crossed]
+    return replace(lines, entering=lines.entering != turned[crossed]), crossed
 
 
 def _middles_of_largest(faces: MeshFaces, parts: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -239,10 +249,10 @@ def _table(faces: MeshFaces, walls: NDArray[np.bool_]) -> Parts:
 
 
 def _without(
-    lines: LineCrossings, crossed: NDArray[np.int64], parts: NDArray[np.bool_]
+    lines: LineCrossings, crossed: NDArray[np.int64], chosen: NDArray[np.bool_]
 ) -> tuple[LineCrossings, NDArray[np.int64]]:
-    """Crossings without those of some parts."""
-    kept = ~parts[crossed]
+    """Lines, and the faces they cross, without some crossings."""
+    kept = ~chosen
     counts = np.concatenate([[0], np.cumsum(kept)])
     return replace(
         lines,
@@ -259,8 +269,6 @@ def _ask_neighbors(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Odds of small parts with what they touch at corners, and the parts of which still nothing is known."""
     surface = faces.surface
-    areas = surface.part_sums(surface.areas)
-    small = small & (areas <= SMALL * areas.sum())
     if not small.any():
         return odds, undecided
     normals = faces.normals(surface.orientation.turned)[surface.owners]
@@ -268,18 +276,37 @@ def _ask_neighbors(
     return told, undecided & (np.abs(told - odds) < 1.0)
 
 
-def _orient_soup(
-    faces: MeshFaces, turned: NDArray[np.bool_], alone: NDArray[np.bool_], soup_signs: SoupSigns | None
+def _turned_together(
+    faces: MeshFaces,
+    turned: NDArray[np.bool_],
+    loose: NDArray[np.bool_],
+    lines: LineCrossings,
+    crossed: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Orient small pieces that touch nothing: as their neighbours are, or from scratch where those contradict."""
-    surface, normals = faces.surface, faces.normals(turned)
-    normals[~surface.is_first] = 0
-    wrong, contested = disagreeing_with_neighbors(faces.centroids, normals, alone)
-    if soup_signs is not None and contested > CONTESTED:
-        areas = surface.areas[alone]
-        wrong = np.zeros_like(wrong)
-        wrong[alone] = soup_signs(faces.centroids[alone], normals[alone] * areas[:, None], areas) < 0
-    return np.not_equal(turned, wrong)
+    """Turn loose parts as points on them tell together, if lines then enter the shape as often as they leave it."""
+    surface, agreeing = faces.surface, faces.surface.orientation.turned
+
+    def unevenness(turned: NDArray[np.bool_]) -> float:
+        return imbalance(lines.starts, lines.entering != (turned != agreeing)[crossed])
+
+    before = unevenness(turned)
+    if before < UNEVEN:
+        return turned
+    of_triangle = surface.orientation.parts[faces.triangle_faces]
+    chosen = np.flatnonzero((loose[of_triangle]) & surface.is_first[faces.triangle_faces])
+    corners = faces.positions[faces.triangles[chosen]]
+    backwards = agreeing[faces.triangle_faces[chosen]]
+    corners[backwards] = corners[backwards, ::-1]
+    flipped = np.zeros(surface.n_parts, dtype=bool)
+    flipped[of_triangle[chosen]] = orient_triangles(corners, groups=of_triangle[chosen]) < 0
+    together = np.where(loose[surface.orientation.parts], agreeing != flipped[surface.orientation.parts], turned)
+    after = unevenness(together)
+    if MENDED * before <= after <= before:
+        vectors = faces.normals(turned) * (surface.areas * surface.is_first)[:, None]
+        backwards = np.where(turned != together, -1.0, 1.0)[:, None]
+        gain = agreement(faces.centroids, vectors * backwards) / agreement(faces.centroids, vectors)
+        return together if gain > AGREEING else turned
+    return together if after < before else turned
 
 
 def _oriented(

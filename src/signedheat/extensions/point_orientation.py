@@ -148,7 +148,12 @@ def orient_axes(
     return signs[members]
 
 
-def orient_triangles(corners: NDArray[np.float64], given: bool = True, n_samples: int = 20_000) -> NDArray[np.float64]:
+def orient_triangles(
+    corners: NDArray[np.float64],
+    given: bool = True,
+    n_samples: int = 20_000,
+    groups: NDArray[np.int64] | None = None,
+) -> NDArray[np.float64]:
     """(m,) signs, −1 for triangles to turn round so that loose triangles, taken together, face outwards.
 
     Parameters
@@ -159,6 +164,8 @@ def orient_triangles(corners: NDArray[np.float64], given: bool = True, n_samples
         Whether the order of their corners is evidence: weak, and relative; if most are inverted, that is found out.
     n_samples : int
         Points that stand for the triangles, at least one for each, as many more as their areas ask for.
+    groups : (m,) int, optional
+        Triangles of the same group, which agree with each other, share one sign.
 
     Notes
     -----
@@ -185,7 +192,8 @@ def orient_triangles(corners: NDArray[np.float64], given: bool = True, n_samples
     order = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
     points = _spread(corners[solid][owners], order, counts[owners])
     axes = (vectors[solid] / areas[solid, None])[owners]
-    signs[solid[owners]] = orient_axes(points, axes, given, owners)
+    members = np.arange(len(corners)) if groups is None else groups
+    signs[solid[owners]] = orient_axes(points, axes, given, members[solid[owners]])
     return signs
 
 

@@ -175,3 +175,22 @@ def _containers(
                 stack[depth] = part
                 depth += 1
     return found
+
+
+def imbalance(starts: NDArray[np.int64], entering: NDArray[np.bool_]) -> float:
+    """Share of the crossings of lines that enter a shape without leaving it, or the other way round; 0 if it is closed.
+
+    Parameters
+    ----------
+    starts : (n_lines + 1,) int
+        Where the crossings of each line begin.
+    entering : (k,) bool
+        Whether the line comes from the side to which the normal points.
+
+    Examples
+    --------
+    >>> imbalance(np.array([0, 2, 4]), np.array([True, False, True, True]))
+    0.5
+    """
+    sums = np.concatenate([[0], np.cumsum(np.where(entering, 1, -1))])
+    return float(np.abs(np.diff(sums[starts])).sum() / max(len(entering), 1))

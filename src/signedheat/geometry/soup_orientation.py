@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 N_NEIGHBORS = 12
 """Neighbours of a piece that are asked."""
+N_AROUND = 24
+"""Neighbours of a piece, itself included, whose agreement is measured."""
 SMOOTH = 0.7
 """Mean square of the cosines between normals of neighbours from which they tell something; ⅓ if normals are random."""
 LEAST_AGREEMENT = 0.6
@@ -57,6 +59,20 @@ def odds_at_corners(
         odds[found] += AT_CORNERS * ballots[found] / cast[found]
         asking &= ~found
     return odds
+
+
+def agreement(centroids: NDArray[np.float64], vectors: NDArray[np.float64]) -> float:
+    """From about ⅕, where pieces face either way at random, to 1, where all face as those around them do.
+
+    The length of the sum of the area vectors of `N_AROUND` neighbours, over the sum of their lengths.
+    """
+    tree = scipy.spatial.cKDTree(centroids)
+    _, near = tree.query(centroids, k=min(N_AROUND, len(centroids)), workers=-1)
+    sums, lengths = np.zeros_like(vectors), np.zeros(len(vectors))
+    for column in near.reshape(len(centroids), -1).T:
+        sums += vectors[column]
+        lengths += np.linalg.norm(vectors[column], axis=1)
+    return float(np.linalg.norm(sums, axis=1).sum() / max(lengths.sum(), np.finfo(float).tiny))
 
 
 def disagreeing_with_neighbors(
