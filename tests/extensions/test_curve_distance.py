@@ -7,6 +7,7 @@ import pytest
 
 import signedheat as sh
 from shapes.domain_cases import ball, error, globe, sphere_points
+from shapes.surface_cases import book
 from shapes.surfaces import disk
 from signedheat.diagnostics import SharpenedToCurves
 from signedheat.samples import sphere, torus
@@ -151,3 +152,15 @@ def test_levels_of_their_own_are_refused():
     with pytest.raises(sh.ConstraintError) as caught:
         sh.curve_distance(mesh, curve, constraint=sh.EachComponent())
     assert caught.value.remedy
+
+
+@pytest.mark.parametrize("pages", [3, 5])
+def test_lines_that_meet_on_a_spine_are_never_turned(pages):
+    """No direction goes on from one page of a book to all others, so that the ends of three lines tell nothing."""
+    mesh = book(pages, 12)
+    height = mesh.vertices[:, 2] - 0.37 - 0.2 * np.hypot(*mesh.vertices[:, :2].T)
+    lines = mesh.level_set(height, 0.0)
+    assert len(lines) == pages
+    phi = sh.curve_distance(mesh, lines)
+    assert np.array_equal(np.sign(phi.values), np.sign(height))
+    assert np.allclose(phi.values, sh.curve_distance(mesh, lines, as_oriented=True).values, rtol=0, atol=1e-12)

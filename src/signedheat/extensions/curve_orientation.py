@@ -61,9 +61,9 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
     from its pairwise terms (`synchronize_signs`), to which every piece adds a weak vote for its own direction. Only
     ends count, so that curves that run beside each other hardly disturb, unless their gaps lie side by side.
 
-    Curves that are closed, those from boundary to boundary of the surface, unoriented curves and points stay as they
-    are. Pieces of different curves that are far
-    from each other have the direction that most of their length was given with.
+    Curves that are closed, those from boundary to boundary of the surface (nonmanifold edges count as boundary),
+    unoriented curves and points stay as they are. Pieces of different curves that are far from each other have the
+    direction that most of their length was given with.
 
     Takes one factorisation, and one solve for each piece.
 
@@ -165,12 +165,12 @@ def _charges(
     surface: SurfaceDiscretization, pieces: Sequence[CurveOrPoints]
 ) -> tuple[sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
     """(k, n) q: +1 where each piece ends, −1 where it begins, with its positive side to its left; (k,) lengths; and
-    (k,) how many of its ends lie on the boundary of the surface.
+    (k,) how many of its ends lie on the boundary of the surface, or on nonmanifold edges.
     """
     rows, lengths, outer = [], [], []
     at_boundary = np.zeros(surface.triangles.n_vertices, dtype=bool)
     edges = surface.triangles.edges
-    at_boundary[edges.vertices[edges.face_counts == 1]] = True
+    at_boundary[edges.vertices[edges.face_counts != 2]] = True  # across three faces no direction goes on to the others
     for piece in pieces:
         assert isinstance(piece, Curve)
         ((part,),) = surface.segments([[piece]])

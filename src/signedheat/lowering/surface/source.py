@@ -67,14 +67,17 @@ class SurfaceSource(Frozen):
 
     @cached_property
     def ending(self) -> NDArray[np.bool_]:
-        """(m,) faces of those connected parts of the surface in which an oriented curve ends, but at the boundary."""
+        """(m,) faces of those connected parts of the surface in which an oriented curve ends.
+
+        Ends at the boundary and at nonmanifold edges, where three curves may meet, do not count.
+        """
         triangles = self.triangles
         oriented = [part for part in self.parts if part.oriented]
         if not oriented:
             return np.zeros(triangles.n_faces, dtype=bool)
         nodes, ends = joined(oriented)
         free = nodes[np.flatnonzero(np.bincount(ends.ravel(), minlength=len(nodes)) % 2)]
-        rim = triangles.edges.face_counts == 1
+        rim = triangles.edges.face_counts != 2
         at_rim = np.zeros(triangles.n_vertices, dtype=bool)
         at_rim[triangles.edges.vertices[rim]] = True
         outer = ((free.kinds == VERTEX) & at_rim[free.elements % triangles.n_vertices]) | (
