@@ -41,7 +41,7 @@ def whole_and_broken(page: Page) -> None:
     for level in range(4):
         mesh = shapes.subdivided(base, level)
         heights = shapes.height(mesh.vertices, 1)
-        solver = sh.SignedHeatSolver(mesh, intrinsic=False)
+        solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
         whole = mesh.level_set(heights, 0.0)
         exact = sh.sharpen(solver.distance(whole)).values
         broken = solver.distance(shapes.pieces(mesh, heights, 0.5, 3)).values
@@ -119,7 +119,7 @@ def draw_planar_fields(page: Page) -> None:
     mesh = shapes.flat_square(5_000)
     star = [shapes.placed(mesh, shapes.star())]
     shown = {
-        "SHM": (sh.SignedHeatSolver(mesh, intrinsic=True).distance(star).restrict(), star),
+        "SHM": (sh.SignedHeatSolver(mesh, 1.0, intrinsic=True).distance(star).restrict(), star),
         "sh.curve_distance": (sh.curve_distance(mesh, star).restrict(), star),
     }
     page.draw(row_of_surfaces(shown, FROM_ABOVE))
@@ -134,7 +134,7 @@ def planar_errors(mesh: sh.TriangleMesh, lines: list[sh.Polyline], slow_ones: bo
     start = dict(zip(near.tolist(), distance[near].tolist(), strict=True))
 
     def heat() -> sh.VertexField[sh.TriangleMesh]:
-        return sh.SignedHeatSolver(mesh, intrinsic=True).distance(curves).restrict()
+        return sh.SignedHeatSolver(mesh, 1.0, intrinsic=True).distance(curves).restrict()
 
     ways: dict[str, Callable[[], Array]] = {
         "SHM": lambda: heat().values,
@@ -143,7 +143,7 @@ def planar_errors(mesh: sh.TriangleMesh, lines: list[sh.Polyline], slow_ones: bo
     }
     if slow_ones:
         ways["convex"] = lambda: (
-            sh.sharpen(sh.SignedHeatSolver(mesh, intrinsic=False).distance(curves), method=sh.Convex()).values
+            sh.sharpen(sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves), method=sh.Convex()).values
         )
         ways["fast marching"] = lambda: sign * baselines.fast_marching(mesh, start)
     cells = {}
@@ -254,7 +254,7 @@ def timings(page: Page) -> None:
         mesh = shapes.subdivided(shapes.organic(1, 700), level)
         heights = shapes.height(mesh.vertices, 1)
         curves = mesh.level_set(heights, 0.0)
-        solver = sh.SignedHeatSolver(mesh, intrinsic=False)
+        solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
         begin = time.process_time()
         solver.distance(curves)
         first = time.process_time() - begin

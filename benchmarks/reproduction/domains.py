@@ -38,7 +38,7 @@ def other_surfaces(page: Page) -> None:
     ring = np.sqrt(1 - height**2) * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + [0, 0, height]
     for k, (name, domain) in enumerate({"polygons": globe, "points": cloud, "voxels": voxels}.items()):
         curve = domain.polyline(ring, closed=True, max_distance=0.2)
-        field = sh.SignedHeatSolver(domain).distance(curve)
+        field = sh.SignedHeatSolver(domain, 1.0).distance(curve)
         positions = domain.points if name == "points" else domain.vertices
         unit = positions / np.linalg.norm(positions, axis=1, keepdims=True)
         exact = np.arcsin(height) - np.arcsin(np.clip(unit[:, 2], -1, 1))
@@ -64,7 +64,7 @@ def robust_domains(page: Page) -> None:
             given = field.values[field.domain.faces].ravel()
             values = np.bincount(corners, given) / np.bincount(corners)
         else:
-            field = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve)
+            field = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve)
             values = field.values
         known = np.isfinite(exact)
         values = values * np.sign(np.nanmedian((values * exact)[known]))

@@ -103,6 +103,7 @@ def write_chapter(folder: Path, numbers: Mapping[str, list[Row]], versions: str)
         "",
         f"`python benchmarks/paper.py` makes this page. Last run with {versions}.",
         "Errors ε are root mean squares over the domain in per cent of the range of the true distance, as in Sec. 9.1.",
+        "The diffusion time is one, t = h², as in the paper, where the text does not say otherwise.",
     ]
     for number, section in sorted(FIGURES.items(), key=lambda item: order(item[0])):
         lines += ["", f"## {heading(number)}: {section.title}", "", inspect.getdoc(section.make) or ""]

@@ -63,7 +63,7 @@ def mixed_sources(page: Page) -> None:
     )
     point = ball.points_at([int(np.argmax(ball.vertices @ [-0.2, -1, -0.3]))])
     sources = [*arcs, open_curve, point]
-    field = sh.SignedHeatSolver(ball, intrinsic=False).distance(sources)
+    field = sh.SignedHeatSolver(ball, 1.0, intrinsic=False).distance(sources)
     for name, items in (("arcs", arcs), ("open curve", [open_curve]), ("point", [point])):
         values = np.concatenate([np.atleast_1d(field(item)) for item in items])
         page.add(source=name, **{"mean |φ|": float(np.abs(values).mean()), "largest |φ|": float(np.abs(values).max())})
@@ -81,7 +81,7 @@ def level_set_constraints(page: Page) -> None:
     """
     mesh = shapes.flat_disk(3000)
     curves = [shapes.placed(mesh, circle(radius)) for radius in (0.6, 1.0, 1.5)]
-    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
+    solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
     picture = new_figure(15, 4.4)
     constraints = {"none": sh.Free(), "zero on all": sh.ZeroSet(), "constant on each": sh.EachComponent()}
     for k, (name, constraint) in enumerate(constraints.items()):
@@ -105,7 +105,7 @@ def soft_constraints(page: Page) -> None:
     t = np.linspace(0, 2 * np.pi, 160, endpoint=False)
     eight = sh.Polyline(np.stack([1.2 * np.sin(t), 0.75 * np.sin(2 * t)], axis=1), True)
     curve = shapes.placed(mesh, eight)
-    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
+    solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
     spacing = shapes.mean_edge(mesh)
     constraints = {"none": sh.Free(), "exact": sh.ZeroSet(hard=True), "default": sh.ZeroSet()}
     constraints["soft"] = sh.Soft(1 / spacing)
@@ -136,7 +136,7 @@ def curves_that_bound_nothing(page: Page) -> None:
     }
     picture = new_figure(15, 4.6)
     for k, (name, (mesh, curves)) in enumerate(cases.items()):
-        continuous = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curves, sh.Free())
+        continuous = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves, sh.Free())
         field = sh.piecewise_distance(mesh, curves, smoothing=1.0)
         slopes = [
             float(np.mean(np.abs(1 - np.linalg.norm(gradient, axis=1))))
@@ -165,7 +165,7 @@ def failing_gracefully(page: Page) -> None:
     """
     mesh = shapes.subdivided(shapes.organic(4, 700), 1)
     heights = shapes.height(mesh.vertices, 4)
-    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
+    solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
     whole = mesh.level_set(heights, 0.0)
     exact = sh.sharpen(solver.distance(whole)).values
     weights = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), mesh.n_vertices)
@@ -206,7 +206,7 @@ def drawn_on_higher_genus(page: Page) -> None:
     heights = shapes.height(mesh.vertices, 3)
     strokes = shapes.pieces(mesh, heights, 0.4, 5)
     closed = sh.close_curves(mesh, strokes)
-    solver = sh.SignedHeatSolver(mesh, intrinsic=False)
+    solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
     exact = sh.sharpen(solver.distance(mesh.level_set(heights, 0.0)))
     away = np.concatenate([np.abs(exact(curve)) for curve in closed])
     spacing = shapes.mean_edge(mesh)
@@ -233,8 +233,8 @@ def intrinsic_triangulations(page: Page) -> None:
         mesh, curve = sheared_square(1200, stretch)
         exact = np.linalg.norm(mesh.vertices[:, :2], axis=1) - 0.55
         fields = {
-            "as it is": sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, sh.Free()),
-            "refined": sh.SignedHeatSolver(mesh, intrinsic=True).distance(curve, sh.Free()),
+            "as it is": sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Free()),
+            "refined": sh.SignedHeatSolver(mesh, 1.0, intrinsic=True).distance(curve, sh.Free()),
         }
         errors = {f"{name} ε %": baselines.error(field.restrict().values, exact) for name, field in fields.items()}
         page.add(stretch=f"{stretch:g}", **errors)
