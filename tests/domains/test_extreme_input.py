@@ -206,6 +206,8 @@ def test_grids_whose_spacing_is_lost_in_rounding_are_refused(origin):
     with pytest.raises(sh.GeometryError) as caught:
         sh.Grid((0, origin, 0), 1.0, (4, 4, 4))
     assert caught.value.element == "spacing" and caught.value.remedy
+    with refused(sh.GeometryError, "spacing"):
+        sh.DigitalSurface(np.ones((2, 2, 2), dtype=bool), origin=(0, origin, 0))
     with pytest.raises(sh.GeometryError):
         sh.signed_distance(sh.TriangleMesh(BALL.vertices + origin, BALL.faces), resolution=16)
 
@@ -252,9 +254,8 @@ def test_convex_sharpening_on_tets_holds_sources_of_any_size(area):
 
 def test_voxels_whose_corners_fall_together_are_refused():
     volume = np.random.default_rng(0).random((4, 4, 4)) < 0.5
-    voxels = sh.DigitalSurface(volume, 1e-12, [1e6, 1e6, 1e6])
     with refused(sh.GeometryError, "spacing"):
-        sh.SignedHeatSolver(voxels).distance(voxels.points_at(0))
+        sh.DigitalSurface(volume, 1e-12, [1e6, 1e6, 1e6])
 
 
 @pytest.mark.parametrize("name", ["closed", "oriented"])

@@ -16,7 +16,7 @@ from .display import Displayed, to_pyvista
 from .polygon_mesh import PolygonMesh
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
-from .validation import array_of, finite_number, frozen, numbers, positive_steps, refuse_extreme
+from .validation import array_of, finite_number, frozen, numbers, positive_steps, refuse_extreme, refuse_lost_spacing
 
 if TYPE_CHECKING:
     import pyvista
@@ -89,6 +89,7 @@ class DigitalSurface(Displayed, Surface):
                 f"the origin of a volume must be 3 finite numbers, not {start.tolist()}", element="origin"
             )
         refuse_extreme(start, start + steps * array.shape, "voxels")
+        refuse_lost_spacing(steps, start, start + steps * array.shape)
         if radius is None:
             spans = [np.flatnonzero(solid.any(axis=tuple({0, 1, 2} - {axis}))) for axis in range(3)]
             extent = max(step * (span[-1] - span[0] + 1) for step, span in zip(steps, spans, strict=True))

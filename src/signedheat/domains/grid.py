@@ -22,14 +22,13 @@ from .validation import (
     numbers,
     positive_steps,
     refuse_extreme,
+    refuse_lost_spacing,
     whole_number,
     whole_numbers,
 )
 
 ROOM = 0.2
 """Share of its longest side by which a shape is padded on every side."""
-LEAST_STEP = 1e-13
-"""Of spacings, relative to coordinates: less would leave nodes few digits apart."""
 if TYPE_CHECKING:
     import pyvista
     from typing_extensions import TypeVar
@@ -112,12 +111,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         steps = positive_steps(spacing, "spacing", len(corner))
         last = corner + steps * (counts.astype(np.float64) - 1)
         refuse_extreme(np.minimum(corner, last), last, "nodes")
-        if (steps < LEAST_STEP * np.maximum(np.abs(corner), np.abs(last))).any():
-            raise GeometryError(
-                f"the spacing {steps.tolist()} is lost in the rounding of coordinates from {corner.tolist()} on",
-                remedy="move the shape to the origin, or choose a larger spacing",
-                element="spacing",
-            )
+        refuse_lost_spacing(steps, corner, last)
         object.__setattr__(self, "origin", frozen(corner))
         object.__setattr__(self, "spacing", steps)
         object.__setattr__(self, "shape", tuple(int(n) for n in counts))

@@ -18,6 +18,8 @@ LARGEST = 1e40
 """Of coordinates. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
 SMALLEST = 1e-40
 """Of the extent of a shape."""
+LEAST_STEP = 1e-13
+"""Of spacings, relative to coordinates: less would leave nodes few digits apart."""
 _MOST = 2**63
 
 
@@ -124,6 +126,16 @@ def refuse_extreme(
             f"{name} {what}, and lengths from {SMALLEST:g} to {LARGEST:g} can be computed with",
             remedy="scale and move the shape, for instance to a size of 1 around the origin",
             element=name,
+        )
+
+
+def refuse_lost_spacing(steps: NDArray[np.float64], first: NDArray[np.float64], last: NDArray[np.float64]) -> None:
+    """Refuse a lattice whose nodes are few digits apart."""
+    if (steps < LEAST_STEP * np.maximum(np.abs(first), np.abs(last))).any():
+        raise GeometryError(
+            f"the spacing {steps.tolist()} is lost in the rounding of coordinates from {first.tolist()} on",
+            remedy="move the shape to the origin, or choose a larger spacing",
+            element="spacing",
         )
 
 
