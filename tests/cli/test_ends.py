@@ -122,6 +122,13 @@ def test_signals_stop_with_one_line_whatever_becomes_of_them(ball, capsys, monke
     assert signal.getsignal(number) is before
 
 
+def test_what_other_packages_print_about_damaged_files_is_left_out(ball, tmp_path, capfd):
+    path = tmp_path / "cut.msh"
+    path.write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1 1 1\n3 1 0 1\n1\n0 0 0\n")
+    assert main(["info", str(path)]) == 1
+    assert_one_line(capfd.readouterr().err)
+
+
 def test_names_that_are_no_text(tmp_path):
     name = os.fsdecode(b"b\xe4ll.stl")
     done = run("info", name, cwd=tmp_path)

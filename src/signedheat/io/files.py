@@ -12,7 +12,8 @@ import secrets
 import stat
 import warnings
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stderr, suppress
+from io import StringIO
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -91,7 +92,7 @@ def parsed_by_others(parse: Callable[[], T], size: int) -> T:
         with np.errstate(all="ignore"):
             return parse()
 
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), redirect_stderr(StringIO()):  # to which meshio prints
         warnings.simplefilter("ignore")  # about files that are not closed, odd fields, and the like
         result: T = run_limited(quietly, 10.0 + size / 1e5)
     return result

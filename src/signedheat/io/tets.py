@@ -6,6 +6,8 @@ What meshio reads is parsed within a limit of time: on some damaged files it doe
 from __future__ import annotations
 
 import warnings
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +117,7 @@ def _store(mesh: Any, path: PathLike) -> None:
 
 
 def _write(module: Any, path: Path, mesh: Any) -> None:
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), redirect_stderr(StringIO()):
         warnings.simplefilter("ignore")
         module.write(str(path), mesh)
 
