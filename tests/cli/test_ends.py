@@ -129,6 +129,24 @@ def test_what_other_packages_print_about_damaged_files_is_left_out(ball, tmp_pat
     assert_one_line(capfd.readouterr().err)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["volume", "--transform", "x\0y"],
+        ["volume", "--transform", "/dev/zero"],
+        ["volume", "--transform", *["inf"] * 12],
+        ["sample", "--samples", "1" + "0" * 20],
+        ["sample", "--samples", "1" + "0" * 5000],
+        ["surface", "--contours", "1" + "0" * 20],
+    ],
+)
+def test_options_beyond_reason_are_refused_in_one_line(ball, tmp_path, capsys, options):
+    command, *given = options
+    curves = ["curves.txt"] if command == "surface" else []
+    assert main([command, str(ball), *curves, "-o", str(tmp_path / "a.npz"), "--quiet", *given]) in (1, 2)
+    assert_one_line(capsys.readouterr().err)
+
+
 def test_names_that_are_no_text(tmp_path):
     name = os.fsdecode(b"b\xe4ll.stl")
     done = run("info", name, cwd=tmp_path)

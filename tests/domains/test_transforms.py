@@ -53,3 +53,12 @@ def test_what_is_no_map_is_refused():
     for wrong in (np.eye(3), np.diag([1, 1, 0, 1]), np.diag([1, 1, 1, 2]), np.full((3, 4), np.nan)):
         with pytest.raises(sh.GeometryError):
             sh.transform(ball, wrong)
+
+
+@pytest.mark.parametrize("entry", [np.nan, np.inf, 1e60, 1e308, "a", None])
+def test_matrices_beyond_numbers_are_refused_without_a_warning(entry):
+    ball = samples.sphere(1)
+    with pytest.raises(sh.GeometryError):
+        sh.transform(ball, np.full((3, 4), entry))
+    with pytest.raises(sh.GeometryError):
+        sh.transform(ball, [[entry, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 from signedheat.extensions.sampling import WIDTHS, surface_triangles
 
@@ -141,3 +142,12 @@ def test_what_cannot_be_sampled_says_so(tmp_path, box):
     with pytest.raises(sh.FileFormatError):
         sh.sample(box, 10).save(tmp_path / "samples.txt")
     assert WIDTHS[0] ** 2 == pytest.approx(10 * WIDTHS[1] ** 2, rel=0.01)
+
+
+def test_numbers_of_samples_that_make_no_sense_or_do_not_fit_are_refused(box):
+    for n in (0, -3, 2.5, "many", None, np.nan, True):
+        with refused(sh.SignedHeatError, "the number of samples"):
+            sh.sample(box, n)
+    for n in (10**15, 10**30):
+        with pytest.raises(sh.MemoryLimitError):
+            sh.sample(box, n)

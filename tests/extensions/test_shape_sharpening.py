@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 import scipy
@@ -10,6 +12,7 @@ import signedheat as sh
 from refusals import refused
 from signedheat import samples
 from signedheat.diagnostics import SharpenedToShape
+from signedheat.extensions.shape_sharpening import confidence_at
 from signedheat.geometry.box_tree import BoxTree
 from signedheat.geometry.nearest import nearest_on_triangles
 
@@ -305,3 +308,17 @@ def test_thin_plates_of_loose_triangles_stay():
     field = sh.solid_distance(noisy, grid)
     truth = box_distance(grid.points, (1.0, 1.0, 0.03))
     assert root_mean_square(field.values - truth) < 0.03
+
+
+def test_shapes_whose_extent_is_lost_in_rounding_are_refused_without_a_warning():
+    """On a grid that is 1e20 times as large, all vertices lie in one place."""
+    holed = samples.without_faces(samples.sphere(2), 0.1)
+    with warnings.catch_warnings(), pytest.raises(sh.SignedHeatError):
+        warnings.simplefilter("error", RuntimeWarning)
+        sh.solid_distance(holed, sh.Grid.around(holed.bounds, 8, padding=1e20))
+
+
+def test_confidence_is_whole_at_a_shape_of_one_point():
+    place = np.ones((1, 3))
+    trust = confidence_at(np.array([[1.0, 1, 1], [2, 1, 1]]), [], [place])
+    assert trust.tolist() == [1.0, 0.0]

@@ -14,6 +14,7 @@ from ..domains.transforms import transform
 from ..errors import FileFormatError, SourceError
 from ..fields.grid_field import GridField
 from ..io import read, read_polylines
+from ..io.files import contents
 from ..io.labels import LabelImage, format_of, read_labels
 from ..io.three_mf import METRES, unit_of
 from ..lowering.area_elements import bounds_around
@@ -58,18 +59,12 @@ def placement(arguments: Namespace) -> NDArray[np.float64] | None:
 def matrix_of(words: list[str]) -> NDArray[np.float64]:
     """(4, 4) from 16 or 12 numbers, row by row, or from a text file that has them."""
     if len(words) == 1:
-        try:
-            with open(words[0], encoding="utf-8", errors="replace") as file:
-                words = file.read(10_000).replace(",", " ").split()
-        except OSError as error:
-            raise FileFormatError(
-                f"cannot be read ({error.strerror})", remedy="name a text file with 16 numbers", path=words[0]
-            ) from error
+        words = contents(words[0])[:10_000].decode("utf-8", "replace").replace(",", " ").split()
     try:
         numbers = np.array([float(word) for word in words])
     except ValueError:
         numbers = np.zeros(0)
-    if len(numbers) not in (12, 16):
+    if len(numbers) not in (12, 16) or not np.isfinite(numbers).all():
         raise SourceError(
             "a transform has 16 numbers, or 12 without the last row", element="--transform", remedy="give them by rows"
         )

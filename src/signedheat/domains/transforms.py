@@ -14,6 +14,7 @@ from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh
+from .validation import LARGEST, SMALLEST, numbers
 
 
 def transform(
@@ -46,15 +47,16 @@ def transform(
     >>> transform(mesh, np.diag([-1.0, 1, 1, 1])).faces.tolist()
     [[2, 1, 0]]
     """
-    whole = np.array(matrix, dtype=np.float64)
+    whole = numbers(matrix, "matrix")
     if whole.shape == (4, 4) and np.array_equal(whole[3], [0, 0, 0, 1]):
         whole = whole[:3]
-    if whole.shape != (3, 4) or not np.isfinite(whole).all():
+    if whole.shape != (3, 4) or not (np.abs(whole) <= LARGEST).all():
         raise GeometryError(
-            "a transform is a matrix of 4 × 4 finite numbers with the last row 0 0 0 1, or of 3 × 4",
+            f"a transform is a matrix of 4 × 4 numbers up to {LARGEST:g} with the last row 0 0 0 1, or of 3 × 4",
             element=f"matrix of shape {whole.shape}",
         )
-    if abs(np.linalg.det(whole[:, :3])) <= 1e-12 * np.linalg.norm(whole[:, :3]) ** 3:
+    linear = whole[:, :3] / max(float(np.abs(whole[:, :3]).max()), SMALLEST)
+    if abs(np.linalg.det(linear)) <= 1e-12 * np.linalg.norm(linear) ** 3:
         raise GeometryError("the transform flattens the shape", remedy="check the matrix", element="matrix")
     return _transformed(converted(shape), whole[:, :3], whole[:, 3])
 

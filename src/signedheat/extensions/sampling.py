@@ -10,17 +10,20 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.validation import finite_number
+from ..domains.validation import finite_number, whole_number
 from ..errors import OutsideError, SignedHeatError
 from ..fields.band_field import BandField
 from ..fields.closest_points import known_surface
 from ..fields.grid_field import GridField
+from ..memory import refuse_beyond_memory
 from ..operators.grid.exact_surface import ExactSurface
 from ..slots import Slot
 
 WIDTHS = (0.05, 0.0158)
 """Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
 
+BYTES_PER_SAMPLE = 200
+"""At the most, with what finding its nearest face takes."""
 BESIDE = 0.05
 """Cells from the rim of a hole beyond which its completion begins."""
 
@@ -147,6 +150,8 @@ def sample(
     ------
     SourceError
         If the field does not know its surface: it was read from a file, or not sharpened to a shape.
+    MemoryLimitError
+        If so many samples do not fit.
     SignedHeatError
         If n is not positive, the share not from 0 to 1, or a width negative.
 
@@ -159,8 +164,8 @@ def sample(
     >>> bool(np.quantile(away, 0.9) < 0.01 and away.max() < 0.1)
     True
     """
-    if n < 1:
-        raise SignedHeatError(f"the number of samples is {n}", remedy="take one or more")
+    n = whole_number(n, "the number of samples", 1, SignedHeatError)
+    refuse_beyond_memory(f"{n} samples", n, lambda k: BYTES_PER_SAMPLE * k, lambda k: f"take {k} at a time")
     if not 0 <= near <= 1:
         raise SignedHeatError(f"the share near the surface is {near:g}", remedy="choose it from 0 to 1")
     scales = [finite_number(width, "the width of the noise", least=0) for width in widths]

@@ -241,7 +241,7 @@ def confidence_at(
     distances = [tree.distances(points) for tree in trees]
     distances += [scipy.spatial.cKDTree(cloud).query(points, workers=-1)[0] for cloud in clouds]
     excess = np.maximum(np.min(distances, axis=0) - gap, 0.0)
-    return np.asarray(DOUBT * diagonal / (DOUBT * diagonal + excess), dtype=np.float32)
+    return _trust_at(excess, DOUBT * diagonal).astype(np.float32)
 
 
 def _trust_in_faces(
@@ -254,8 +254,13 @@ def _trust_in_faces(
     radii = areas / np.maximum(np.linalg.norm(sides, axis=2).sum(axis=1), np.finfo(float).tiny)
     doubt = DOUBT * float(np.linalg.norm(np.ptp(vertices[faces].reshape(-1, 3), axis=0)))
     trust = np.ones(len(faces), dtype=np.float32)
-    trust[restored] = np.minimum(doubt / (doubt + radii), np.nextafter(np.float32(1.0), np.float32(0.0)))
+    trust[restored] = np.minimum(_trust_at(radii, doubt), np.nextafter(np.float32(1.0), np.float32(0.0)))
     return trust
+
+
+def _trust_at(distances: NDArray[np.float64], doubt: float) -> NDArray[np.float64]:
+    """(n,) from 1 where distances are zero to 1/2 where they are `doubt`, which is zero for shapes of one point."""
+    return np.divide(doubt, doubt + distances, out=np.ones_like(distances), where=distances > 0)
 
 
 def joined_triangles(

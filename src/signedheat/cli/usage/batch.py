@@ -5,7 +5,16 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-from .options import add_command, add_method_options, add_room_options, add_step_options, finite, positive, whole_number
+from .options import (
+    MOST_WORKERS,
+    add_command,
+    add_method_options,
+    add_room_options,
+    add_step_options,
+    finite,
+    positive,
+    whole_number,
+)
 from .sample import add_sampling_options
 
 
@@ -45,8 +54,12 @@ def add_to(commands: Any) -> None:
     )
     wanted.add_argument("--info", action="store_true", help="counts and defects, in the manifest")
     running = parser.add_argument_group("running")
-    running.add_argument("--workers", type=whole_number(1), metavar="N", help="processes (one for each processor)")
-    running.add_argument("--threads", type=whole_number(1), default=1, metavar="N", help="threads of each process (1)")
+    running.add_argument(
+        "--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help="processes (one for each processor)"
+    )
+    running.add_argument(
+        "--threads", type=whole_number(1, MOST_WORKERS), default=1, metavar="N", help="threads of each process (1)"
+    )
     running.add_argument("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
     running.add_argument("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up")
     add_sampling_options(parser)

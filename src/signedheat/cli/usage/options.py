@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from ..streams import say, tell
 
+MOST_WORKERS = 1024
 PLANAR = (".csv", ".svg")
 """Extensions of files with polylines in the plane."""
 IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
@@ -140,7 +141,9 @@ def add_tile_options(parser: Parser) -> None:
         help="compute the band in tiles, which are kept in this folder: for bands larger than memory; the same command "
         "goes on where it was stopped",
     )
-    tiles.add_argument("--workers", type=whole_number(1), metavar="N", help="processes for them (threads of this one)")
+    tiles.add_argument(
+        "--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help="processes for them (threads of this one)"
+    )
     tiles.add_argument("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
 
 
@@ -231,12 +234,14 @@ def fraction(word: str) -> float:
     return value
 
 
-def whole_number(least: int) -> Callable[[str], int]:
-    """A function that parses a whole number of at least `least`."""
+def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
+    """A function that parses a whole number of at least `least`, and at most `most`."""
+    upper = "on" if most is None else f"to {most}"
 
     def parse(word: str) -> int:
-        if not re.fullmatch(r"[-+]?\d+", word) or int(word) < least:
-            raise argparse.ArgumentTypeError(f"'{word}' is no whole number from {least} on")
+        is_number = re.fullmatch(r"[-+]?\d{1,4000}", word)
+        if not is_number or int(word) < least or (most is not None and int(word) > most):
+            raise argparse.ArgumentTypeError(f"'{word}' is no whole number from {least} {upper}")
         return int(word)
 
     return parse

@@ -18,7 +18,10 @@ def add_to(commands: Any) -> None:
     )
     add_curves_and_output(parser, "field: .ply .vtp .obj .npz")
     parser.add_argument(
-        "--contours", type=whole_number(1), metavar="N", help="write N isolines beside the output, as OUT.contours.obj"
+        "--contours",
+        type=whole_number(1, 1000),
+        metavar="N",
+        help="write N isolines beside the output, as OUT.contours.obj",
     )
     parser.add_argument(
         "--subdivide",
