@@ -65,7 +65,7 @@ class SurfaceDiscretization:
     spacing: float = math.nan
     notes: tuple[Note, ...] = ()
     _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(TIMES), init=False, repr=False)
-    _like: list[Factor] = field(default_factory=list, init=False, repr=False)
+    _like: LastUsed[None, list[Factor]] = field(default_factory=LastUsed, init=False, repr=False)
     _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -142,7 +142,7 @@ class SurfaceDiscretization:
 
     def _vector_heat(self, time: float) -> VectorHeat:
         order = self.triangles.edges.elimination_order(self.vertex_order)
-        return VectorHeat(self.triangles, time, order, self._like)
+        return VectorHeat(self.triangles, time, order, self._like(None, list))
 
     def to_cells(self, stages: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
         """(m,) three times the mean of X over the edges of each face (Sec. 6), in its layout.
