@@ -194,6 +194,8 @@ def surface_triangles(
     """(m, 3, 3) triangles that cover the surface of a field once, and which of them only stand in for missing faces."""
     faces = surface.features.corners.reshape(-1, 3, 3) + surface.origin
     restored = surface.features.trusted < 1.0
+    if len(faces) and not len(surface.crossings) and (surface.features.across >= 0).all():  # nothing is missing
+        return faces, restored
     try:
         contour = cast("GridField[Literal[3]] | BandField", field).contour(
             0.0
