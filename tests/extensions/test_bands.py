@@ -1,12 +1,16 @@
+import re
+
 import numpy as np
 import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 import signedheat as sh
+from refusals import refused
 from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold, sphere, torus
 from signedheat import samples
+from signedheat.extensions import band_memory, bands
 from signedheat.extensions.bands import band_around
 
 
@@ -206,3 +210,22 @@ def test_many_points_get_the_values_of_few(holed_band):
     some = np.r_[0:50, 65_500:65_600]
     np.testing.assert_array_equal(holed_band(points)[some], holed_band(points[some]))
     np.testing.assert_array_equal(holed_band.gradient(points)[some], holed_band.gradient(points[some]))
+
+
+def test_a_band_beyond_memory_is_refused_with_a_spacing_that_fits(monkeypatch):
+    class ReachedError(Exception):
+        pass
+
+    def reached(*_):
+        raise ReachedError
+
+    monkeypatch.setattr(band_memory, "available_memory", lambda: 250_000_000)
+    monkeypatch.setattr(band_memory, "libraries", lambda: 0)
+    monkeypatch.setattr(bands, "in_threads", reached)
+    ball = sphere(2000)
+    with refused(sh.MemoryLimitError) as caught:
+        sh.solid_distance(ball, spacing=0.0025, band=0.01)
+    spacing = float(re.search(r"spacing of ([0-9.e-]+)", caught.value.remedy).group(1))
+    assert 0.0025 < spacing < 0.005
+    with pytest.raises(ReachedError):
+        sh.solid_distance(ball, spacing=spacing, band=0.01)

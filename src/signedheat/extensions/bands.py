@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +14,12 @@ from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
+from ..memory import paged
 from ..operators.grid.blocks import Blocks
 from ..operators.grid.exact_surface import ExactSurface
 from ..parallel import n_threads
 from ..progress import Progress
+from .band_memory import refuse_band_beyond_memory
 from .band_plan import BandPlan, plan_band
 from .band_tiles import Tile, solve_tile
 
@@ -38,12 +42,18 @@ def band_around(coarse: GridField, grid: Grid, band: float, progress: Progress |
     -------
     BandField
         With the notes of the coarse field.
+
+    Raises
+    ------
+    MemoryLimitError
+        If the band cannot fit in memory; none of it has been computed then.
     """
     plan = plan_band(coarse, grid, band)
+    refuse_band_beyond_memory(plan)
     tiles = plan.tiles
     results: list[Tile] = []
     for tile in in_threads(lambda place: solve_tile(plan, place), tiles):
-        results.append(tile)
+        results.append(replace(tile, values=paged(tile.values), confidence=paged(tile.confidence)))
         if progress is not None:
             progress(len(results) / len(tiles), "band")
     return joined(plan, results, coarse.diagnostics)
@@ -52,26 +62,27 @@ def band_around(coarse: GridField, grid: Grid, band: float, progress: Progress |
 def in_threads(solve: Callable[[NDArray[np.int64]], Tile], places: Iterable[NDArray[np.int64]]) -> Iterator[Tile]:
     """Tiles, in order, of which as many are computed at a time as there are processors."""
     with ThreadPoolExecutor(n_threads()) as pool:
-        jobs = [pool.submit(solve, place) for place in places]
+        jobs = deque(pool.submit(solve, place) for place in places)
         try:
-            for job in jobs:
-                yield job.result()
+            while jobs:
+                yield jobs.popleft().result()  # a job that is kept keeps its tile
         finally:
             for job in jobs:
                 job.cancel()
 
 
 def joined(plan: BandPlan, tiles: list[Tile], diagnostics: Diagnostics) -> BandField:
-    """The field that tiles, in any order, make together."""
+    """The field that tiles, in any order, make together; their list is emptied, lest all is there twice."""
     places = np.concatenate([tile.places for tile in tiles])
     blocks = Blocks.of(places, plan.grid.shape)
     values = np.empty((len(places), *tiles[0].values.shape[1:]), dtype=np.float32)
     confidence = np.empty(values.shape, dtype=np.float16)
-    for tile in tiles:
+    crossings = np.concatenate([tile.crossings for tile in tiles])
+    while tiles:
+        tile = tiles.pop()
         rows = blocks.rows(tile.places)
         values[rows] = tile.values
         confidence[rows] = tile.confidence
     telling = plan.telling if not plan.telling.all() else None
-    crossings = np.concatenate([tile.crossings for tile in tiles])
     surface = ExactSurface(plan.features, crossings, np.array(plan.grid.origin), np.array(plan.steps), telling)
     return BandField(plan.grid, blocks, values, plan.coarse, plan.width, diagnostics, confidence, surface)

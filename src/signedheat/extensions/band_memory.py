@@ -1,0 +1,85 @@
+"""What a band takes in memory, before any of it is computed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MemoryLimitError
+from ..memory import available_memory, libraries
+from ..operators.grid.blocks import CUBE, NODES, SIDE
+from ..parallel import n_threads
+from .band_completion import halo, near_ends
+from .band_plan import BandPlan
+
+LOOKED_AT = 24
+"""Tiles of which blocks are counted, at most."""
+KEPT = 0.7
+"""Share of the blocks counted that have nodes in the band."""
+BYTES, BYTES_AT_WORK, BYTES_SOLVED = 6, 30, 200
+"""Measured: of each node of a band; of a node of a tile that is computed; and of one where the method is repeated."""
+
+ROOM = 1.1
+"""By how much the spacing that is told to fit is larger than it must be."""
+LEAST = 0.01
+"""Share of the values that is taken to fit where even less would not."""
+FIXED = 75_000_000
+"""Bytes that trees of faces and threads take besides."""
+
+
+def memory_of_band(plan: BandPlan) -> tuple[int, int]:
+    """Estimated bytes that a band takes beside what is there already: for its values, and at work on its tiles.
+
+    Blocks are counted in some of the tiles.
+    """
+    tiles = plan.tiles
+    if not len(tiles):
+        return 0, 0
+    some = tiles[np.unique(np.linspace(0, len(tiles) - 1, LOOKED_AT).astype(np.int64))]
+    counts = [_blocks_of(plan, tile) for tile in some]
+    held = np.mean([own for own, _, _ in counts]) * len(tiles)
+    at_work = max(around * BYTES_AT_WORK + solved * BYTES_SOLVED for _, around, solved in counts)
+    return int(NODES * KEPT * held * BYTES), int(FIXED + NODES * n_threads() * at_work)
+
+
+def refuse_band_beyond_memory(plan: BandPlan) -> None:
+    """Raise `MemoryLimitError` if a band will not fit, and tell the spacing at which it would."""
+    available = available_memory()
+    values, at_work = memory_of_band(plan)
+    needed = values + at_work + libraries()
+    if available is None or needed <= available:
+        return
+    spacing, width = float(plan.steps.min()), plan.width
+    share = max((available - at_work - libraries()) / values, LEAST)
+    fitting = ROOM * _fitting_spacing(spacing, width, share)
+    raise MemoryLimitError(
+        f"the band needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
+        remedy=f"use a spacing of {fitting:.2g} or more, or let tiled_distance keep it on disk (--tiles)",
+    )
+
+
+def _blocks_of(plan: BandPlan, tile: NDArray[np.integer]) -> tuple[int, int, int]:
+    """Number of blocks of a tile, of those that are computed for it, and of those where the method is repeated."""
+    low = np.asarray(tile, dtype=np.int64) * CUBE
+    high = low + CUBE
+    own = plan.blocks_in(low, high)
+    if not plan.is_open(low, high):
+        return len(own), len(own), 0
+    wide = halo(plan)
+    held = plan.blocks_in(low - wide, high + wide)
+    return len(own), len(held), len(near_ends(plan, held))
+
+
+def _fitting_spacing(spacing: float, width: float, share: float) -> float:
+    """The least spacing with that share of the nodes, of which there are 2 (b / h + 6) / h² for a piece of surface."""
+
+    def nodes(h: float) -> float:
+        return (width / h + 0.75 * SIDE) / h**2
+
+    low, high = spacing, spacing
+    while nodes(high) > share * nodes(spacing):
+        high *= 2.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if nodes(middle) <= share * nodes(spacing) else (middle, high)
+    return high
