@@ -134,8 +134,7 @@ def test_pieces_near_a_smooth_surface_turn_with_their_neighbours():
     assert right.mean() > 0.99
 
 
-@pytest.mark.parametrize("name, jitter", [("sphere", 0.002), ("torus", 0.01), ("torus", 0.02)])
-@pytest.mark.parametrize("share", [0.3, 0.5])
+@pytest.mark.parametrize("name, jitter, share", [("sphere", 0.002, 0.5), ("torus", 0.01, 0.3), ("torus", 0.02, 0.5)])
 def test_soups_that_face_either_way_are_oriented_from_scratch(name, jitter, share):
     """Triangles that touch nothing and agree with nobody."""
     soup = samples.soup(CLOSED[name], jitter=jitter)

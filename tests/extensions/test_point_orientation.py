@@ -196,3 +196,18 @@ def test_distance_to_points_without_normals_is_that_with_them():
         for cloud in (truth, orient_points(sh.PointCloud(truth.points)).cloud)
     ]
     assert errors[1] < 1.15 * errors[0]
+
+
+def test_few_points_keep_the_normals_that_they_are_given():
+    """Where a thin part's other side is as near as the next point, those that gave normals know better."""
+    assert orient_points(samples.oriented_points(samples.duck(40), 200)).n_turned == 0
+    assert orient_points(samples.oriented_points(samples.torus(1.0, 0.12), 300, seed=1)).n_turned == 0
+
+
+def test_far_between_points_nothing_is_missing():
+    """300 points on a ball, ten cells apart: its inside is solid, and it was taken for sheets."""
+    cloud = samples.oriented_points(samples.sphere(5), 300)
+    field = sh.solid_distance(cloud, resolution=96)
+    truth = np.linalg.norm(field.grid.points, axis=-1) - 1.0
+    assert np.sqrt(np.mean((field.values - truth) ** 2)) < 0.02
+    assert field.diagnostics.note(sh.diagnostics.BoundsNothing) is None

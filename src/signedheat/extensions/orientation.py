@@ -38,7 +38,7 @@ SOUP = 0.1
 """Share of the area of small loose parts from which a shape is a soup, in part."""
 UNEVEN = 0.04
 """Imbalance of the lines through a soup from which on it is oriented from scratch."""
-MENDED = 0.96
+MENDED = 0.9
 """Share of that imbalance below which it must come by it; or it must not grow, and pieces must agree so much more:"""
 AGREEING = 1.8
 """Ratio of the length of sums of area vectors of neighbours, after to before."""

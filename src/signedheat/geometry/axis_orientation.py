@@ -19,8 +19,8 @@ MOST = 100_000
 """Points for which tets are made; the others follow their neighbours."""
 GIVEN_WEIGHT = 0.1
 """Weight of given signs, beside half of all that balls and neighbours tell about a point."""
-
-
+DOUBTFUL = 3.0
+"""Share of given signs that seem wrong, over that in which points contradict each other, up to which they stay."""
 WORSE = 0.0015
 """Coherence by which larger neighbourhoods must gain, and which, once lost, no larger ones win back."""
 
@@ -73,7 +73,7 @@ def outward_signs(
         Unit normals, up to sign.
     given : bool
         Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out.
-        They stay, or are all inverted, where no more of them seem wrong than points contradict each other.
+        They stay, or are all inverted, where hardly more of them seem wrong than points contradict each other.
     groups : (n,) int, optional
         Points of the same group, counted from 0, share one sign.
     """
@@ -101,7 +101,7 @@ def outward_signs(
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
     agreed = float((weights * found[tails] * found[heads]).sum()) / max(float(np.abs(weights).sum()), 1e-300)
     signs = signs if groups is None else _shared(signs, groups)
-    if given and min((signs < 0).mean(), (signs > 0).mean()) <= 1 - agreed:  # no more than what is contradicted anyway
+    if given and min((signs < 0).mean(), (signs > 0).mean()) <= DOUBTFUL * (1 - agreed):
         signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
     return OutwardSigns(signs, sided, agreed)
 

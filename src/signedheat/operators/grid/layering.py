@@ -30,10 +30,12 @@ BLOCK = 2
 """Cells along each side of the blocks in which probes are counted; blocks count with those around them."""
 LAYERED = 0.03
 """Mean gap between layers, in cells, from which on a place is layered."""
-CENTRED = 0.15
+CENTRED = 0.3
 """Ratio of the mean of φ at faces to that gap, below which φ = 0 is taken to run in the middle of layers."""
+SCATTERED = 0.15
+"""The same, of scattered corners."""
 APART = 0.15
-"""Mean gap between layers, in cells, from which on φ = 0 is the better surface in any case."""
+"""Mean gap between layers, in cells, from which on φ = 0 is the better surface in any case; less scatter is none."""
 
 
 def layered_faces(
@@ -60,8 +62,8 @@ def layered_faces(
     shape = tuple(-(-n // BLOCK) for n in phi.shape)
     gap = _around(blocks[samples], shape, gaps)[tuple(blocks.T)]
     mean = _around(blocks, shape, heights)[tuple(blocks.T)] / float(steps.min())
-    wide = np.maximum(gap, np.where(scatter > APART, scatter, 0.0)[band.faces])
-    chosen = (gap > APART) | ((wide > LAYERED) & (np.abs(mean) < CENTRED * wide))
+    wide = np.where(scatter > APART, scatter, 0.0)[band.faces]
+    chosen = (gap > APART) | ((gap > LAYERED) & (np.abs(mean) < CENTRED * gap)) | (np.abs(mean) < SCATTERED * wide)
     table = _around(blocks, shape, chosen.astype(np.float64), 5)  # by vote, lest single faces remain
     chosen = table[tuple(blocks.T)] > 0.5
     counts = np.bincount(band.faces, minlength=len(layered))
