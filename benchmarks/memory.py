@@ -17,7 +17,7 @@ from signedheat import samples
 from signedheat.geometry.surfels import count_surfels
 from signedheat.lowering.surface.digital_surfaces import BYTES_PER_VOXEL
 from signedheat.lowering.surface.memory import memory_estimate as surface_estimate
-from signedheat.lowering.surface.point_clouds import NEIGHBORS
+from signedheat.lowering.surface.point_clouds import BYTES_PER_POINT, NEIGHBORS
 from signedheat.lowering.tets.discretization import memory_estimate as tet_estimate
 from signedheat.memory import libraries
 
@@ -55,7 +55,8 @@ def case(kind: str, size: int) -> tuple[object, object, float]:
         k = np.arange(size) + 0.5
         polar, azimuth = np.arccos(1 - 2 * k / size), np.pi * (1 + 5**0.5) * k
         rows = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
-        return sh.PointCloud(np.stack(rows, -1)), [0, size // 2], surface_estimate(2 * size) + NEIGHBORS
+        beside = NEIGHBORS + BYTES_PER_POINT * size
+        return sh.PointCloud(np.stack(rows, -1)), [0, size // 2], surface_estimate(2 * size) + beside
     if kind == "voxels":
         along = (np.arange(size) - size / 2 + 0.5) ** 2
         volume = along[:, None, None] + along[:, None] + along < (0.45 * size) ** 2

@@ -12,8 +12,8 @@ from ...domains.point_cloud import PointCloud
 from .discretization import SurfaceDiscretization
 from .memory import refuse_too_many
 
-NEIGHBORS = 40_000_000
-"""Bytes of the libraries that find neighbours. Measured."""
+NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
+"""Bytes of the libraries that find neighbours, and of neighbours, beside those of triangles. Measured."""
 
 
 @discretize.register
@@ -22,7 +22,9 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
 
     h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
     """
-    refuse_too_many(2 * domain.n_points, domain.n_points, "points", beside=NEIGHBORS)
+    refuse_too_many(
+        2 * domain.n_points, domain.n_points, "points", beside=NEIGHBORS + BYTES_PER_POINT * domain.n_points
+    )
     mesh = domain.triangulation
     used = np.zeros(domain.n_points, dtype=bool)
     used[mesh.faces] = True
