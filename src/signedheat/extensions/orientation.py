@@ -188,7 +188,9 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
         )
         turned = turned != wrong_here
     if 0 < small.sum() <= MOST and parts.areas[small].sum() > SOUP * parts.areas.sum():
-        turned = _turned_together(faces, turned, small, lines, crossed)
+        together = _turned_together(faces, turned, small, lines, crossed)
+        if together is not None:
+            turned, undecided = together, undecided & ~small
     return _oriented(shape, surface, found, turned, wrong, walls, undecided)
 
 
@@ -282,8 +284,8 @@ def _turned_together(
     loose: NDArray[np.bool_],
     lines: LineCrossings,
     crossed: NDArray[np.int64],
-) -> NDArray[np.bool_]:
-    """Turn loose parts as points on them tell together, if lines then enter the shape as often as they leave it."""
+) -> NDArray[np.bool_] | None:
+    """Turn loose parts as points on them tell together; None if lines find no fewer contradictions then."""
     surface, agreeing = faces.surface, faces.surface.orientation.turned
 
     def unevenness(turned: NDArray[np.bool_]) -> float:
@@ -291,7 +293,7 @@ def _turned_together(
 
     before = unevenness(turned)
     if before < UNEVEN:
-        return turned
+        return None
     of_triangle = surface.orientation.parts[faces.triangle_faces]
     chosen = np.flatnonzero((loose[of_triangle]) & surface.is_first[faces.triangle_faces])
     corners = faces.positions[faces.triangles[chosen]]
@@ -305,8 +307,8 @@ def _turned_together(
         vectors = faces.normals(turned) * (surface.areas * surface.is_first)[:, None]
         backwards = np.where(turned != together, -1.0, 1.0)[:, None]
         gain = agreement(faces.centroids, vectors * backwards) / agreement(faces.centroids, vectors)
-        return together if gain > AGREEING else turned
-    return together if after < before else turned
+        return together if gain > AGREEING else None
+    return together if after < before else None
 
 
 def _oriented(
