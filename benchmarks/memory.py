@@ -8,14 +8,21 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
+from signedheat.extensions.solid_memory import bytes_of_faces, bytes_per_node
+from signedheat.extensions.steps import Steps
 from signedheat.geometry.surfels import count_surfels
+from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate
 from signedheat.lowering.surface.digital_surfaces import BYTES_PER_VOXEL
+from signedheat.lowering.surface.intrinsic import BYTES_REFINED
 from signedheat.lowering.surface.memory import memory_estimate as surface_estimate
 from signedheat.lowering.surface.point_clouds import BYTES_PER_POINT, NEIGHBORS
 from signedheat.lowering.tets.discretization import memory_estimate as tet_estimate
@@ -27,8 +34,12 @@ SIZES = {
     "points": (20_000, 40_000, 80_000),
     "voxels": (64, 96, 128),
     "tets": (20, 28, 36),
+    "intrinsic": (70, 140, 200),
+    "piecewise": (50, 100, 200),
+    "piecewise, exact": (40, 60, 80),
+    "noisy soups": (96, 144, 192),
 }
-"""Of each kind: parallels of a globe, points, voxels and cells along an edge."""
+"""Of each kind: parallels of a globe, points, voxels and cells along an edge, nodes along the longest side."""
 
 
 def globe(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -41,30 +52,90 @@ def globe(n: int) -> tuple[np.ndarray, np.ndarray]:
     return np.stack(rows, -1).reshape(-1, 3), quads
 
 
-def case(kind: str, size: int) -> tuple[object, object, float]:
-    """A domain, a source on it, and the estimate."""
+def case(kind: str, size: int) -> tuple[Callable[[], object], float]:
+    """What is computed, on a domain that is there, and its estimate besides libraries."""
     if kind == "triangles":
-        vertices, quads = globe(size)
-        mesh = sh.TriangleMesh(vertices, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]))
-        return mesh, mesh.level_set(vertices[:, 2], 0.3), surface_estimate(mesh.n_faces)
+        mesh = triangulated(size)
+        curves = mesh.level_set(mesh.vertices[:, 2], 0.3)
+        return lambda: sh.SignedHeatSolver(mesh).distance(curves), surface_estimate(mesh.n_faces)
     if kind == "polygons":
         vertices, quads = globe(size)
         polygons = sh.PolygonMesh(vertices, quads)
-        return polygons, polygons.points_at(0), surface_estimate(4 * len(quads))
+        at = polygons.points_at(0)
+        return lambda: sh.SignedHeatSolver(polygons).distance(at), surface_estimate(4 * len(quads))
     if kind == "points":
-        k = np.arange(size) + 0.5
-        polar, azimuth = np.arccos(1 - 2 * k / size), np.pi * (1 + 5**0.5) * k
-        rows = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
+        cloud = sh.PointCloud(spiral(size))
         beside = NEIGHBORS + BYTES_PER_POINT * size
-        return sh.PointCloud(np.stack(rows, -1)), [0, size // 2], surface_estimate(2 * size) + beside
+        both = [0, size // 2]  # `points_at` makes the triangles
+        return lambda: sh.SignedHeatSolver(cloud).distance(cloud.points_at(both)), surface_estimate(2 * size) + beside
     if kind == "voxels":
         along = (np.arange(size) - size / 2 + 0.5) ** 2
         volume = along[:, None, None] + along[:, None] + along < (0.45 * size) ** 2
         surface = sh.DigitalSurface(volume, 1 / size)
-        return surface, surface.points_at(0), surface_estimate(4 * count_surfels(volume)) + BYTES_PER_VOXEL * size**3
-    diagonal = sh.TriangleMesh([[-1, -1, -1], [1, 1, 1], [-1, 1, 0]], [[0, 1, 2]])
-    mesh = sh.tetrahedralize(diagonal, resolution=size, padding=0, grading=np.inf)
-    return mesh, samples.sphere(3, radius=0.7), tet_estimate(mesh.n_tets)
+        start = surface.points_at(0)
+        estimate = surface_estimate(4 * count_surfels(volume)) + BYTES_PER_VOXEL * size**3
+        return lambda: sh.SignedHeatSolver(surface).distance(start), estimate
+    if kind == "tets":
+        diagonal = sh.TriangleMesh([[-1, -1, -1], [1, 1, 1], [-1, 1, 0]], [[0, 1, 2]])
+        tets = sh.tetrahedralize(diagonal, resolution=size, padding=0, grading=np.inf)
+        ball = samples.sphere(3, radius=0.7)
+        return lambda: sh.SignedHeatSolver(tets).distance(ball), tet_estimate(tets.n_tets)
+    return CASES[kind](size)
+
+
+def refined(size: int) -> tuple[Callable[[], object], float]:
+    """Distance on the refinement of a squashed globe, whose number of triangles is known once it is refined."""
+    mesh = triangulated(size, (1.0, 1.0, 0.3))
+    ring = mesh.path(size // 2 * 2 * size + np.arange(2 * size), closed=True)
+    code = "import sys, memory; print(memory.count_refined(int(sys.argv[1])))"
+    found = subprocess.run(
+        [sys.executable, "-c", code, str(size)], cwd=Path(__file__).parent, capture_output=True, text=True, check=True
+    )
+    n = int(found.stdout)
+    return lambda: sh.SignedHeatSolver(mesh, intrinsic=True).distance(ring), surface_estimate(n) + BYTES_REFINED * n
+
+
+def count_refined(size: int) -> int:
+    """Triangles of the refinement, counted in a process of its own."""
+    return sh.intrinsic_delaunay(triangulated(size, (1.0, 1.0, 0.3)), refine=True).n_faces
+
+
+def piecewise(size: int, exact: bool = False) -> tuple[Callable[[], object], float]:
+    """Half of the equator, which bounds nothing."""
+    mesh = triangulated(size)
+    half = mesh.path(size // 2 * 2 * size + np.arange(size))
+    return lambda: sh.piecewise_distance(mesh, half, exact=exact), piecewise_estimate(mesh.n_faces, exact)
+
+
+def noisy_soup(size: int) -> tuple[Callable[[], object], float]:
+    """A soup of 20,480 faces in a grid of this resolution."""
+    mesh = samples.soup(samples.sphere(5), 0.02)
+    steps = Steps(True, True, True, sh.ZeroSet(), 1.0)
+    grid = sh.Grid.around(mesh.bounds, size)
+    estimate = grid_estimate(grid, bytes_per_node(mesh, steps, closed=True), bytes_of_faces(mesh)) - libraries()
+    return lambda: sh.solid_distance(mesh, grid), estimate
+
+
+CASES = {
+    "intrinsic": refined,
+    "piecewise": piecewise,
+    "piecewise, exact": partial(piecewise, exact=True),
+    "noisy soups": noisy_soup,
+}
+
+
+def triangulated(size: int, scales: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> sh.TriangleMesh:
+    """The globe in triangles, scaled along the axes."""
+    vertices, quads = globe(size)
+    return sh.TriangleMesh(vertices * scales, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]))
+
+
+def spiral(size: int) -> np.ndarray:
+    """Points on the unit sphere, evenly."""
+    k = np.arange(size) + 0.5
+    polar, azimuth = np.arccos(1 - 2 * k / size), np.pi * (1 + 5**0.5) * k
+    rows = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
+    return np.stack(rows, -1)
 
 
 def resident(name: str) -> int:
@@ -75,11 +146,9 @@ def resident(name: str) -> int:
 
 def measure(kind: str, size: int) -> dict[str, float]:
     """Peak of a first distance above what was held before it, and its estimate."""
-    domain, source, estimate = case(kind, size)
+    compute, estimate = case(kind, size)
     before, loading = resident("VmRSS"), libraries()
-    if kind == "points":
-        source = domain.points_at(source)  # makes the triangles
-    sh.SignedHeatSolver(domain).distance(source)
+    _ = compute()
     return {"measured": resident("VmHWM") - before, "estimated": estimate + loading}
 
 

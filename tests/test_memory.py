@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import subprocess
 import sys
@@ -16,7 +17,10 @@ import signedheat as sh
 from refusals import refused
 from shapes.tet_cases import boxes
 from signedheat import memory, samples
+from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
+from signedheat.extensions.solid_memory import BYTES_IF_CLOSED, BYTES_IF_SCATTERED, bytes_of_faces
 from signedheat.lowering.grid.discretization import fitting_spacing, memory_estimate
+from signedheat.lowering.surface import intrinsic
 from signedheat.memory import available_memory
 
 
@@ -55,11 +59,21 @@ def test_the_spacing_that_is_proposed_fits(shape):
         _ = sh.SignedHeatSolver(grid).discretization
 
 
+solid_distance = importlib.import_module("signedheat.extensions.solid_distance")
 BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "memory.py"
 
 
 @pytest.mark.parametrize(
-    ("kind", "size"), [("triangles", 140), ("polygons", 100), ("points", 30_000), ("voxels", 80), ("tets", 20)]
+    ("kind", "size"),
+    [
+        ("triangles", 140),
+        ("polygons", 100),
+        ("points", 30_000),
+        ("voxels", 80),
+        ("tets", 20),
+        ("piecewise", 40),
+        ("noisy soups", 96),
+    ],
 )
 def test_estimates_are_near_the_peak_of_a_process_of_its_own(kind, size):
     command = [sys.executable, str(BENCHMARK), kind, str(size)]
@@ -88,6 +102,40 @@ def test_what_does_not_fit_is_refused_and_what_would_is_named(name, monkeypatch)
     with refused(sh.MemoryLimitError) as caught:
         sh.SignedHeatSolver(domain).distance(source(domain))
     assert any(letter.isdigit() for letter in caught.value.remedy)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_piecewise_fields_that_do_not_fit_name_a_number_of_triangles_that_does(exact, monkeypatch):
+    half = BALL.path([0, int(BALL.edges.vertices[BALL.edges.vertices[:, 0] == 0][0, 1])])
+    free = memory.libraries() + int(piecewise_estimate(BALL.n_faces // 2, exact))
+    for surface in (BALL, sh.PolygonMesh(BALL.vertices, BALL.faces), sh.intrinsic_delaunay(BALL)):
+        monkeypatch.setattr(memory, "_free", lambda: free)
+        with refused(sh.MemoryLimitError) as caught:
+            sh.piecewise_distance(surface, half, exact=exact)
+        fitting = int(caught.value.remedy.split()[3].replace(",", ""))
+        room = free - memory.libraries()
+        assert piecewise_estimate(fitting, exact) <= room < piecewise_estimate(fitting + 1, exact)
+
+
+def test_meshes_that_do_not_fit_are_refused_before_they_are_refined(monkeypatch):
+    monkeypatch.setattr(memory, "_free", lambda: 22_000_000)
+    monkeypatch.setattr(intrinsic, "intrinsic_delaunay", lambda *_, **__: pytest.fail("refined"))
+    with refused(sh.MemoryLimitError):
+        sh.SignedHeatSolver(BALL, intrinsic=True).distance(BALL.points_at(0))
+
+
+def test_noisy_soups_are_refused_before_their_faces_are_turned(monkeypatch):
+    """With memory for a closed ball, but not for its faces in layers."""
+    soup = samples.soup(BALL, 0.02)
+    grid = sh.Grid.around(soup.bounds, 64)
+    closed = memory_estimate(grid, BYTES_IF_CLOSED, bytes_of_faces(BALL))
+    monkeypatch.setattr(memory, "_free", lambda: closed + 1_000_000)
+    monkeypatch.setattr(solid_distance, "_oriented", lambda *_: pytest.fail("turned"))
+    with refused(sh.MemoryLimitError) as caught:
+        solid_distance.solid_distance(soup, grid)
+    spacing = float(caught.value.remedy.split()[4])
+    fits = sh.Grid.around(soup.bounds, spacing=1.05 * spacing)
+    assert memory_estimate(fits, BYTES_IF_SCATTERED, bytes_of_faces(soup)) <= closed + 1_000_000
 
 
 @given(st.integers(1, 10**12), st.floats(0, 1e13), st.floats(0.1, 1e4))

@@ -12,7 +12,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError, SourceError
 from ..extensions.orientation import Orientation, orientation
-from ..extensions.solid_distance import BYTES_PER_NODE
+from ..extensions.solid_memory import BYTES_PER_NODE
 from ..extensions.thickness import Thickness, thickness
 from ..io import read, read_curves, read_polylines
 from ..io.files import extension

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..diagnostics import Diagnostics, Jumps
-from ..discretization import discretize
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.foreign import ForeignShape, converted
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
-from ..domains.kinds import SurfaceDomain
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
@@ -31,7 +29,10 @@ from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in
 from ..linear import factorize
-from ..lowering.surface.discretization import SurfaceDiscretization
+from ..lowering.surface.discretization import SurfaceDiscretization, lowered_mesh
+from ..lowering.surface.intrinsic import lowered
+from ..lowering.surface.polygons import lowered_polygons
+from ..memory import refuse_beyond_memory
 from ..method import diffuse, normalize
 from ..operators.cotan import cotan_matrix
 from ..progress import Progress, Stopwatch
@@ -41,6 +42,8 @@ from .jump_solvers import JumpProblem, JumpSolution, minimize_exactly, minimize_
 
 SOURCE_WEIGHT = 100.0
 """Factor by which a cut along or across the source is more expensive than elsewhere."""
+BYTES_PER_TRIANGLE, BYTES_IF_EXACT, EXACT_BASE = 2600, 5400, 20_000_000
+"""Measured peak memory, of the fast solver and of the linear program, which takes some for itself."""
 
 
 def piecewise_distance(
@@ -93,6 +96,8 @@ def piecewise_distance(
         If a source does not fit the surface, or an unoriented curve was not kept by an intrinsic triangulation.
     UnsupportedTypeError
         If the domain is none of these.
+    MemoryLimitError
+        If the field does not fit into memory; nothing has been allocated then.
     ValueError
         If `diffusion` or `smoothing` is not positive and finite.
 
@@ -120,11 +125,11 @@ def piecewise_distance(
     stopwatch = Stopwatch(progress, steps=4)
     with stopwatch("prepare"):
         diffusion = positive_number(diffusion, "diffusion")
-        discretization = _lowered(domain)
+        discretization = _lowered(domain, exact)
         if not conforms(discretization, listed):
             assert not isinstance(domain, IntrinsicTriangulation)  # which `conforms` refuses
             domain = intrinsic_delaunay(domain.triangulation, keep=listed)
-            discretization = _lowered(domain)
+            discretization = _lowered(domain, exact)
             conforms(discretization, listed)  # or it is refused: curves on faces so flat that rounding moves them
     with stopwatch("diffuse"):
         discretization, groups = discretization.adapt(listed)
@@ -172,10 +177,29 @@ def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps
     )
 
 
-def _lowered(domain: SurfaceDomain) -> SurfaceDiscretization:
-    lowered = discretize(domain)
-    assert isinstance(lowered, SurfaceDiscretization)
-    return lowered
+def memory_estimate(n_triangles: int, exact: bool) -> float:
+    """Bytes that a field on so many triangles takes at the most, besides libraries.
+
+    Examples
+    --------
+    >>> memory_estimate(1_000_000, exact=False)
+    2600000000.0
+    """
+    return EXACT_BASE + BYTES_IF_EXACT * float(n_triangles) if exact else BYTES_PER_TRIANGLE * float(n_triangles)
+
+
+def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation, exact: bool) -> SurfaceDiscretization:
+    """The discretisation, if there is memory for the field; factors are made for one diffusion time only."""
+    n = len(domain.corners) if isinstance(domain, PolygonMesh) else domain.n_faces
+    refuse_beyond_memory(
+        f"piecewise distance on {n:,} triangles",
+        n,
+        partial(memory_estimate, exact=exact),
+        lambda number: f"use at most {number:,} triangles" + (", or exact=False" if exact else ""),
+    )
+    if isinstance(domain, IntrinsicTriangulation):
+        return lowered(domain)
+    return lowered_polygons(domain) if isinstance(domain, PolygonMesh) else lowered_mesh(domain)
 
 
 def conforms(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> bool:

@@ -44,14 +44,13 @@ from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .shape_sides import sides_of_shape
 from .sharpening import sharpen
 from .sides import FAR
+from .solid_memory import bytes_of_faces, bytes_per_node
 from .steps import Steps
 from .thin_walls import telling_at, with_thin_walls
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of
 
 STEPS = 7
 """Steps that are timed."""
-BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 54, 42, 31
-"""Measured peak memory: of points and shapes with holes or overlaps; of φ alone; of shapes whose parts are closed."""
 GAPS = 1.5
 """Mean gaps between points, besides `FAR` cells, within which φ tells the sides of a cloud."""
 
@@ -232,14 +231,14 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
-    refuse_beyond_memory(grid, BYTES_IF_CLOSED if steps.sharpen and steps.orient else BYTES_IF_PLAIN)
+    refuse_beyond_memory(grid, bytes_per_node(shape, steps, closed=True), bytes_of_faces(shape))
     with stopwatch("orient"):
         merged, closed = _oriented(shape, steps, notes) if steps.orient else (merge_duplicates(shape), False)
     if closed and steps.sharpen:
         field = _bounded(merged, grid, steps, notes, stopwatch)
         if field is not None:
             return field
-    refuse_beyond_memory(grid, BYTES_PER_NODE if steps.sharpen else BYTES_IF_PLAIN)
+    refuse_beyond_memory(grid, bytes_per_node(merged.shape, steps, closed=False))
     discretization = discretize(grid)
     with stopwatch("unite"):
         merged, samples, winding = _united(merged, grid, steps, notes)

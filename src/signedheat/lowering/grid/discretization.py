@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...discretization import DiffusesEach, discretize
 from ...domains.grid import Grid
 from ...errors import MemoryLimitError, SourceError
-from ...memory import available_memory
+from ...memory import available_memory, libraries
 from ...operators.grid.multilevel import Level, collapse, diffuse_multilevel
 from ...operators.grid.readout import unit_vectors
 from ...operators.grid.stencil import divergence
@@ -27,14 +27,16 @@ SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the simplices into which faces are bisected."""
 BYTES_PER_NODE = 46
 """Measured peak memory of a distance computation."""
-BASE = 200_000_000
-"""The part that does not depend on the number of nodes: loaded libraries and compiled kernels."""
+BASE = 20_000_000
+"""The part that does not depend on the number of nodes, besides what libraries still take."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
 
 
-def memory_estimate(grid: Grid, per_node: float | None = None) -> int:
+def memory_estimate(grid: Grid, per_node: float | None = None, beside: float = 0.0) -> int:
     """Estimated peak memory of a distance computation on the grid, in bytes; of others, if `per_node` is given.
+
+    What is needed `beside` the nodes and the libraries is added.
 
     Examples
     --------
@@ -43,15 +45,15 @@ def memory_estimate(grid: Grid, per_node: float | None = None) -> int:
     """
     if per_node is None:
         per_node = BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS[grid.dimension]
-    return int(per_node * grid.n_nodes) + BASE
+    return int(per_node * grid.n_nodes + beside) + BASE + libraries()
 
 
-def refuse_beyond_memory(grid: Grid, per_node: float | None = None) -> None:
+def refuse_beyond_memory(grid: Grid, per_node: float | None = None, beside: float = 0.0) -> None:
     """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing."""
-    available, needed = available_memory(), memory_estimate(grid, per_node)
+    available, needed = available_memory(), memory_estimate(grid, per_node, beside)
     if available is None or needed <= available:
         return
-    spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting_spacing(grid, available, per_node)))
+    spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting_spacing(grid, available, per_node, beside)))
     raise MemoryLimitError(
         f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
         f"and {available / 1e9:.1f} GB are free",
@@ -59,12 +61,15 @@ def refuse_beyond_memory(grid: Grid, per_node: float | None = None) -> None:
     )
 
 
-def fitting_spacing(grid: Grid, available: int, per_node: float | None = None) -> NDArray[np.float64]:
+def fitting_spacing(
+    grid: Grid, available: int, per_node: float | None = None, beside: float = 0.0
+) -> NDArray[np.float64]:
     """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
-    whole = memory_estimate(grid, per_node) - BASE
-    spacing = grid.spacing * max((available - BASE) / whole, 1e-12) ** (-1.0 / grid.dimension)
+    base = memory_estimate(grid, 0.0, beside)
+    whole = memory_estimate(grid, per_node, beside) - base
+    spacing = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
     per_node = whole / grid.n_nodes
-    while per_node * np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1) + BASE > max(available, 2 * BASE):
+    while per_node * np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1) + base > max(available, 2 * base):
         spacing *= 1.01
     return spacing
 

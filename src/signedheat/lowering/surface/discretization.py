@@ -175,6 +175,11 @@ class SurfaceDiscretization:
 @discretize.register
 def _(domain: TriangleMesh) -> SurfaceDiscretization:
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
+    return lowered_mesh(domain)
+
+
+def lowered_mesh(domain: TriangleMesh) -> SurfaceDiscretization:
+    """The discretisation of a mesh, of whose memory the caller has made sure."""
     triangles, added = laid_out(domain, 1e-6)
     share = large_angles(triangles)
     notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []))

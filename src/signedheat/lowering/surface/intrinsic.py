@@ -25,12 +25,16 @@ SPOILED = 0.0015
 LARGE = 120.0
 """Degrees."""
 
+BYTES_REFINED = 750
+"""What each triangle of a refinement takes itself, besides distance on it."""
+
 THICKNESS = 1e-9
 """Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
 
 
 @discretize.register
 def _(domain: IntrinsicTriangulation) -> SurfaceDiscretization:
+    refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     return lowered(domain)
 
 
@@ -72,7 +76,9 @@ def large_angles(mesh: TriangleMesh) -> float:
 
 def refined(mesh: TriangleMesh, progress: Progress | None = None, keep: Sequence[Any] = ()) -> SurfaceDiscretization:
     """The intrinsic Delaunay refinement of a mesh; fields are reported on the mesh, and kept on the refinement."""
+    refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", beside=BYTES_REFINED * mesh.n_faces)  # which only grow
     domain = intrinsic_delaunay(mesh, keep=keep, refine=True, progress=progress)
+    refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     lowered_mesh = lowered(domain, domain=mesh, restriction=np.arange(mesh.n_vertices))
     return replace(lowered_mesh, triangulation=domain)
 
@@ -80,7 +86,6 @@ def refined(mesh: TriangleMesh, progress: Progress | None = None, keep: Sequence
 def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDiscretization:
     """The discretisation of an intrinsic triangulation; triangles that are nearly flat are mollified."""
     triangles = triangulation.triangles
-    refuse_too_many(triangles.n_faces, triangles.n_faces, "triangles")
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
     if added:
         corners, edges = triangles.corner_vertices, triangles.edges

@@ -8,20 +8,26 @@ import numpy as np
 
 from ...discretization import discretize
 from ...domains.polygon_mesh import PolygonMesh
-from .discretization import SurfaceDiscretization
+from .discretization import SurfaceDiscretization, lowered_mesh
 from .memory import refuse_too_many
 
 
 @discretize.register
 def _(domain: PolygonMesh) -> SurfaceDiscretization:
-    """φ is solved for on all vertices of the triangles, virtual ones included, and reported at those of the polygons.
+    refuse_too_many(len(domain.corners), domain.n_polygons, "polygons")
+    return lowered_polygons(domain)
+
+
+def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
+    """The discretisation of polygons, of whose memory the caller has made sure.
+
+    φ is solved for on all vertices of the triangles, virtual ones included, and reported at those of the polygons.
 
     With virtual vertices eliminated in step 3 (``PᵀCP``), a curve across polygons could not be a level set of φ: it
     crosses more edges of triangles than its polygons have corners, and φ would be constant on whole polygons. h is half
     the mean length of the polygons' own edges, so that virtual vertices do not change t.
     """
-    refuse_too_many(len(domain.corners), domain.n_polygons, "polygons")
-    lowered = discretize(domain.triangulation)
+    lowered = lowered_mesh(domain.triangulation)
     own = (domain.triangulation.edges.vertices < domain.n_vertices).all(axis=1)
     spacing = 0.5 * float(domain.triangulation.edge_lengths[own].mean())
     return replace(lowered, domain=domain, restriction=np.arange(domain.n_vertices), spacing=spacing)
