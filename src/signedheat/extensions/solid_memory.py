@@ -16,6 +16,8 @@ BYTES_IF_SCATTERED = 62
 """The same of noisy soups, whose faces lie in layers."""
 BYTES_PER_FACE, BYTES_PER_SCATTERED_FACE = 400, 1200
 """What each triangle of the shape adds, and each of a noisy soup, which share no edges."""
+BYTES_OF_POINTS = 190_000_000
+"""What turning points takes, of however many: the libraries and kernels that only it needs."""
 ONCE = 0.9
 """Share of the vertices with a coordinate of their own from which on a soup has noise, so that it is never joined."""
 
@@ -32,7 +34,7 @@ def bytes_per_node(shape: Shape, steps: Steps, closed: bool) -> int:
 def bytes_of_faces(shape: Shape) -> float:
     """What is added by the faces of a shape, of which most is taken when they are oriented."""
     if isinstance(shape, PointCloud):
-        return 0.0
+        return float(BYTES_OF_POINTS)
     if isinstance(shape, PolygonMesh):
         return float(BYTES_PER_FACE * len(shape.corners))
     return float((BYTES_PER_SCATTERED_FACE if is_scattered(shape) else BYTES_PER_FACE) * shape.n_faces)
