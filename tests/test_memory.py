@@ -71,8 +71,8 @@ BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "memory.py"
         ("points", 30_000),
         ("voxels", 80),
         ("tets", 20),
-        ("piecewise", 40),
-        ("noisy soups", 96),
+        ("piecewise", 30),
+        ("noisy soups", 64),
     ],
 )
 def test_estimates_are_near_the_peak_of_a_process_of_its_own(kind, size):
