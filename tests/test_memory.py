@@ -64,20 +64,23 @@ BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "memory.py"
 
 
 @pytest.mark.parametrize(
-    ("kind", "size"),
+    ("kind", "size", "small"),
     [
-        ("triangles", 140),
-        ("polygons", 100),
-        ("points", 30_000),
-        ("voxels", 80),
-        ("tets", 20),
-        ("piecewise", 30),
-        ("noisy soups", 64),
+        ("triangles", 140, 12),
+        ("polygons", 100, 12),
+        ("points", 30_000, 1000),
+        ("voxels", 80, 12),
+        ("tets", 20, 6),
+        ("piecewise", 30, 10),
+        ("noisy soups", 64, 64),
     ],
 )
-def test_estimates_are_near_the_peak_of_a_process_of_its_own(kind, size):
-    command = [sys.executable, str(BENCHMARK), kind, str(size)]
-    row = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+def test_estimates_are_near_the_peak_of_a_process_of_its_own(kind, size, small):
+    """The first process compiles, which takes memory of its own."""
+    for n in (small, size):
+        command = [sys.executable, str(BENCHMARK), kind, str(n)]
+        made = subprocess.run(command, capture_output=True, text=True, check=True)
+    row = json.loads(made.stdout)
     assert 0.75 < row["estimated"] / row["measured"] < 1.3, row
 
 
