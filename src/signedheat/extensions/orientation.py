@@ -125,9 +125,9 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
     Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Across edges of two faces
     orientation is carried on, and each part so found takes that of the most of its area. Lines laid through the whole
     shape then tell which way each part faces (`orient_parts`). Small pieces that touch other parts at corners face as
-    they do; of those that touch nothing, each turns only if its neighbours clearly disagree with it. Where most of the
-    shape is such pieces, and lines do not leave it as often as they enter it, points on them tell which way they face,
-    all together (`orient_triangles`): that is taken if lines find far fewer contradictions then.
+    they do; of those that touch nothing, each turns only if its neighbours clearly disagree with it. Where they are a
+    tenth of the shape or more, and lines do not leave it as often as they enter it, points on them tell which way they
+    face, all together (`orient_triangles`): that is taken if lines then find fewer contradictions.
 
     A part that is there twice, once facing each way, is a doubled wall: both its sides stay. If it is closed, or holes
     make up less than a ninth of its area, it is a solid drawn from both sides, and one side goes.
@@ -183,7 +183,7 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
         & (parts.areas <= SMALL * parts.areas.sum())[surface.orientation.parts]
     )
     if alone.any():
-        wrong_here, _ = disagreeing_with_neighbors(
+        wrong_here = disagreeing_with_neighbors(
             faces.centroids, faces.normals(turned) * surface.is_first[:, None], alone
         )
         turned = turned != wrong_here
@@ -295,7 +295,7 @@ def _turned_together(
     if before < UNEVEN:
         return None
     of_triangle = surface.orientation.parts[faces.triangle_faces]
-    chosen = np.flatnonzero((loose[of_triangle]) & surface.is_first[faces.triangle_faces])
+    chosen = np.flatnonzero(loose[of_triangle] & surface.is_first[faces.triangle_faces])
     corners = faces.positions[faces.triangles[chosen]]
     backwards = agreeing[faces.triangle_faces[chosen]]
     corners[backwards] = corners[backwards, ::-1]

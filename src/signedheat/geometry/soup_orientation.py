@@ -77,8 +77,8 @@ def agreement(centroids: NDArray[np.float64], vectors: NDArray[np.float64]) -> f
 
 def disagreeing_with_neighbors(
     centroids: NDArray[np.float64], normals: NDArray[np.float64], asking: NDArray[np.bool_], rounds: int = 4
-) -> tuple[NDArray[np.bool_], float]:
-    """Which of the asking pieces to turn so that they face as their neighbours do, and how many do not know.
+) -> NDArray[np.bool_]:
+    """Which of the asking pieces to turn so that they face as their neighbours do.
 
     Neighbours count the less the farther they are off the piece's plane, so that the other side of a thin wall is not
     asked. Where normals scatter they tell nothing: noise turns as many one way as the other, and turning these back
@@ -93,14 +93,12 @@ def disagreeing_with_neighbors(
 
     Returns
     -------
-    turned : (n,) bool
+    (n,) bool
         Pieces to turn.
-    contested : float
-        Share of the asking pieces whose neighbours are parallel, but face different ways.
     """
     here = np.flatnonzero(asking)
     if len(centroids) < 3:
-        return np.zeros(len(centroids), dtype=bool), 0.0
+        return np.zeros(len(centroids), dtype=bool)
     distance, near = scipy.spatial.cKDTree(centroids).query(centroids[here], k=min(N_NEIGHBORS + 1, len(centroids)))
     away = centroids[near] - centroids[here, None]
     height = np.abs(np.einsum("ijk,ik->ij", away, normals[here])) / np.maximum(distance, 1e-300)
@@ -109,8 +107,6 @@ def disagreeing_with_neighbors(
     total = weights.sum(axis=1)
     smooth = (weights * along**2).sum(axis=1) > SMOOTH * np.maximum(total, 1.0)
     along *= weights
-    split = np.abs(along.sum(axis=1)) < LEAST_AGREEMENT * total
-    contested = float((smooth & split).sum() / max(len(here), 1))
     signs = np.ones(len(centroids))
     for _ in range(rounds):
         ballots = (along * signs[near]).sum(axis=1) * signs[here]
@@ -118,4 +114,5 @@ def disagreeing_with_neighbors(
         if not wrong.any():
             break
         signs[here[wrong]] *= -1
-    return signs < 0, contested
+    result: NDArray[np.bool_] = signs < 0
+    return result
