@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -58,3 +61,17 @@ def test_curves_keep_their_length(data, mesh, refine):
         return
     better = sh.intrinsic_delaunay(mesh, refine=refine)
     assert abs(better.transfer(curve).lengths.sum() / length - 1) < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_edges_of_a_boundary_keep_their_length_where_refinement_puts_vertices_in_their_middle(seed):
+    corner = np.arange(20).reshape(4, 5)
+    a, b, c, d = (corner[i, j].ravel() for i, j in product((slice(None, -1), slice(1, None)), repeat=2))
+    faces = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+    mesh = sh.TriangleMesh(np.random.default_rng(seed).random((20, 3)), faces)
+    history = sh.intrinsic_delaunay(mesh, refine=True).history
+    lines, after = history.edges_after(), history.after
+    pieces = np.abs(((lines.ends - lines.starts) * after.corner_positions[lines.faces]).sum(axis=1))
+    lengths = np.empty(history.before.n_edges)
+    lengths[history.before.edges.face_edges] = history.before.edge_lengths
+    np.testing.assert_allclose(np.bincount(lines.owners, pieces, len(lengths)), lengths, rtol=1e-9)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .gluing_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, diamond, following, kernel
+from .gluing_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, apex_position, diamond, following, kernel
 
 BEFORE = np.full((4, 3, 3), -1)
 """By kind of step, face and corner: which of the four points is that corner before the step; `AFTER`, after it."""
@@ -18,6 +18,9 @@ AFTER = np.full((4, 3, 3), -1)
 BEFORE[FLIP, :2], AFTER[FLIP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
 BEFORE[SPLIT_EDGE, 0], AFTER[SPLIT_EDGE, :2] = [0, 1, 2], [[0, 3, 2], [3, 1, 2]]
 BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+
+OUTWARD = 1e-6
+"""Sine of the angle up to which a line that leaves the surface is one along its boundary, but for rounding."""
 
 
 @kernel
@@ -146,7 +149,7 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
     Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
     it, and the vectors there. Returns the next row.
     """
-    f, left = face, 1.0
+    f, left, slides = face, 1.0, 0
     w, v = barycentric.copy(), vectors.copy()
     sign = 1.0 if forward else -1.0
     for _ in range(1000000):
@@ -176,9 +179,18 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
             break
         h = 3 * f + (leaving + 1) % 3
         t = g.sibling[h]
-        if t == h or g.sibling[t] != h:
-            break  # a boundary, reached by rounding errors only
         i, j, a = h % 3, following(h) % 3, leaving
+        slides = 0 if step > 0.0 else slides
+        if t == h or g.sibling[t] != h:  # where no single face goes on; only rounding leads out: go along the edge
+            x, y = apex_position(g, h)
+            base = g.length[g.edge[h]]
+            if slides == 2 or y * abs(v[0, a]) > OUTWARD * abs(base * v[0, j] + x * v[0, a]):
+                break
+            slides += 1
+            v[0, i] += v[0, a] * (1.0 - x / base)
+            v[0, j] += v[0, a] * x / base
+            v[0, a] = 0.0
+            continue
         ti, tj = (t % 3, following(t) % 3) if g.forward[h] == g.forward[t] else (following(t) % 3, t % 3)
         tb = 3 - ti - tj
         c_i, c_j, c_a, c_b, _ = diamond(g, h)
