@@ -61,7 +61,7 @@ def flipped_along_creases(vertices: NDArray[np.float64], faces: NDArray[np.int64
         if not len(first):
             break
         result[some[first]], result[some[second]] = one, other
-    return faces if (edge_table(result).face_counts > 2).any() else result  # manifold comes before smooth
+    return result
 
 
 @dataclass(frozen=True, eq=False)

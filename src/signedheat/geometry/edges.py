@@ -71,7 +71,7 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     return EdgeTable(*find_edges(faces, np.bincount(faces.ravel())))
 
 
-def edge_keys(one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
     """(k,) a number for each pair of vertices, whichever comes first."""
-    keys: NDArray[np.int64] = (np.minimum(one, other) << 32) | np.maximum(one, other)
+    keys: NDArray[np.int64] = (np.minimum(one, other).astype(np.int64) << 32) | np.maximum(one, other)
     return keys
