@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import product
 from threading import local
 
 import numpy as np
@@ -30,8 +31,12 @@ PLANES = 16
 """Planes of nodes that one thread goes through, each after the one before."""
 ROWS, ROW = 16, 64
 """Lines of a tile of nodes, and nodes of each, in which samples are asked one after the other."""
-APART = 1.0
-"""Cells between feet from which on a neighbour's is taken to be on another part of the surface."""
+BEFORE = np.array(sorted(filter(lambda step: step < (0, 0, 0), product((-1, 0, 1), repeat=3)), key=np.linalg.norm))
+"""(13, 3) ways to the neighbours of a node that come before it, the three along the axes first."""
+CLOSE = 8.0
+"""Cells from the surface within which neighbours across are asked as well as those along the axes."""
+BESIDE, SLACK = 3.0, 0.1
+"""Cells from the surface within which neighbours' faces lead on that are farther, by at most so many cells."""
 ROUNDING = 1e-6
 """Of feet in single precision."""
 
@@ -178,7 +183,7 @@ def signed_distances(
         places = (nearest[here], values[here], rooms.feet[: len(nearest[here])])
         _nearest_to_samples(links, surface.owners, surface.crossings, steps, reach, first, *places)
         for way in (1, -1):
-            _nearest_to_neighbours(links, steps, first, (APART * cell) ** 2, way, *places)
+            _nearest_to_neighbours(links, steps, first, cell, way, *places)
         _confidences(surface.features.trusted, trusted, nearest[here], confidence[here])
         _signs(surface.features.rows, normals, told, steps, first, NEAR * cell, inside[here], *places[:2])
 
@@ -238,46 +243,53 @@ def _nearest_to_neighbours(
     links: Links,
     steps: NDArray[np.float64],
     first: int,
-    apart: float,
+    cell: float,
     way: int,
     nearest: NDArray[np.int32],
     values: NDArray[np.float64],
     feet: NDArray[np.float32],
 ) -> None:
-    """What is nearest to the node before along each axis, and from there, where that is nearer; upwards or downwards.
+    """What is nearest to the nodes before, and from there, where that is nearer; upwards or downwards.
 
     The distance d to a triangle is convex, so at x it is at least ``d(y) + ∇d(y) · (x − y)``: most neighbours' faces
-    need not be asked. Nor need those whose feet are within the root of `apart` from the node's own, unless they lie at
-    a rim: a walk came by.
+    need not be asked. Others are, before a walk begins from them, unless the node is nearest to a crossing.
     """
-    across = links[3]
+    rows = links[0]
     planes, n1, n2 = nearest.shape
-    points, candidates = np.empty((3 * n2, 3)), np.empty((3 * n2, 1), dtype=np.int32)
-    found, squares = np.empty(3 * n2, dtype=np.int32), np.empty(3 * n2)
-    codes, places, nodes = np.empty(3 * n2, dtype=np.int8), np.empty((3 * n2, 3)), np.empty(3 * n2, dtype=np.int64)
+    points, candidates = np.empty((len(BEFORE) * n2, 3)), np.empty((len(BEFORE) * n2, 1), dtype=np.int32)
+    found, squares = np.empty(len(BEFORE) * n2, dtype=np.int32), np.empty(len(BEFORE) * n2)
+    codes, places, nodes = (
+        np.empty(len(BEFORE) * n2, dtype=np.int8),
+        np.empty((len(BEFORE) * n2, 3)),
+        np.empty(len(BEFORE) * n2, dtype=np.int64),
+    )
     for line in range(planes * n1):
         at = line if way > 0 else planes * n1 - 1 - line
         i, j, count = at // n1, at % n1, 0
         for step in range(n2):
             k = step if way > 0 else n2 - 1 - step
-            for axis in range(3):
-                a, b, c = i - way * (axis == 0), j - way * (axis == 1), k - way * (axis == 2)
+            value = values[i, j, k]
+            for m in range(len(BEFORE) if value < CLOSE * cell else 3):
+                u, v, w = BEFORE[m]
+                a, b, c = i + way * u, j + way * v, k + way * w
                 if not (0 <= a < planes and 0 <= b < n1 and 0 <= c < n2):
                     continue
                 other = nearest[a, b, c]
                 if other < 0 or other == nearest[i, j, k]:
                     continue
-                there = (first + a if axis == 0 else (b if axis == 1 else c)) * steps[axis]
                 near = values[a, b, c]
-                least = near * near + (there - feet[a, b, c, axis]) * way * steps[axis]
-                if least >= near * values[i, j, k] * (1.0 - ROUNDING):
+                least = near * near - way * (
+                    ((first + a) * steps[0] - feet[a, b, c, 0]) * u * steps[0]
+                    + (b * steps[1] - feet[a, b, c, 1]) * v * steps[1]
+                    + (c * steps[2] - feet[a, b, c, 2]) * w * steps[2]
+                )
+                if least >= near * value * (1.0 - ROUNDING):
                     continue
-                if nearest[i, j, k] >= 0 and across[other, 0] >= 0 and across[other, 1] >= 0 and across[other, 2] >= 0:
-                    square = (feet[a, b, c, 0] - feet[i, j, k, 0]) ** 2 + (feet[a, b, c, 1] - feet[i, j, k, 1]) ** 2
-                    if square + (feet[a, b, c, 2] - feet[i, j, k, 2]) ** 2 < apart:
-                        continue
-                points[count, 0], points[count, 1] = (first + i) * steps[0], j * steps[1]
-                points[count, 2] = k * steps[2]
+                x, y, z = (first + i) * steps[0], j * steps[1], k * steps[2]
+                most = value + (SLACK * cell if value < BESIDE * cell else 0.0)
+                if nearest[i, j, k] >= 0 and foot_on_triangle(rows, other, x, y, z)[0] >= most * most:
+                    continue
+                points[count, 0], points[count, 1], points[count, 2] = x, y, z
                 candidates[count, 0], nodes[count] = other, k
                 count += 1
         if count == 0:
