@@ -19,7 +19,7 @@ from types import BuiltinFunctionType
 from typing import Any
 
 from .kernel_lowering import Lower
-from .kernel_steps import REPLACED, makes_references
+from .kernel_steps import REPLACED, Constraints, Sequence, makes_references
 
 codegen: Any = import_module("numba.core.codegen")  # as far as type checkers are concerned, all of it is untyped
 compiler: Any = import_module("numba.core.compiler")
@@ -27,6 +27,7 @@ environments: Any = import_module("numba.core.environment")
 llvm: Any = import_module("llvmlite.binding")
 machinery: Any = import_module("numba.core.compiler_machinery")
 make_function: Any = import_module("numba._dynfunc").make_function
+typeinfer: Any = import_module("numba.core.typeinfer")
 typed_passes: Any = import_module("numba.core.typed_passes")
 untyped_passes: Any = import_module("numba.core.untyped_passes")
 types: Any = import_module("numba.core.types")
@@ -100,11 +101,14 @@ class Library(codegen.JITCodeLibrary):  # type: ignore[misc]
                 steps.run(function, builder)
 
     def _optimize_final_module(self) -> None:
-        if self.has_references or not NEW_PASSES:
+        if not NEW_PASSES:
             super()._optimize_final_module()
-        else:
-            steps, builder = self._codegen._module_pass_manager()
+            return
+        if self.has_references:  # into one function, so that most of them are found to be needless
+            steps, builder = self._codegen._module_pass_manager(opt=0, loop_vectorize=False, cost="cheap")
             steps.run(self._final_module, builder)
+        steps, builder = self._codegen._module_pass_manager()
+        steps.run(self._final_module, builder)
 
 
 class LinkedLibrary(Library):
@@ -175,6 +179,7 @@ def our_steps() -> Iterator[None]:
     """While one of our kernels is compiled: what it calls of Numba's own is only linked, and nobody times LLVM."""
     lock = getattr(getattr(llvm.ffi.lib, "_lock", None), "_cblist", [])
     decorator = templates._OverloadFunctionTemplate._get_jit_decorator
+    network = typeinfer.ConstraintNetwork
 
     def linked(self: Any) -> Any:
         jit = decorator(self)
@@ -183,10 +188,12 @@ def our_steps() -> Iterator[None]:
     with compiler_lock:
         told, lock[:] = list(lock), []
         templates._OverloadFunctionTemplate._get_jit_decorator = linked
+        typeinfer.ConstraintNetwork = Constraints
         try:
             yield
         finally:
             templates._OverloadFunctionTemplate._get_jit_decorator = decorator
+            typeinfer.ConstraintNetwork = network
             lock[:] = told
 
 
@@ -212,9 +219,10 @@ class Pipeline(compiler.CompilerBase):  # type: ignore[misc]
         kept = [(step, about) for step, about in steps.passes if step not in left_out]
         replaced = {**REPLACED, typed_passes.NativeLowering: Lowering}
         steps.passes = [(replaced.get(step, step), about) for step, about in kept]
-        steps._finalized = False
-        steps.finalize()
-        return [steps]
+        sequence = Sequence("signedheat")
+        sequence.passes = steps.passes
+        sequence.finalize()
+        return [sequence]
 
 
 def restored(context: Any, kept: Any) -> Any:

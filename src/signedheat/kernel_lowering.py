@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import Any
 
 arrays: Any = import_module("numba.np.arrayobj")
+callwrapper: Any = import_module("numba.core.callwrapper")
 cgutils: Any = import_module("numba.core.cgutils")
 ir: Any = import_module("numba.core.ir")
 llvm: Any = import_module("llvmlite.ir")
@@ -49,6 +50,22 @@ class Lower(lowering.Lower):  # type: ignore[misc]
             found = self._counted[kind] = bool(model.contains_nrt_meminfo())
         return found
 
+    def create_cpython_wrapper(self, release_gil: bool = False) -> None:
+        """The entry for Python, which is not worth optimising."""
+        if self.genlower:
+            super().create_cpython_wrapper(release_gil)
+            return
+        module = self.context.create_module("wrapper")
+        kind = self.context.call_conv.get_function_type(self.fndesc.restype, self.fndesc.argtypes)
+        called = llvm.Function(module, kind, self.fndesc.llvm_func_name)
+        wrapper = callwrapper.PyCallWrapper(
+            self.context, module, called, self.fndesc, self.env, call_helper=self.call_helper, release_gil=release_gil
+        )
+        entry, _ = wrapper.build()
+        for attribute in ("noinline", "optnone"):
+            entry.attributes.add(attribute)
+        self.library.add_ir_module(module)
+
     def delvar(self, name: str) -> None:
         """The end of a variable."""
         if self.is_counted(self.typeof(name)):
@@ -56,12 +73,24 @@ class Lower(lowering.Lower):  # type: ignore[misc]
 
     def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
         """Give a variable its value."""
-        if argidx is not None or self.is_counted(self.typeof(name)):
-            super().storevar(value, name, argidx)
+        if argidx is None and self.is_counted(self.typeof(name)):
+            super().storevar(value, name)
         elif name in self._singly_assigned_vars:
             self._blk_local_varmap[name] = value
         else:
             self.builder.store(value, self.getvar(name))
+
+    def alloca_lltype(self, name: str, kind: Any, datamodel: Any = None) -> Any:
+        """Room for a variable."""
+        return cgutils.alloca_once(self.builder, kind, name=name)
+
+    def lower_block(self, block: Any) -> None:
+        """The statements of a block."""
+        self.pre_block(block)
+        for statement in block.body:
+            self.loc = statement.loc
+            self.lower_inst(statement)
+        self.post_block(block)
 
     def lower_expr(self, kind: Any, expression: Any) -> Any:
         """The value of an expression."""

@@ -8,6 +8,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
+errors: Any = import_module("numba.core.errors")
 ir: Any = import_module("numba.core.ir")
 ir_utils: Any = import_module("numba.core.ir_utils")
 machinery: Any = import_module("numba.core.compiler_machinery")
@@ -15,12 +18,16 @@ rewrites: Any = import_module("numba.core.rewrites")
 ssa: Any = import_module("numba.core.ssa")
 transforms: Any = import_module("numba.core.transforms")
 typed_passes: Any = import_module("numba.core.typed_passes")
+typeinfer: Any = import_module("numba.core.typeinfer")
 types: Any = import_module("numba.core.types")
 untyped_passes: Any = import_module("numba.core.untyped_passes")
+utils: Any = import_module("numba.core.utils")
 
 VIEWS = {"getitem", "static_getitem", "getattr", "build_tuple", "cast", "phi", "getiter", "iternext", "exhaust_iter"}
 VIEWS |= {"pair_first", "pair_second"}
 """Expressions whose value, if it is an array, is one that was there before, or a part of it."""
+UFUNCS = np.ufunc, import_module("numba.np.ufunc.dufunc").DUFunc
+"""What calls of arrays become a loop."""
 
 
 @machinery.register_pass(mutates_CFG=True, analysis_only=False)
@@ -94,10 +101,30 @@ def _array_expressions(state: Any) -> Any:
                 continue
             if value.op == "static_getitem" and isinstance(value.index, str):
                 yield True
-            if value.op in ("unary", "binop", "inplace_binop", "call"):
+            if value.op in ("unary", "binop", "inplace_binop") or (value.op == "call" and _is_ufunc(state, value.func)):
                 yield isinstance(state.typemap.get(assignment.target.name), types.Array)
         for item in block.find_insts(ir.StaticSetItem):
             yield isinstance(item.index, str)
+
+
+def _is_ufunc(state: Any, function: Any) -> bool:
+    kind = state.typemap[function.name]
+    return not isinstance(kind, types.Dispatcher) and isinstance(getattr(kind, "typing_key", None), UFUNCS)
+
+
+@machinery.register_pass(mutates_CFG=True, analysis_only=False)
+class Merging(typed_passes.PreLowerStripPhis):  # type: ignore[misc]
+    """Variables that are assigned in several places again."""
+
+    _name = "signedheat_merging"
+
+    def run_pass(self, state: Any) -> bool:
+        """Replace the step of Numba."""
+        if state.func_ir.is_generator:
+            return bool(super().run_pass(state))
+        state.func_ir = self._strip_phi_nodes(state.func_ir)
+        state.func_ir._definitions = ir_utils.build_definitions(state.func_ir.blocks)
+        return True
 
 
 @machinery.register_pass(mutates_CFG=False, analysis_only=True)
@@ -114,11 +141,44 @@ class Ends(typed_passes.IRLegalization):  # type: ignore[misc]
         return True
 
 
+class Sequence(machinery.PassManager):  # type: ignore[misc]
+    """Steps one after another, without checks between them, nor analyses that only generators and lifted loops need."""
+
+    def _runPass(self, index: int, step: Any, state: Any) -> None:
+        if state.func_ir is not None and state.func_ir.is_generator:
+            super()._runPass(index, step, state)
+            return
+        step.analysis = self._analysis
+        with errors.new_error_context("Pass {name}", name=step.name()):
+            has_changed = step.run_initialization(state)
+            has_changed |= step.run_pass(state)
+            has_changed |= step.run_finalizer(state)
+        if has_changed and machinery._pass_registry.get(type(step)).mutates_CFG:
+            state.func_ir.blocks = transforms.canonicalize_cfg(state.func_ir.blocks)
+
+
+class Constraints(typeinfer.ConstraintNetwork):  # type: ignore[misc]
+    """What types depend on, without a place for the warnings of each."""
+
+    def propagate(self, inferer: Any) -> list[Any]:
+        """Apply all; those that fail for now are told."""
+        told = []
+        for constraint in self.constraints:
+            try:
+                constraint(inferer)
+            except errors.ForceLiteralArg as error:
+                told.append(error)
+            except errors.TypingError as error:
+                told.append(utils.chain_exception(errors.TypingError(str(error), loc=constraint.loc), error))
+        return told
+
+
 REPLACED = {
     untyped_passes.IRProcessing: Processing,
     untyped_passes.GenericRewrites: Rewriting,
     untyped_passes.ReconstructSSA: Assignments,
     typed_passes.NopythonRewrites: ArrayExpressions,
+    typed_passes.PreLowerStripPhis: Merging,
     typed_passes.IRLegalization: Ends,
 }
 
