@@ -71,6 +71,7 @@ TAKERS = {
     "solver": lambda shape: sh.SignedHeatSolver(sh.Grid.around(BALL.bounds, 12)).distance(shape).values,
     "many": lambda shape: sh.SignedHeatSolver(sh.Grid.around(BALL.bounds, 12)).distance_many([shape])[0].values,
     "sharpen": lambda shape: sh.sharpen(sh.signed_distance(BALL, resolution=12), shape).values,
+    "grid": lambda shape: sh.Grid.around(shape, 12).origin,
     "orient": lambda shape: sh.orient(shape).faces,
     "unite": lambda shape: sh.unite(shape, resolution=12).faces,
     "dilate": lambda shape: sh.dilate(shape, 0.2, resolution=16).vertices,

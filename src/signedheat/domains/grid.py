@@ -14,6 +14,8 @@ from ..errors import GeometryError, MemoryLimitError
 from ..frozen import Frozen
 from ..reprs import short
 from .display import Displayed, to_pyvista
+from .foreign import ForeignShape, Shape, converted
+from .polyline import Polyline
 from .validation import (
     array_of,
     coordinates,
@@ -120,17 +122,17 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
     @classmethod
     def around(
         cls: type[Grid[int]],
-        bounds: ArrayLike,
+        bounds: ArrayLike | Shape | Polyline | ForeignShape,
         resolution: int = 128,
         padding: float | None = None,
         spacing: ArrayLike | None = None,
     ) -> Grid[int]:
-        """A grid centred on a box, with padding on every side.
+        """A grid centred on a shape or a box, with padding on every side.
 
         Parameters
         ----------
-        bounds : (2, d) float
-            Lower and upper corner of the box, such as the `bounds` of a shape.
+        bounds : shape, or (2, d) float
+            A shape, or the lower and upper corner of a box.
         resolution : int
             Number of nodes along the longest side; all axes have the same spacing.
         padding : float, optional
@@ -147,15 +149,18 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         --------
         >>> Grid.around([[0, 0, 0], [1, 2, 4]], resolution=7, padding=1.0)
         Grid(origin=[-1, -1, -1], spacing=1, shape=(4, 5, 7))
+        >>> from signedheat.samples import sphere
+        >>> Grid.around(sphere(3), spacing=0.5).shape
+        (7, 7, 7)
         """
-        box = coordinates(bounds, "bounds")
+        box = coordinates(getattr(converted(bounds), "bounds", bounds), "bounds")
         if len(box) != 2 or not (box[0] <= box[1]).all():
             raise GeometryError(f"bounds must be a lower and an upper corner, not {box.tolist()}", element="bounds")
         lower, upper = box
         longest = float((upper - lower).max())
         if padding is not None:
             padding = finite_number(padding, "padding", 0, GeometryError)
-        room = room_around(bounds) if padding is None else float(padding)
+        room = room_around(box) if padding is None else float(padding)
         if not longest + 2 * room > 0:
             raise GeometryError(
                 "the shape is a single point",
