@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
+import signedheat as sh
 from shapes.bodies import box
 from signedheat import samples
-from signedheat.extensions.exact_uniting import exactly_without_covered
+from signedheat.extensions.exact_uniting import Overlaps, exactly_without_covered
 from signedheat.extensions.uniting import merge_duplicates
 
 
 def left_of(mesh, apart, finest):
-    return exactly_without_covered(merge_duplicates(mesh), apart, finest)
+    return exactly_without_covered(Overlaps(merge_duplicates(mesh), apart, finest))
 
 
 @pytest.mark.parametrize("gap", [1.0, 1.9, 1.99])
@@ -36,3 +37,20 @@ def test_bodies_that_touch_and_bodies_apart_are_left_as_they_are():
     for shift in (1.0, 1.2):
         pair = samples.union(box((0, 0, 0), (1, 1, 1)), box((shift, 0.2, 0.2), (shift + 1, 0.8, 0.8)))
         assert left_of(pair, 0.1, 0.02).shape is pair
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.05])
+def test_a_rod_far_thinner_than_a_face_is_found_in_its_middle(radius):
+    """Half of a rod is in a plate of large faces: it covers its section of them, up to the pieces at its rim."""
+    plate = box((-1, -1, -0.5), (1, 1, 0))
+    angle = 2 * np.pi * np.arange(32) / 32
+    ring = np.stack([radius * np.cos(angle) + 0.31, radius * np.sin(angle) + 0.17], axis=1)
+    vertices = np.concatenate([np.column_stack([ring, np.full(32, z)]) for z in (-0.2, 0.2)])
+    i, j = np.arange(32), (np.arange(32) + 1) % 32
+    fan = np.stack([np.zeros(30, dtype=int), np.arange(1, 31), np.arange(2, 32)], axis=1)
+    sides = np.concatenate([np.stack([i, j, 32 + j], axis=1), np.stack([i, 32 + j, 32 + i], axis=1)])
+    rod = sh.TriangleMesh(vertices, np.concatenate([sides, fan[:, ::-1], 32 + fan]))
+    found = left_of(samples.union(plate, rod), 0.04, 0.01)
+    upper = (np.abs(found.shape.vertices[found.shape.faces][:, :, 2]) < 1e-9).all(axis=1)
+    disc = 16 * radius**2 * np.sin(2 * np.pi / 32)
+    assert found.shape.face_areas[upper].sum() == pytest.approx(4 - disc, abs=0.005 * 2 * np.pi * radius)

@@ -35,4 +35,4 @@ def test_a_cap_is_seen_under_its_solid_angle(height):
     triangles = triangles[triangles[:, :, 2].min(axis=1) > -1e-9]
     rim = 1 / np.hypot(1, height)
     seen = 0.5 * (1 - height * rim)
-    assert winding(triangles, [[0, 0, -height]])[0] == pytest.approx(seen, abs=0.02)
+    assert winding(triangles, [[0, 0, -height]])[0] == pytest.approx(seen, abs=0.01)

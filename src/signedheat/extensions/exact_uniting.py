@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from ..geometry.components import same_positions
 from ..geometry.edges import edge_table
 from ..geometry.refining import split_at_edges
 from ..geometry.winding_tree import WindingTree
-from .uniting import BURIED, COVERED, Merged, Union, what_is_left, without_covered
+from .uniting import BURIED, COVERED, Merged, Union, what_is_left
 
 FINEST = 64
 """Parts along the sides of the largest faces at whose centres is looked."""
@@ -22,112 +23,107 @@ ROUNDS = 40
 """How often faces are halved at most."""
 MANY = 2_000_000
 """Faces beyond which none are cut further."""
-INNER = np.array([[1.0, 1, 1], [8, 1, 1], [1, 8, 1], [1, 1, 8]]) / np.array([[3.0], [10], [10], [10]])
-"""Places of a piece that are looked at: barycentric coordinates."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Depths:
-    """Winding numbers beside a mesh's faces: the mean of both sides; the same on both beside doubled walls."""
+class Overlaps:
+    """Winding numbers beside a mesh's faces: the mean of both sides; the same on both beside doubled walls.
 
-    mesh: TriangleMesh
-    walls: NDArray[np.bool_]
-    tree: WindingTree
+    Attributes
+    ----------
+    merged : Merged
+        The shape, with faces.
+    apart : float
+        Distance of the places of large faces that are looked at.
+    finest : float
+        Length of the edges of the pieces into which faces are cut, at most.
+    """
 
-    @classmethod
-    def of(cls, merged: Merged) -> _Depths:
-        """Of a shape with faces."""
-        assert not isinstance(merged.shape, PointCloud)
-        mesh = merged.shape.triangulation
-        return cls(mesh, merged.walls_among_triangles(), WindingTree.of(mesh.vertices[mesh.faces]))
+    merged: Merged
+    apart: float
+    finest: float
 
-    def covered(self, faces: NDArray[np.int64], places: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(n,) whether places on faces lie inside other bodies."""
+    @cached_property
+    def mesh(self) -> TriangleMesh:
+        """Its triangles."""
+        assert not isinstance(self.merged.shape, PointCloud)
+        return self.merged.shape.triangulation
+
+    @cached_property
+    def walls(self) -> NDArray[np.bool_]:
+        """(m,) those of doubled walls."""
+        return self.merged.walls_among_triangles()
+
+    @cached_property
+    def tree(self) -> WindingTree:
+        """Their winding numbers."""
+        return WindingTree.of(self.mesh.vertices[self.mesh.faces])
+
+    @cached_property
+    def of_faces(self) -> NDArray[np.float64]:
+        """(m,) share of each face that is covered."""
+        return self.covered(np.arange(self.mesh.n_faces), self.tree.triangles)
+
+    def covered(self, faces: NDArray[np.int64], pieces: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) share of places on (n, 3, 3) pieces of faces that lie inside other bodies."""
+        longest = np.linalg.norm(pieces - np.roll(pieces, 1, axis=1), axis=2).max(axis=1)
+        parts = np.clip(np.ceil(longest / self.apart), 1, FINEST).astype(np.int64)
+        share = np.empty(len(pieces))
+        for n in np.unique(parts):
+            chosen = np.flatnonzero(parts == n)
+            i, j = (np.argwhere(np.add.outer(np.arange(n), np.arange(n)) < n).T + 1 / 3) / n
+            weights = np.stack([1 - i - j, i, j], axis=1)
+            places = np.einsum("pc,fcd->fpd", weights, pieces[chosen]).reshape(-1, 3)
+            share[chosen] = (
+                self._at(np.repeat(faces[chosen], len(weights)), places).reshape(len(chosen), -1).mean(axis=1)
+            )
+        return share
+
+    def _at(self, faces: NDArray[np.int64], places: NDArray[np.float64]) -> NDArray[np.bool_]:
         behind = self.tree.behind(faces, places)
         result: NDArray[np.bool_] = np.where(self.walls[faces], behind > BURIED, behind - 0.5 > COVERED)
         return result
 
 
-def exactly_without_covered(merged: Merged, apart: float, finest: float) -> Union:
-    """Leave out what lies inside other bodies, and cut faces that are partly inside.
-
-    Parameters
-    ----------
-    merged : Merged
-        The shape.
-    apart : float
-        Distance of the places of large faces that are looked at.
-    finest : float
-        Length of the edges of the pieces at the cut, at most.
-    """
-    depths = _Depths.of(merged)
-    mesh = depths.mesh
-    some, every = _on_whole_faces(depths, apart)
+def exactly_without_covered(overlaps: Overlaps) -> Union:
+    """Leave out what lies inside other bodies, and cut faces that are partly inside."""
+    mesh, share = overlaps.mesh, overlaps.of_faces
     faces = same_positions(mesh.vertices)[mesh.faces]
-    if not some.any():
-        return what_is_left(merged, mesh, depths.walls, mesh.vertices, faces, np.arange(len(faces)), some)
-    return what_is_left(merged, mesh, depths.walls, *_cut(depths, faces, some, every, finest))
+    parts = mesh.vertices, faces, np.arange(len(faces)), share > 0.5
+    return what_is_left(overlaps.merged, mesh, overlaps.walls, *(_cut(overlaps, faces) if share.any() else parts))
 
 
-def union_for(merged: Merged, winding: NDArray[np.float64], grid: Grid, finest: float | None) -> Union:
-    """What lies inside other bodies left out: as the nodes of a grid tell, or exactly, for a band of that spacing."""
+def overlaps_of(merged: Merged, grid: Grid, finest: float | None) -> Overlaps | None:
+    """Of the bodies of a shape, for a band of some spacing around a coarse grid; None where a grid tells them."""
     if finest is None or isinstance(merged.shape, PointCloud):
-        return without_covered(merged, winding, grid)
-    return exactly_without_covered(merged, float(grid.spacing.min()), finest)
-
-
-def overlap_between_nodes(merged: Merged, grid: Grid, finest: float | None) -> bool:
-    """Whether bodies overlap where a grid that is coarse for a band has no nodes."""
-    return finest is not None and bool(_on_whole_faces(_Depths.of(merged), float(grid.spacing.min()))[0].any())
-
-
-def _on_whole_faces(depths: _Depths, apart: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(m,) whether some, and whether all of the places of each face are covered."""
-    triangles = depths.tree.triangles
-    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
-    parts = np.clip(np.ceil(longest / apart), 1, FINEST).astype(np.int64)
-    some, every = np.zeros(len(triangles), dtype=bool), np.ones(len(triangles), dtype=bool)
-    for n in np.unique(parts):
-        chosen = np.flatnonzero(parts == n)
-        i, j = (np.argwhere(np.add.outer(np.arange(n), np.arange(n)) < n).T + 1 / 3) / n
-        weights = np.stack([1 - i - j, i, j], axis=1)
-        places = np.einsum("pc,fcd->fpd", weights, triangles[chosen]).reshape(-1, 3)
-        covered = depths.covered(np.repeat(chosen, len(weights)), places).reshape(len(chosen), -1)
-        some[chosen], every[chosen] = covered.any(axis=1), covered.all(axis=1)
-    return some, every
+        return None
+    return Overlaps(merged, float(grid.spacing.min()), finest)
 
 
 def _cut(
-    depths: _Depths, faces: NDArray[np.int64], some: NDArray[np.bool_], every: NDArray[np.bool_], finest: float
+    overlaps: Overlaps, faces: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
     """Vertices, faces, the face of the mesh that each is part of, and whether it is covered."""
-    vertices, origins = depths.mesh.vertices, np.arange(len(faces))
-    partly = (some & ~every) | _beside_others(faces, some, every, len(vertices))
-    covered = every
+    vertices, origins, share = overlaps.mesh.vertices, np.arange(len(faces)), overlaps.of_faces
+    partly = _partly(faces, share, len(vertices))
     for _ in range(ROUNDS):
         table = edge_table(faces)
         ends = vertices[table.vertices]
         split = np.zeros(len(ends), dtype=bool)
         split[table.face_edges[partly]] = True
-        split &= np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > finest
+        split &= np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > overlaps.finest
         if not split.any() or len(faces) > MANY:
             break
         vertices, faces, parents = split_at_edges(vertices, faces, split, np.full(len(split), 0.5))
-        origins, covered, partly = origins[parents], covered[parents], partly[parents]
+        origins, share, partly = origins[parents], share[parents], partly[parents]
         at = np.flatnonzero(partly)
-        places = np.einsum("pc,fcd->fpd", INNER, vertices[faces[at]]).reshape(-1, 3)
-        inside = depths.covered(np.repeat(origins[at], len(INNER)), places).reshape(len(at), -1)
-        covered[at] = inside.sum(axis=1) > inside.shape[1] / 2
-        some, every = covered.copy(), covered.copy()
-        some[at], every[at] = inside.any(axis=1), inside.all(axis=1)
-        partly &= (some & ~every) | _beside_others(faces, some, every, len(vertices))
-    return vertices, faces, origins, covered
+        share[at] = overlaps.covered(origins[at], vertices[faces[at]])
+        partly &= _partly(faces, share, len(vertices))
+    return vertices, faces, origins, share > 0.5
 
 
-def _beside_others(
-    faces: NDArray[np.int64], some: NDArray[np.bool_], every: NDArray[np.bool_], n_vertices: int
-) -> NDArray[np.bool_]:
-    """(m,) faces that share a vertex with faces that are covered where they are not, or the other way round."""
+def _partly(faces: NDArray[np.int64], share: NDArray[np.float64], n_vertices: int) -> NDArray[np.bool_]:
+    """(m,) faces that are covered in part, or share a vertex with others that are where they are not."""
     has_covered, has_free = np.zeros(n_vertices, dtype=bool), np.zeros(n_vertices, dtype=bool)
-    has_covered[faces[some]], has_free[faces[~every]] = True, True
+    has_covered[faces[share > 0]], has_free[faces[share < 1]] = True, True
     return np.asarray((has_covered & has_free)[faces].any(axis=1))

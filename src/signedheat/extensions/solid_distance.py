@@ -33,7 +33,7 @@ from ..progress import Progress, Stopwatch, within
 from ..solver import SignedHeatSolver, checked
 from .band_plan import coarse_grid
 from .bands import band_around
-from .exact_uniting import overlap_between_nodes, union_for
+from .exact_uniting import Overlaps, exactly_without_covered, overlaps_of
 from .face_density import as_if_whole
 from .inside import Sides, closed_sides
 from .joining import Shape, joined_shape
@@ -47,7 +47,7 @@ from .sides import FAR
 from .solid_memory import bytes_of_faces, bytes_per_node
 from .steps import Steps
 from .thin_walls import telling_at, with_thin_walls
-from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, winding_of
+from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, without_covered, wound
 
 STEPS = 7
 """Steps that are timed."""
@@ -234,14 +234,16 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     refuse_beyond_memory(grid, bytes_per_node(shape, steps, closed=True), bytes_of_faces(shape))
     with stopwatch("orient"):
         merged, closed = _oriented(shape, steps, notes) if steps.orient else (merge_duplicates(shape), False)
+    overlaps = overlaps_of(merged, grid, steps.finest) if steps.unite else None
     if closed and steps.sharpen:
-        field = _bounded(merged, grid, steps, notes, stopwatch)
+        field = _bounded(merged, grid, steps, overlaps, notes, stopwatch)
         if field is not None:
             return field
     refuse_beyond_memory(grid, bytes_per_node(merged.shape, steps, closed=False))
     discretization = discretize(grid)
     with stopwatch("unite"):
-        merged, samples, winding = _united(merged, grid, steps, notes)
+        merged, samples, winding = _united(merged, grid, steps, overlaps, notes)
+        del overlaps
     if samples is None:  # doubled walls alone: there is no φ
         phi, time = None, float("nan")
     else:
@@ -271,7 +273,9 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     return _solid(sharpened, grid, notes, stopwatch, time)
 
 
-def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwatch: Stopwatch) -> GridField | None:
+def _bounded(
+    merged: Merged, grid: Grid, steps: Steps, overlaps: Overlaps | None, notes: list[Note], stopwatch: Stopwatch
+) -> GridField | None:
     """A shape whose parts are all closed, and do not overlap: there is nothing to complete, and lines tell its inside.
 
     None if it is not so. φ is needed where its faces lie in layers, only.
@@ -282,9 +286,9 @@ def _bounded(merged: Merged, grid: Grid, steps: Steps, notes: list[Note], stopwa
     with stopwatch("unite"):
         vertices, faces = triangles_of(shape)
         winding = closed_winding_numbers(((vertices - grid.origin) / grid.spacing)[faces], grid.shape)
-        if winding is None or (
-            steps.unite and (winding.max() > 1 or overlap_between_nodes(merged, grid, steps.finest))
-        ):
+        if winding is None or (steps.unite and winding.max() > 1):
+            return None
+        if overlaps is not None and overlaps.of_faces.any():  # between the nodes
             return None
     if merged.count:
         notes.append(LeftOut(merged_faces=merged.count))
@@ -375,24 +379,15 @@ def _widened(nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _united(
-    merged: Merged, grid: Grid, steps: Steps, notes: list[Note]
+    merged: Merged, grid: Grid, steps: Steps, overlaps: Overlaps | None, notes: list[Note]
 ) -> tuple[Merged, AreaSamples | None, NDArray[np.float64]]:
     """The shape, its samples and its winding numbers, without what lies inside other bodies."""
-    samples, winding = _wound(merged.shape, grid)
+    samples, winding = wound(merged.shape, grid)
     if not steps.unite:
         return merged, samples, winding
-    united = union_for(merged, winding, grid, steps.finest)
+    united = without_covered(merged, winding, grid) if overlaps is None else exactly_without_covered(overlaps)
     if united.left_out.merged_faces or united.left_out.covered_faces:
         notes.append(united.left_out)
     if united.shape is merged.shape:
         return merged, samples, winding
-    return merged.without(united), *_wound(united.shape, grid)
-
-
-def _wound(shape: Shape, grid: Grid) -> tuple[AreaSamples | None, NDArray[np.float64]]:
-    """Samples of a shape and its winding numbers; none and zeros where all its normals cancel."""
-    try:
-        samples = sample_on_grid([shape], grid, SAMPLE_SIZE)
-    except CancellingNormalsError:
-        return None, np.zeros(grid.shape)
-    return samples, winding_of(samples, grid)
+    return merged.without(united), *wound(united.shape, grid)

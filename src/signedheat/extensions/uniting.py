@@ -141,11 +141,16 @@ def union_of(shape: Shape | ForeignShape, domain: Grid | None = None, *, resolut
     own = cast("Shape", converted(shape))
     grid = grid_around([own], resolution) if domain is None else domain
     merged = merge_duplicates(own)
+    return without_covered(merged, wound(merged.shape, grid)[1], grid)
+
+
+def wound(shape: Shape, grid: Grid) -> tuple[AreaSamples | None, NDArray[np.float64]]:
+    """Samples of a shape and its winding numbers; none and zeros where all its normals cancel."""
     try:
-        samples = sample_on_grid([merged.shape], grid, SAMPLE_SIZE)
+        samples = sample_on_grid([shape], grid, SAMPLE_SIZE)
     except CancellingNormalsError:
-        return without_covered(merged, np.zeros(grid.shape), grid)
-    return without_covered(merged, winding_of(samples, grid), grid)
+        return None, np.zeros(grid.shape)
+    return samples, winding_of(samples, grid)
 
 
 def winding_of(samples: AreaSamples, grid: Grid) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """Kernels: generalized winding numbers of points, through a tree of boxes (Barill et al. 2018).
 
-Faces near a point count by the solid angles that they are seen under, what is far by its area vector alone.
+Faces near a point count by the solid angles that they are seen under, what is far by its moments.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..parallel import in_chunks
 from .box_tree import LEAF, BoxTree
+from .winding_moments import moments_of
 
 DEPTH, INWARDS = 1e-5, 0.02
 """Size of a face by which what is behind it lies behind it; share of the way to its centre by which it is inside."""
-OPENING = 2.0
-"""Distance over radius from which on one area vector stands for what is below a node."""
+OPENING = 1.25
+"""Distance over radius from which on moments stand for what is below a node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,37 +75,7 @@ class WindingTree:
 
     @cached_property
     def _moments(self) -> NDArray[np.float64]:
-        return _moments(self.triangles, self.tree)
-
-
-def _moments(triangles: NDArray[np.float64], tree: BoxTree) -> NDArray[np.float64]:
-    """(2 · leaves, 7) area vector, its centre, and the squared distance from there where it will do, of each node."""
-    leaves = len(tree.bounds) // 2
-    grouped = tree.items.reshape(leaves, LEAF)
-    there = (grouped >= 0)[..., None]
-    sides = triangles[:, 1:] - triangles[:, :1]
-    own = np.where(there, 0.5 * np.cross(sides[:, 0], sides[:, 1])[grouped], 0.0)
-    areas = np.linalg.norm(own, axis=2)
-    middles = np.where(there, triangles.mean(axis=1)[grouped], 0.0)
-    moments = np.zeros((2 * leaves, 7))
-    vectors, weights = own.sum(axis=1), areas.sum(axis=1)
-    firsts = (areas[..., None] * middles).sum(axis=1)
-    level = leaves
-    while level:
-        rows = slice(level, 2 * level)
-        moments[rows, :3] = vectors
-        centres = firsts / np.where(weights > 0, weights, 1.0)[:, None]
-        moments[rows, 3:6] = centres
-        low, high = tree.bounds[rows, :3], tree.bounds[rows, 3:]
-        with np.errstate(invalid="ignore"):  # of nothing
-            reach = np.maximum(centres - low, high - centres)
-        moments[rows, 6] = np.where(weights > 0, OPENING**2 * np.einsum("ij,ij->i", reach, reach), 0.0)
-        if level == 1:
-            break
-        vectors, firsts = (each.reshape(-1, 2, 3).sum(axis=1) for each in (vectors, firsts))
-        weights = weights.reshape(-1, 2).sum(axis=1)
-        level //= 2
-    return moments
+        return moments_of(self.triangles, self.tree, OPENING)
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -124,22 +95,41 @@ def _winding(
             dx, dy, dz = moments[node, 3] - x, moments[node, 4] - y, moments[node, 5] - z
             square = dx * dx + dy * dy + dz * dz
             if square > moments[node, 6]:
-                flux = dx * moments[node, 0] + dy * moments[node, 1] + dz * moments[node, 2]
+                m = moments[node]
+                xx, yy, zz = dx * dx, dy * dy, dz * dz
+                lean = xx * m[7] + yy * m[8] + zz * m[9] + dx * dy * m[10] + dx * dz * m[11] + dy * dz * m[12]
+                bend = dx * (xx * m[13] + yy * m[18] + zz * m[20]) + dy * (yy * m[14] + xx * m[16] + zz * m[21])
+                bend += dz * (zz * m[15] + xx * m[17] + yy * m[19]) + dx * dy * dz * m[22]
+                trace = dx * (3.0 * m[13] + m[18] + m[20]) + dy * (3.0 * m[14] + m[16] + m[21])
+                trace += dz * (3.0 * m[15] + m[17] + m[19])
+                flux = dx * m[0] + dy * m[1] + dz * m[2] + m[7] + m[8] + m[9]
+                flux += (7.5 * bend / square - 3.0 * lean - 1.5 * trace) / square
                 total += flux / (square * np.sqrt(square))
             elif node < leaves:
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
             else:
+                real, imaginary = 1.0, 0.0
                 for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
                     if items[k] >= 0:
-                        total += _solid_angle(corners, items[k], x, y, z)
+                        rest, volume = _solid_angle(corners, items[k], x, y, z)
+                        if rest > abs(volume):  # less than an eighth of a turn each: their product has their sum
+                            share = volume / rest
+                            real, imaginary = real - imaginary * share, imaginary + real * share
+                        elif volume != 0.0:
+                            total += 2.0 * np.arctan2(volume, rest)
+                if imaginary != 0.0:
+                    total += 2.0 * np.arctan2(imaginary, real)
         result[p] = total / (4.0 * np.pi)
     return result
 
 
 @compiled(nogil=True, error_model="numpy")
-def _solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> float:
-    """Signed solid angle of a triangle from a point, positive from behind it (van Oosterom & Strackee 1983)."""
+def _solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> tuple[float, float]:
+    """Parts of a complex number whose argument is half the signed solid angle of a triangle from a point.
+
+    Positive from behind it (van Oosterom & Strackee 1983).
+    """
     ax, ay, az = corners[face, 0] - x, corners[face, 1] - y, corners[face, 2] - z
     bx, by, bz = corners[face, 3] - x, corners[face, 4] - y, corners[face, 5] - z
     cx, cy, cz = corners[face, 6] - x, corners[face, 7] - y, corners[face, 8] - z
@@ -149,5 +139,4 @@ def _solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z:
     volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
     rest = a * b * c + (ax * bx + ay * by + az * bz) * c
     rest += (bx * cx + by * cy + bz * cz) * a + (cx * ax + cy * ay + cz * az) * b
-    angle: float = 2.0 * np.arctan2(volume, rest) if volume != 0.0 else 0.0
-    return angle
+    return rest, volume
