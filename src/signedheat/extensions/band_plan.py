@@ -16,6 +16,7 @@ from ..fields.grid_field import GridField
 from ..geometry.box_tree import BoxTree
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
+from ..geometry.touching_faces import touching_faces
 from ..geometry.winding_tree import WindingTree
 from ..operators.grid.blocks import CUBE, SIDE
 from .rims import Rims, rims_of
@@ -36,6 +37,8 @@ SLACK = 0.75
 """Coarse cells by which distance may be off between the nodes of the coarse field."""
 ENDS = 2.5
 """Coarse cells from ends of the surface up to which the fine solution counts."""
+TOUCHING = 1e-3
+"""Cells between faces that lie on each other."""
 LEAST = 2.0
 """Cells that a band is wide on either side at least."""
 
@@ -62,6 +65,8 @@ class BandPlan:
         Those that do not, but beside which winding numbers do.
     share : float
         Of the surface that is there, by which winding numbers are divided.
+    closed : bool
+        Whether winding numbers tell all sides, and nothing is completed.
     tree : BoxTree, optional
         Over the boxes of the faces; made when it is first needed.
     """
@@ -74,6 +79,7 @@ class BandPlan:
     ends: NDArray[np.float64]
     asked: NDArray[np.bool_]
     share: float = 1.0
+    closed: bool = False
     tree: BoxTree | None = None
 
     @property
@@ -106,6 +112,14 @@ class BandPlan:
         return WindingTree(self.features.corners.reshape(-1, 3, 3), self.faces.tree)
 
     @cached_property
+    def touching(self) -> NDArray[np.bool_]:
+        """(m,) faces on which others lie: which of them is the nearer tells nothing."""
+        if self.faces is None:
+            return np.zeros(0, dtype=bool)
+        bounds, items = self.faces.tree.bounds, self.faces.tree.items
+        return touching_faces(self.features.corners, self.features.face_normals, bounds, items, TOUCHING * self.cell)
+
+    @cached_property
     def rims(self) -> Rims | None:
         """Those of the faces."""
         if not len(self.features.rows):
@@ -127,7 +141,7 @@ class BandPlan:
     def open_places(self) -> scipy.spatial.cKDTree | None:
         """Around which surface may have to be completed: `ends`, and what the coarse field completes."""
         surface = self.coarse.surface
-        crossings = np.zeros((0, 3)) if surface is None else surface.crossings[:, 1:4]
+        crossings = np.zeros((0, 3)) if surface is None or self.closed else surface.crossings[:, 1:4]
         places = np.concatenate([self.ends, crossings])
         return scipy.spatial.cKDTree(places) if len(places) else None
 
@@ -256,8 +270,10 @@ def plan_band(coarse: GridField, grid: Grid, band: float) -> BandPlan:
     telling = telling | _closed_parts(features)
     width = max(float(band), LEAST * float(grid.spacing.max()))
     asked = np.zeros_like(telling) if surface.asked is None else surface.asked & ~telling
-    ends = _ends(features, telling | asked, 0.5 * float(coarse.grid.spacing.max()))
-    return BandPlan(grid, coarse, width, features, telling, ends, asked, surface.share)
+    ends = np.zeros((0, 3))
+    if not surface.closed:
+        ends = _ends(features, telling | asked, 0.5 * float(coarse.grid.spacing.max()))
+    return BandPlan(grid, coarse, width, features, telling, ends, asked, surface.share, surface.closed)
 
 
 def _closed_parts(features: FaceFeatures) -> NDArray[np.bool_]:

@@ -72,6 +72,7 @@ def save_plan(plan: BandPlan, folder: Path, fingerprint: str) -> None:
         "coarse_spacing": plan.coarse.grid.spacing.tolist(),
         "width": plan.width,
         "share": plan.share,
+        "closed": plan.closed,
     }
     temporary = place / "about.part"
     temporary.write_text(json.dumps(about))
@@ -109,7 +110,7 @@ def load_plan(folder: Path) -> BandPlan:
         tree = BoxTree(arrays["bounds"], arrays["items"]) if "bounds" in arrays else None
         fine = Grid(origin, about["spacing"], about["shape"])
         faces = arrays["telling"], arrays["ends"], arrays["asked"]
-        return BandPlan(fine, coarse, about["width"], features, *faces, about["share"], tree)
+        return BandPlan(fine, coarse, about["width"], features, *faces, about["share"], about["closed"], tree)
     except (OSError, ValueError, KeyError) as error:
         raise FileFormatError(
             f"the plan of its tiles cannot be read ({error})", remedy="remove the folder and start anew", path=folder

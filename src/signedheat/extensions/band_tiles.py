@@ -20,8 +20,6 @@ from .shape_sharpening import stands_in
 
 TOGETHER = 512
 """Blocks whose faces are searched at a time."""
-CONTRARY = 0.5
-"""Coarse cells by which the nearest face and the coarse field differ at least to contradict each other."""
 LEVEL = 0.5
 """Winding number of places inside, where no face tells."""
 COVERED, CLEAR = 0.75, 0.25
@@ -138,15 +136,17 @@ def _told(
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """(n,) signed functions, and whether faces tell them: the nearest, or all together by their winding number.
 
-    All are asked around walls that the coarse grid does not see, and where the nearest face and the coarse field
-    contradict each other: it may be folded over, or lie in what is inside.
+    All are asked around walls that the coarse grid does not see, where the nearest face and the coarse field contradict
+    each other, since it may be folded over or lie in what is inside, and where another face lies on it.
     """
     near = min(NEAR * plan.coarse_cell, plan.open_reach)
     by_face = found.regular & (found.distances < near) & plan.telling[found.faces]
     by_all = found.regular & (found.distances < near) & plan.asked[found.faces]
+    if plan.closed:
+        by_all = ~by_face & (found.distances < near)
     outside = found.cosines >= 0
     signed = np.where(outside, found.distances, -found.distances)
-    contrary = by_face & (np.abs(signed - coarse) > CONTRARY * plan.coarse_cell) & ((coarse >= 0) != outside)
+    contrary = by_face & (((coarse >= 0) != outside) | plan.touching[found.faces])
     asked = np.flatnonzero(by_all | contrary)
     if len(asked) and plan.winding is not None:
         winding = plan.winding.numbers(points[asked]) / plan.share

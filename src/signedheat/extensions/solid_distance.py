@@ -309,7 +309,7 @@ def _bounded(
 
     stopwatch.skip(4)
     with stopwatch("sharpen"):
-        sharpened = assemble([shape], grid, function, steps.fit, phi, restored=merged.restored)
+        sharpened = _closed(assemble([shape], grid, function, steps.fit, phi, restored=merged.restored), steps)
     return _solid(sharpened, grid, notes, stopwatch, float("nan"))
 
 
@@ -338,7 +338,7 @@ def _sharpened(
     if isinstance(shape, PointCloud) and phi is not None:  # no faces: φ is fitted to the points
         return assemble([shape], grid, _guarded(phi(), sides, shape, grid), "auto")
     if phi is not None and closed:
-        return assemble([shape], grid, sides.function, steps.fit, phi, restored=merged.restored)
+        return _closed(assemble([shape], grid, sides.function, steps.fit, phi, restored=merged.restored), steps)
     refused = _widened(sides.refused)
 
     def accepted() -> NDArray[np.float64]:
@@ -355,6 +355,13 @@ def _sharpened(
     if steps.finest is None:
         return assembled
     return replace(assembled, surface=with_thin_walls(assembled.surface, refused, share))
+
+
+def _closed(assembled: Assembled, steps: Steps) -> Assembled:
+    """The distance to closed bodies: bands may rely on it where no faces lie in layers."""
+    if steps.finest is None or assembled.layered:
+        return assembled
+    return replace(assembled, surface=replace(assembled.surface, closed=True))
 
 
 def _guarded(phi: NDArray[np.float64], sides: Sides, cloud: PointCloud, grid: Grid) -> NDArray[np.float64]:

@@ -15,6 +15,8 @@ from ..operators.grid.face_values import values_at
 BOUNDING = 0.22
 """Mean winding number of a face's two sides from which it tells inside from outside: 0 on a sheet, ½ on a solid, ¼ on
 one half a cell thick, where it is known at nodes only."""
+ENCLOSED = 0.95
+"""Winding number behind faces beside what the coarse grid takes for open sheets, from which they bound something."""
 PROBES = np.array([[1.0, 1, 1], [8, 1, 1], [1, 8, 1], [1, 1, 8]])
 """Barycentric coordinates, times their sum, of the places of a face that are asked."""
 
@@ -52,10 +54,10 @@ def with_thin_walls(surface: ExactSurface, refused: NDArray[np.bool_], share: fl
     asked = np.zeros(len(triangles), dtype=bool)
     if len(silent):
         nodes = np.rint(triangles[silent].mean(axis=1) / surface.steps).astype(np.int64)
-        silent = silent[~refused[tuple(np.clip(nodes, 0, np.array(refused.shape) - 1).T)]]
-    if len(silent):
+        open_there = refused[tuple(np.clip(nodes, 0, np.array(refused.shape) - 1).T)]
+        level = np.where(open_there, ENCLOSED, 0.5 + BOUNDING * share)  # ½ more than the mean of both sides
         tree = WindingTree(triangles, surface.tree.tree)
         for weights in PROBES / PROBES.sum(axis=1, keepdims=True):
             behind = tree.behind(silent, np.einsum("c,fcd->fd", weights, triangles[silent]))
-            asked[silent] |= behind - 0.5 > BOUNDING * share  # ½ more than the mean of both sides
+            asked[silent] |= behind > level
     return replace(surface, asked=asked, share=share)

@@ -90,6 +90,8 @@ class ExactSurface(Frozen):
         Faces beside which a winding number does, of the place itself.
     share : float
         Of the surface that is there, by which winding numbers are divided.
+    closed : bool
+        Whether winding numbers tell all sides, since the faces bound closed bodies, or their union.
     """
 
     features: FaceFeatures
@@ -100,6 +102,7 @@ class ExactSurface(Frozen):
     nodes: NDArray[np.int32] | None = None
     asked: NDArray[np.bool_] | None = None
     share: float = 1.0
+    closed: bool = False
 
     @cached_property
     def tree(self) -> FaceTree:
