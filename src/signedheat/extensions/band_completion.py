@@ -39,6 +39,21 @@ def halo(plan: BandPlan) -> int:
     return 1 + int(np.ceil(NONE * plan.coarse_cell / (SIDE * float(plan.steps.min()))))
 
 
+def needed_blocks(plan: BandPlan, low: NDArray[np.int64], high: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
+    """Blocks that must be computed for those in a box [low, high), and how many blocks from it they lie at most.
+
+    Around it those with completed surface, as far as it may be the nearest, and those near ends of the surface.
+    """
+    if not plan.is_open(low, high):
+        return plan.blocks_in(low, high), 0
+    reach = min(plan.reach / (SIDE * float(plan.steps.min())), float(max(plan.grid.shape)))
+    beside = 2 + int(reach)
+    wide = max(beside, halo(plan)) if plan.has_ends(low - beside, high + beside) else beside
+    held = plan.blocks_in(low - wide, high + wide)
+    own, around = (((held >= low - n) & (held < high + n)).all(axis=1) for n in (0, beside))
+    return held[own | (around & plan.blocks_near(plan.open_places, held)) | near_ends(plan, held)], wide
+
+
 def completed_function(
     plan: BandPlan,
     blocks: Blocks,
@@ -47,7 +62,7 @@ def completed_function(
     doubtful: NDArray[np.bool_],
 ) -> None:
     """Replace the coarse function, in place, at doubtful nodes of blocks, (n, 512) each, near the ends of faces."""
-    active = _are_near_ends(plan, blocks.places) if doubtful.any() else np.zeros(len(blocks), dtype=bool)
+    active = near_ends(plan, blocks.places) if doubtful.any() else np.zeros(len(blocks), dtype=bool)
     if not active.any():
         return
     fine = _fine_function(plan, SomeNodes.of_blocks(Blocks(blocks.places[active], blocks.shape)))
@@ -94,17 +109,9 @@ def _guarded(
     return result
 
 
-def near_ends(plan: BandPlan, places: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Those of the blocks at (n, 3) places that the method is repeated in, around the ends of the surface."""
-    return places[_are_near_ends(plan, places)].astype(np.int64)
-
-
-def _are_near_ends(plan: BandPlan, places: NDArray[np.integer]) -> NDArray[np.bool_]:
-    if plan.end_tree is None:
-        return np.zeros(len(places), dtype=bool)
-    centres = (places.astype(np.int64) * SIDE + 0.5 * (SIDE - 1)) * plan.steps
-    within = NONE * plan.coarse_cell + 0.5 * float(np.linalg.norm((SIDE - 1) * plan.steps))
-    return np.asarray(plan.end_tree.query(centres, distance_upper_bound=within)[0] <= within)
+def near_ends(plan: BandPlan, places: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """(n,) which of the blocks at (n, 3) places the method is repeated in, around the ends of the surface."""
+    return plan.blocks_near(plan.end_tree, places)
 
 
 def _fine_function(plan: BandPlan, nodes: SomeNodes) -> NDArray[np.float64] | None:

@@ -9,7 +9,7 @@ from ..errors import MemoryLimitError
 from ..memory import available_memory, libraries
 from ..operators.grid.blocks import CUBE, NODES, SIDE
 from ..parallel import n_threads
-from .band_completion import halo, near_ends
+from .band_completion import near_ends, needed_blocks
 from .band_plan import BandPlan
 
 LOOKED_AT = 24
@@ -63,11 +63,8 @@ def _blocks_of(plan: BandPlan, tile: NDArray[np.integer]) -> tuple[int, int, int
     low = np.asarray(tile, dtype=np.int64) * CUBE
     high = low + CUBE
     own = plan.blocks_in(low, high)
-    if not plan.is_open(low, high):
-        return len(own), len(own), 0
-    wide = halo(plan)
-    held = plan.blocks_in(low - wide, high + wide)
-    return len(own), len(held), len(near_ends(plan, held))
+    needed, wide = needed_blocks(plan, low, high)
+    return len(own), len(needed), int(near_ends(plan, needed).sum()) if wide else 0
 
 
 def _fitting_spacing(spacing: float, width: float, share: float) -> float:

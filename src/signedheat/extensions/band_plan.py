@@ -39,6 +39,9 @@ ENDS = 2.5
 """Coarse cells from ends of the surface up to which the fine solution counts."""
 TOUCHING = 1e-3
 """Cells between faces that lie on each other."""
+BEYOND, COVERED = 2.0, 0.75
+"""Cells beyond an end at which surface goes on inside bodies, as where they were united, if this is the winding number
+there: nothing is missing."""
 LEAST = 2.0
 """Cells that a band is wide on either side at least."""
 
@@ -117,7 +120,9 @@ class BandPlan:
         if self.faces is None:
             return np.zeros(0, dtype=bool)
         bounds, items = self.faces.tree.bounds, self.faces.tree.items
-        return touching_faces(self.features.corners, self.features.face_normals, bounds, items, TOUCHING * self.cell)
+        gap = TOUCHING * self.cell
+        found: NDArray[np.bool_] = touching_faces(self.features.corners, self.features.face_normals, bounds, items, gap)
+        return found
 
     @cached_property
     def rims(self) -> Rims | None:
@@ -179,6 +184,23 @@ class BandPlan:
     def has_ends(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> bool:
         """Whether the surface ends so near to a box of blocks that the fine solution counts there."""
         return self._is_near(self.end_tree, low, high, ENDS * self.coarse_cell)
+
+    def blocks_near(self, tree: scipy.spatial.cKDTree | None, places: NDArray[np.integer]) -> NDArray[np.bool_]:
+        """(n,) which of some blocks have nodes so near to open places or ends that the fine solution may count."""
+        if tree is None:
+            return np.zeros(len(places), dtype=bool)
+        centres = (places.astype(np.int64) * SIDE + 0.5 * (SIDE - 1)) * self.steps
+        within = ENDS * self.coarse_cell + 0.5 * float(np.linalg.norm((SIDE - 1) * self.steps))
+        found: NDArray[np.bool_] = tree.query(centres, distance_upper_bound=within)[0] <= within
+        return found
+
+    def away_from_ends(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) which of some places are so far from all ends of the surface that the fine solution does not count."""
+        if self.end_tree is None:
+            return np.ones(len(points), dtype=bool)
+        reach = ENDS * self.coarse_cell
+        away: NDArray[np.bool_] = self.end_tree.query(points, distance_upper_bound=reach)[0] > reach
+        return away
 
     def _is_near(
         self, tree: scipy.spatial.cKDTree | None, low: NDArray[np.int64], high: NDArray[np.int64], reach: float
@@ -270,10 +292,14 @@ def plan_band(coarse: GridField, grid: Grid, band: float) -> BandPlan:
     telling = telling | _closed_parts(features)
     width = max(float(band), LEAST * float(grid.spacing.max()))
     asked = np.zeros_like(telling) if surface.asked is None else surface.asked & ~telling
-    ends = np.zeros((0, 3))
-    if not surface.closed:
-        ends = _ends(features, telling | asked, 0.5 * float(coarse.grid.spacing.max()))
-    return BandPlan(grid, coarse, width, features, telling, ends, asked, surface.share, surface.closed)
+    tree, ends = None, np.zeros((0, 3))
+    if not surface.closed and len(features.rows):
+        tree = FaceTree.of(features).tree
+        ends, ahead = _ends(features, telling | asked, 0.5 * float(coarse.grid.spacing.max()))
+        winding = WindingTree(features.corners.reshape(-1, 3, 3), tree)
+        covered = winding.numbers(ends + BEYOND * float(grid.spacing.max()) * ahead) > COVERED * surface.share
+        ends = ends[~covered]
+    return BandPlan(grid, coarse, width, features, telling, ends, asked, surface.share, surface.closed, tree)
 
 
 def _closed_parts(features: FaceFeatures) -> NDArray[np.bool_]:
@@ -289,16 +315,24 @@ def _closed_parts(features: FaceFeatures) -> NDArray[np.bool_]:
     return np.asarray(~is_open[label])
 
 
-def _ends(features: FaceFeatures, telling: NDArray[np.bool_], gap: float) -> NDArray[np.float64]:
-    """Samples, at most `gap` apart, of edges beyond which the surface does not go on, and of faces that do not tell."""
+def _ends(
+    features: FaceFeatures, telling: NDArray[np.bool_], gap: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Samples, at most `gap` apart, of edges beyond which the surface does not go on, and of faces that do not tell.
+
+    Beside each the direction in which its face would go on.
+    """
     corners = features.corners.reshape(-1, 3, 3)
     face, side = np.nonzero((features.across < 0) | ~telling[:, None])
     start, stop = corners[face, side], corners[face, (side + 1) % 3]
-    counts = np.ceil(np.linalg.norm(stop - start, axis=1) / gap).astype(np.int64) + 1
+    lengths = np.linalg.norm(stop - start, axis=1)
+    counts = np.ceil(lengths / gap).astype(np.int64) + 1
     which = np.repeat(np.arange(len(counts)), counts)
     along = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)) / np.maximum(counts[which] - 1, 1)
     places = start[which] + along[:, None] * (stop[which] - start[which])
     if not len(places):
-        return np.zeros((0, 3))
-    kept: NDArray[np.float64] = places[np.unique(np.floor(places / gap).astype(np.int64), axis=0, return_index=True)[1]]
-    return kept
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    kept = np.unique(np.floor(places / gap).astype(np.int64), axis=0, return_index=True)[1]
+    edge = which[kept]
+    ahead = np.cross(stop[edge] - start[edge], features.face_normals[face[edge]])
+    return places[kept], ahead / np.where(lengths > 0, lengths, 1.0)[edge, None]

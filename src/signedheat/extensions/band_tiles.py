@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..geometry.nearest_faces import NearestFaces
 from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points, off_grid
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
-from .band_completion import NONE, completed_function, halo, near_ends
+from .band_completion import NONE, completed_function, needed_blocks
 from .band_plan import FAR, NEAR, BandPlan
 from .shape_sharpening import stands_in
 
@@ -66,13 +66,7 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     """The blocks of a tile, given by its first node divided by `TILE`, that hold nodes of the band."""
     low = np.asarray(tile, dtype=np.int64) * CUBE
     high = low + CUBE
-    is_open = plan.is_open(low, high)
-    reach = min(plan.reach / (SIDE * float(plan.steps.min())), float(max(plan.grid.shape)))
-    beside = 2 + int(reach) if is_open else 0  # whose crossings matter
-    wide = max(beside, halo(plan)) if is_open and plan.has_ends(low - beside, high + beside) else beside
-    held = plan.blocks_in(low - wide, high + wide)
-    far = ~((held >= low - beside) & (held < high + beside)).all(axis=1)
-    needed = np.concatenate([held[~far], near_ends(plan, held[far])])
+    needed, wide = needed_blocks(plan, low, high)
     blocks = Blocks.of(needed, plan.grid.shape)
     sides = _sides(plan, blocks)
     own = ((blocks.places >= low) & (blocks.places < high)).all(axis=1)
@@ -80,7 +74,7 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     distances, places = sides.distances[own], blocks.places[own]
     confidence = sides.trusted[own]
     crossings = np.zeros((0, 18))
-    if is_open:
+    if wide:
         last = -(-np.array(plan.grid.shape) // SIDE)
         crossings = _crossings(plan, sides, np.maximum(low - wide, 0), np.minimum(high + wide, last))
         _completed(plan, places, distances, confidence, crossings)
@@ -111,12 +105,12 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
             continue
         points = points.reshape(-1, NODES, 3)[here - begin].reshape(-1, 3)
         found = plan.faces.search(points)
-        signed, told = _told(plan, points, found, coarse.reshape(-1, NODES)[here - begin].ravel())
+        signed, told, ended = _told(plan, points, found, coarse.reshape(-1, NODES)[here - begin].ravel())
         distances[here] = found.distances.reshape(-1, NODES)
         function[here] = signed.reshape(-1, NODES)
         doubtful[here] = (~told & (plan.telling | plan.asked)[found.faces]).reshape(-1, NODES)
         trusted[here] = plan.features.trusted[found.faces].reshape(-1, NODES)
-        at_ends[here] = ~found.regular.reshape(-1, NODES)
+        at_ends[here] = ended.reshape(-1, NODES)
     completed_function(plan, blocks, distances, function, doubtful)
     return _Sides(blocks, distances, function, trusted, at_ends)
 
@@ -133,17 +127,22 @@ def _reached(plan: BandPlan, blocks: Blocks) -> NDArray[np.bool_]:
 
 def _told(
     plan: BandPlan, points: NDArray[np.float64], found: NearestFaces, coarse: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(n,) signed functions, and whether faces tell them: the nearest, or all together by their winding number.
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """(n,) signed functions, whether faces tell them, and whether these end at the nearest place and some may miss.
+
+    The nearest face tells, or all together by their winding number.
 
     All are asked around walls that the coarse grid does not see, where the nearest face and the coarse field contradict
-    each other, since it may be folded over or lie in what is inside, and where another face lies on it.
+    each other, since it may be folded over or lie in what is inside, where another face lies on it, and at edges beyond
+    which it does not go on, though nothing is missing there.
     """
     near = min(NEAR * plan.coarse_cell, plan.open_reach)
     by_face = found.regular & (found.distances < near) & plan.telling[found.faces]
     by_all = found.regular & (found.distances < near) & plan.asked[found.faces]
-    if plan.closed:
-        by_all = ~by_face & (found.distances < near)
+    ended = ~found.regular
+    at = np.flatnonzero(ended & (found.distances < near))
+    by_all[at] = plan.away_from_ends(points[at])
+    ended &= ~by_all
     outside = found.cosines >= 0
     signed = np.where(outside, found.distances, -found.distances)
     contrary = by_face & (((coarse >= 0) != outside) | plan.touching[found.faces])
@@ -153,7 +152,7 @@ def _told(
         level = np.where(by_all[asked], LEVEL, np.where(outside[asked], COVERED, CLEAR))
         signed[asked] = np.where(winding > level, -found.distances[asked], found.distances[asked])
     told = by_face | by_all
-    return np.where(told, signed, coarse), told
+    return np.where(told, signed, coarse), told, ended
 
 
 def _crossings(plan: BandPlan, sides: _Sides, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.float64]:
