@@ -57,10 +57,10 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
     intrinsic : "auto", True or False
-        Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh. "auto": where large angles would
-        make directions inaccurate, the mesh is refined once, and all sources share it and its factors. True: a
-        refinement for every set of sources, along whose edges they run. False: the triangles as they are. For more
-        control use `intrinsic_delaunay` as the domain.
+        Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh. "auto": where large angles or
+        needles would make distance inaccurate, the mesh is refined once, and all sources share it and its factors.
+        True: a refinement for every set of sources, along whose edges they run. False: the triangles as they are. For
+        more control use `intrinsic_delaunay` as the domain.
 
     Raises
     ------

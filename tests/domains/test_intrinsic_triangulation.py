@@ -74,6 +74,25 @@ def test_refinement_reaches_the_angle(surface):
     assert better.n_vertices < 12 * surface.n_vertices
 
 
+def circumradii(triangles):
+    return triangles.edge_lengths.prod(axis=1) / (4 * triangles.face_areas)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_large_triangles_are_split(scale):
+    """A fan of slivers: refinement makes many small triangles at its rim and few large ones between."""
+    around = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    rim = np.stack([np.cos(around), np.sin(around), 0 * around], axis=1)
+    fan = sh.TriangleMesh(scale * rim, [[0, k, k + 1] for k in range(1, 89)])
+    graded = sh.intrinsic_delaunay(fan, refine=True).triangles
+    largest = np.sqrt(4 / 27**0.5 * graded.face_areas.mean())  # circumradius if equilateral and of the mean area
+    assert circumradii(graded).max() > 2.5 * largest
+    better = sh.intrinsic_delaunay(fan, refine=True, coarsest=1.25)
+    assert better.complete and not len(better.thin_faces)
+    assert circumradii(better.triangles).max() <= 1.25 * largest * (1 + 1e-9)
+    assert better.triangles.face_areas.sum() == pytest.approx(fan.face_areas.sum(), rel=1e-12)
+
+
 def test_euler_characteristic_and_gluing(surface):
     better = sh.intrinsic_delaunay(surface, refine=True)
 
@@ -344,7 +363,7 @@ def test_refinement_ends_on_anything(seed):
         vertices[rng.integers(0, n, n // 3)] = vertices[rng.integers(0, n, n // 3)]
         soup = sh.TriangleMesh(vertices, rng.integers(0, n, (m, 3)))  # some faces with a corner twice
         try:
-            better = sh.intrinsic_delaunay(soup, refine=True, max_vertices=800)
+            better = sh.intrinsic_delaunay(soup, refine=True, max_vertices=800, coarsest=[1.4, np.inf][seed % 2])
         except sh.GeometryError as refusal:  # lengths of edges no longer tell the area of the thinnest
             assert refusal.remedy
             continue
@@ -382,6 +401,9 @@ def test_what_cannot_be_done_is_said():
     for angle in 45, 0, -3, np.nan, np.inf, "28", [20]:
         with refused(sh.GeometryError, "angle"):
             sh.intrinsic_delaunay(mesh, refine=True, angle=angle)
+    for coarsest in 0.9, -1, np.nan, "fine", [2]:
+        with refused(sh.GeometryError, "coarsest"):
+            sh.intrinsic_delaunay(mesh, refine=True, coarsest=coarsest)
     for limit in 0, -1, np.nan, np.inf, "many", [9]:
         with refused(sh.GeometryError, "max_vertices"):
             sh.intrinsic_delaunay(mesh, refine=True, max_vertices=limit)

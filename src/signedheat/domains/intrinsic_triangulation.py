@@ -253,6 +253,7 @@ def intrinsic_delaunay(
     refine: bool = False,
     angle: float = 28.0,
     max_vertices: int | None = None,
+    coarsest: float = np.inf,
     progress: Progress | None = None,
 ) -> IntrinsicTriangulation:
     """Intrinsic Delaunay triangulation or refinement of a mesh: better angles, the same surface.
@@ -275,6 +276,10 @@ def intrinsic_delaunay(
         Minimum angle in degrees, at most 30.
     max_vertices : int, optional
         Limit on the number of vertices; by default 20 for every vertex of the mesh and the kept curves, plus 10,000.
+    coarsest : float
+        Largest circumradius that refinement leaves, in multiples of that of an equilateral triangle of the mean area
+        that there would be otherwise; at least 1. Flat parts of CAD meshes, which small angles do not ask to be split,
+        are then about as fine as the rest.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
@@ -288,7 +293,7 @@ def intrinsic_delaunay(
     ------
     GeometryError
         If the domain is not a triangle mesh, has no area or faces so thin that lengths of edges do not tell it to four
-        digits, or `angle` or `max_vertices` is out of range.
+        digits, or `angle`, `max_vertices` or `coarsest` is out of range.
     SourceError
         If a curve to be kept does not lie on the mesh.
 
@@ -308,6 +313,8 @@ def intrinsic_delaunay(
         raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}", element="angle")
     if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):
         raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices!r}", element="max_vertices")
+    if not isinstance(coarsest, Real) or not coarsest >= 1:
+        raise GeometryError(f"coarsest must be at least 1, not {coarsest!r}", element="coarsest")
     stopwatch = Stopwatch(progress, steps=3)
     with stopwatch("embed curves"):
         base, _ = laid_out(mesh, MARGIN)
@@ -323,7 +330,7 @@ def intrinsic_delaunay(
         if refine:
             inner = None if progress is None else lambda share: progress((2 + share) / 3, "refine")
             limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
-            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), limit, inner)
+            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), float(coarsest), limit, inner)
             marked = np.append(marked, False)[origin]
     n = int(gluing.counts[3])
     triangles = lay_out(gluing)

@@ -88,3 +88,33 @@ def test_underflow_behind_two_fronts():
     sources = [mesh.path([0, 1]), mesh.path([2 * (n + 1), 2 * (n + 1) + 1])]
     phi = sh.SignedHeatSolver(mesh, intrinsic=False).distance(sources).values
     np.testing.assert_allclose(np.abs(phi), np.tile(np.repeat(np.arange(n + 1.0), 2), 2), atol=1e-5)
+
+
+def fan(n=400):
+    """A disc as a cap of CAD is triangulated: slivers from one of its vertices."""
+    around = np.linspace(0, 2 * np.pi, n, endpoint=False)
+    rim = np.stack([np.cos(around), np.sin(around), 0 * around], axis=1)
+    return sh.TriangleMesh(rim, [[0, k, k + 1] for k in range(1, n - 1)])
+
+
+def needles(n=90, m=6):
+    """A square of right-angled triangles fifteen times as long as wide."""
+    x, y = np.meshgrid(np.linspace(-1, 1, n + 1), np.linspace(-1, 1, m + 1))
+    a = (np.arange(m)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.concatenate([np.stack([a, a + 1, a + n + 2], 1), np.stack([a, a + n + 2, a + n + 1], 1)])
+    return sh.TriangleMesh(np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1), faces)
+
+
+@pytest.mark.parametrize("mesh", [fan(), needles()], ids=["fan", "needles"])
+@pytest.mark.parametrize("centre, radius, bound", [((0.2, 0.1), 0.2, 0.04), ((-0.1, 0.15), 0.5, 0.01)])
+def test_triangles_of_cad_meshes(mesh, centre, radius, bound):
+    """The default refines fans and needles, and not for their angles alone: a circle is larger than its triangles."""
+    steps = np.linspace(0, -2 * np.pi, 80, endpoint=False)
+    circle = np.stack([centre[0] + radius * np.cos(steps), centre[1] + radius * np.sin(steps), 0 * steps], axis=1)
+    curve = mesh.polyline(circle, closed=True)
+    truth = np.linalg.norm(mesh.vertices[:, :2] - centre, axis=1) - radius
+    default, plain = (
+        rms(sh.SignedHeatSolver(mesh, intrinsic=intrinsic).distance(curve).values - truth) / np.ptp(truth)
+        for intrinsic in ("auto", False)
+    )
+    assert default < bound and default < 0.25 * plain

@@ -1,4 +1,4 @@
-"""Intrinsic Delaunay refinement: insert vertices until no triangle is thin."""
+"""Intrinsic Delaunay refinement: insert vertices until no triangle is thin, and none large beside the others."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..components import connected_components
 from .coincidence_kernels import coinciding
 from .delaunay import doubled, lay_out
 from .gluing_kernels import Gluing
-from .refinement_kernels import FULL, GROW, N_BINS, NARROW, PAUSED, Agenda, Goal, list_all, refine
+from .refinement_kernels import DONE, FULL, GROW, N_BINS, NARROW, PAUSED, Agenda, Goal, list_all, refine
 
 PER_FACE = ("tail", "edge", "forward", "front", "sibling")
 PER_EDGE = ("start", "length", "fixed", "flips")
@@ -22,9 +22,13 @@ PATIENCE = 5000
 
 
 def refine_all(
-    gluing: Gluing, angle: float, max_vertices: int, progress: Callable[[float], None] | None = None
+    gluing: Gluing,
+    angle: float,
+    coarsest: float,
+    max_vertices: int,
+    progress: Callable[[float], None] | None = None,
 ) -> tuple[Gluing, NDArray[np.int64], NDArray[np.bool_], bool]:
-    """Refine a Delaunay triangulation until no face has an angle below `angle`, where that is possible.
+    """Refine a Delaunay triangulation until no face is thin and then none is large, where that is possible.
 
     Fixed, boundary and nonmanifold edges may be split but are not flipped. Small angles remain where fixed edges meet
     at less than 60°, at vertices with a total angle of less than 60°, at vertices that nearly coincide, and where the
@@ -35,7 +39,9 @@ def refine_all(
     gluing : Gluing
         Delaunay, as `flip_all` returns it; changed in place.
     angle : float
-        Radians.
+        Smallest angle, in radians.
+    coarsest : float
+        Largest circumradius, in multiples of that of an equilateral triangle of the mean area once no face is thin.
     max_vertices : int
         Stop when there are as many.
     progress : callable, optional
@@ -53,7 +59,23 @@ def refine_all(
         Whether refinement ended before the limit on the number of vertices.
     """
     segments, agenda = agenda_of(gluing)
-    goal = Goal(np.tan(angle / 2) ** 2, max_vertices)
+    goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
+    gluing, agenda, status = refined(gluing, agenda, goal, progress)
+    if status == DONE and coarsest < np.inf:
+        goal = goal._replace(radius=coarsest * mean_radius(gluing))
+        report = None if progress is None else lambda _: progress(1.0)  # it may cancel
+        gluing, agenda, status = refined(gluing, agenda, goal, report)
+    n_edges = int(gluing.counts[1])
+    origin = np.full(n_edges, -1)
+    fixed = np.flatnonzero(gluing.fixed[:n_edges])
+    origin[fixed] = segments[agenda.segment[fixed]]
+    return gluing, origin, close_faces(gluing, agenda), status != FULL
+
+
+def refined(
+    gluing: Gluing, agenda: Agenda, goal: Goal, progress: Callable[[float], None] | None
+) -> tuple[Gluing, Agenda, int]:
+    """Refine until the goal is met or out of reach; the arrays, perhaps longer ones, and why it ended."""
     list_all(gluing, agenda, goal)
     listed = np.flatnonzero(agenda.bins >= 0)  # lists by size, large faces first: the current list tells the progress
     done = 0.0
@@ -67,12 +89,12 @@ def refine_all(
             gluing = gluing._replace(**grown)
             agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in TO_GROW})
         if status not in (PAUSED, GROW):
-            break
-    n_edges = int(gluing.counts[1])
-    origin = np.full(n_edges, -1)
-    fixed = np.flatnonzero(gluing.fixed[:n_edges])
-    origin[fixed] = segments[agenda.segment[fixed]]
-    return gluing, origin, close_faces(gluing, agenda), status != FULL
+            return gluing, agenda, status
+
+
+def mean_radius(gluing: Gluing) -> float:
+    """Circumradius of an equilateral triangle of the mean area of the faces, in the unit of the gluing."""
+    return float(np.sqrt(4 / 27**0.5 * lay_out(gluing).face_areas.mean())) / gluing.unit
 
 
 def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Kernels of intrinsic Delaunay refinement: find thin triangles and insert vertices that remove them.
+"""Kernels of intrinsic Delaunay refinement: find thin and large triangles and insert vertices that remove them.
 
 Circumcentres are inserted (Chew 1993; on surfaces Sharp, Soliman & Crane 2019); where one would lie beyond a segment
 (an edge that must not be flipped) or in a segment's diametral circle, the segment is split instead (Ruppert 1995).
@@ -30,7 +30,7 @@ from .gluing_kernels import (
 )
 
 DONE, GROW, FULL, PAUSED = 0, 1, 2, 3
-"""Why `refine` returned: no thin face is left; arrays are full; vertex limit reached; pause to report progress."""
+"""Why `refine` returned: no bad face is left; arrays are full; vertex limit reached; pause to report progress."""
 
 NARROW = np.pi / 3
 """Where segments meet at less than this, or a vertex has a smaller total angle, small angles cannot be avoided."""
@@ -42,7 +42,7 @@ class Agenda(NamedTuple):
     """Work lists of refinement, and what it needs to know of segments.
 
     `stack` and `stacked` are the edges to be checked for the Delaunay property. `bins` and `next_face` are linked lists
-    of thin faces, by the binary logarithm of their circumradius; `listed` marks the faces that are in one. `segment` is
+    of bad faces, by the binary logarithm of their circumradius; `listed` marks the faces that are in one. `segment` is
     the input segment of each fixed edge, `segment_ends` and `segment_length` describe the segments, and `on_segment` is
     the segment on which a new vertex was inserted. `narrow` marks input vertices at which two segments meet at less
     than 60°, or with a smaller total angle. `group` and `extent` describe the vertices that nearly coincide, as
@@ -68,22 +68,23 @@ class Agenda(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """When refinement is done: `angle` is tan²(α/2) of the smallest angle α allowed; and the vertex limit."""
+    """When refinement is done: tan²(α/2) of the smallest angle α, largest circumradius, and limit on the vertices."""
 
     angle: float
+    radius: float
     max_vertices: int
 
 
 @kernel
 def refine(g, agenda, goal, patience):
-    """Insert vertices until no face has an angle below the goal, where possible; pause after `patience` of them."""
+    """Insert vertices until every face meets the goal, where possible; pause after `patience` of them."""
     pause = g.counts[2] + patience
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):
         for n in range(agenda.seen[0], g.counts[3]):
             for f in changed_faces(g, n):
                 list_face(g, agenda, f, goal)
         agenda.seen[0] = g.counts[3]
-        f = next_thin(g, agenda, goal)
+        f = next_bad(g, agenda, goal)
         if f < 0:
             return DONE
         if g.counts[2] >= goal.max_vertices:
@@ -111,21 +112,21 @@ def changed_faces(g, n):
 
 
 @kernel
-def is_thin(g, f, goal):
-    """Whether the smallest angle of a face, opposite to its shortest side, is below the goal; and that halfedge."""
+def is_bad(g, f, goal):
+    """Whether a face is too thin (its smallest angle is opposite to its shortest side) or too large; and that side."""
     h = 3 * f
     for k in range(1, 3):
         if g.length[g.edge[3 * f + k]] < g.length[g.edge[h]]:
             h = 3 * f + k
     n, d = tangent_at(g, preceding(h))
-    return n < goal.angle * d, h
+    return n < goal.angle * d or g.length[g.edge[h]] * (n + d) > 4.0 * goal.radius * np.sqrt(n * d), h
 
 
 @kernel
 def list_face(g, agenda, f, goal):
-    """Put a thin face on the lists."""
-    thin, h = is_thin(g, f, goal)
-    if agenda.listed[f] or not thin:
+    """Put a face on the lists, if it is bad."""
+    bad, h = is_bad(g, f, goal)
+    if agenda.listed[f] or not bad:
         return
     n, d = tangent_at(g, preceding(h))
     radius = g.length[g.edge[h]] * (n + d) / np.sqrt(n * d) if n > 0.0 and d > 0.0 else np.inf
@@ -137,34 +138,34 @@ def list_face(g, agenda, f, goal):
 
 @kernel
 def list_all(g, agenda, goal):
-    """Put every thin face on the lists."""
+    """Put every bad face on the lists."""
     for f in range(g.counts[0]):
         list_face(g, agenda, f, goal)
 
 
 @kernel
-def next_thin(g, agenda, goal):
-    """The thin face of (nearly) the largest circumradius, or −1."""
+def next_bad(g, agenda, goal):
+    """The bad face of (nearly) the largest circumradius, or −1."""
     for place in range(N_BINS - 1, -1, -1):
         while agenda.bins[place] >= 0:
             f = agenda.bins[place]
             agenda.bins[place] = agenda.next_face[f]
             agenda.listed[f] = False
             agenda.seen[1] = place
-            if is_thin(g, f, goal)[0]:
+            if is_bad(g, f, goal)[0]:
                 return f
     return -1
 
 
 @kernel
 def improve(g, agenda, f, goal):
-    """Insert one vertex to remove a thin face, where possible; returns False if the arrays have no room for it.
+    """Insert one vertex to remove a bad face, where possible; returns False if the arrays have no room for it.
 
     A face at vertices that nearly coincide is left as it is, unless an angle above 150° makes its circumcircle large
     and no segment blocks its circumcentre: grading the faces towards such vertices would take hundreds of new vertices,
     for no gain in accuracy.
     """
-    h = is_thin(g, f, goal)[1]
+    h = is_bad(g, f, goal)[1]
     close = coincide(g, agenda, h)
     if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
         return True

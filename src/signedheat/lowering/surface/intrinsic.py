@@ -25,6 +25,18 @@ SPOILED = 0.0015
 LARGE = 120.0
 """Degrees."""
 
+NEEDLES = 0.1
+"""Fraction of the area in triangles with an angle below `SMALL`, from which a mesh is refined."""
+
+SMALL = 10.0
+"""Degrees. Needles resolve distance by their length only, even right-angled ones."""
+
+ANGLE = 20.0
+"""Smallest angle of "auto", in degrees: vertices that 28 would take are better spent on large triangles."""
+
+COARSEST = 1.25
+"""Largest triangles of "auto", beside the mean one: curves on coarser ones are not resolved."""
+
 BYTES_REFINED = 750
 """What each triangle of a refinement takes itself, besides distance on it."""
 
@@ -54,30 +66,45 @@ class Retriangulated:
 
 
 def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
-    """The discretisation of a domain; triangle meshes with many large angles are refined intrinsically.
+    """The discretisation of a domain; triangle meshes with many large or small angles are refined intrinsically.
 
     Those whose faces are too thin for that stay as they are, with the note `LargeAngles`.
     """
-    if isinstance(domain, TriangleMesh) and large_angles(domain) >= SPOILED:
+    if isinstance(domain, TriangleMesh) and is_spoiled(domain):
         try:
-            return refined(domain, progress)
+            return refined(domain, progress, (), ANGLE, COARSEST)
         except GeometryError:
             pass
     return discretize(domain)
 
 
-def large_angles(mesh: TriangleMesh) -> float:
-    """Fraction of the area in triangles with a large angle."""
-    a, b, c = np.sort(mesh.edge_lengths[mesh.edges.face_edges] ** 2, axis=1).T
-    large = c - a - b > -2 * np.cos(np.radians(LARGE)) * np.sqrt(a * b)
+def is_spoiled(mesh: TriangleMesh) -> bool:
+    """Whether so much of the area has a large angle, or is needles, that the mesh is to be refined.
+
+    Examples
+    --------
+    >>> strip = TriangleMesh([[0, 0, 0], [8, 0, 0], [0, 1, 0], [8, 1, 0]], [[0, 1, 2], [1, 3, 2]])
+    >>> is_spoiled(strip), is_spoiled(TriangleMesh(strip.vertices * [0.5, 1, 1], strip.faces))
+    (True, False)
+    """
+    a, b, c = np.sort(mesh.edge_lengths[mesh.edges.face_edges], axis=1).T
     areas = mesh.face_areas
-    return float(areas[large].sum() / max(areas.sum(), 1e-300))
+    total = max(float(areas.sum()), 1e-300)
+    large = c**2 - a**2 - b**2 > -2 * np.cos(np.radians(LARGE)) * a * b
+    small = b**2 + c**2 - a**2 > 2 * np.cos(np.radians(SMALL)) * b * c
+    return bool(areas[large].sum() >= SPOILED * total or areas[small].sum() >= NEEDLES * total)
 
 
-def refined(mesh: TriangleMesh, progress: Progress | None = None, keep: Sequence[Any] = ()) -> SurfaceDiscretization:
+def refined(
+    mesh: TriangleMesh,
+    progress: Progress | None = None,
+    keep: Sequence[Any] = (),
+    angle: float = 28.0,
+    coarsest: float = np.inf,
+) -> SurfaceDiscretization:
     """The intrinsic Delaunay refinement of a mesh; fields are reported on the mesh, and kept on the refinement."""
     refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", beside=BYTES_REFINED * mesh.n_faces)  # which only grow
-    domain = intrinsic_delaunay(mesh, keep=keep, refine=True, progress=progress)
+    domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=progress)
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     lowered_mesh = lowered(domain, domain=mesh, restriction=np.arange(mesh.n_vertices))
     return replace(lowered_mesh, triangulation=domain)
