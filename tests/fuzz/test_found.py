@@ -30,6 +30,8 @@ FOUND = [
     ("space tets", 207, 222),
     # levels far from zero, interpolated
     ("surface use", 300, 927), ("surface use", 300, 1913),
+    # points that nearly coincide, each at a level of its own
+    ("surface use", 412, 1359),
     # paths through edges that are a rounding shorter than none
     ("surface use", 202, 43), ("surface curves", 300, 4876),
     # bands around shapes all of whose faces lie in layers

@@ -161,7 +161,7 @@ class DirectIntegration(Frozen):
 
     def _factorize_pulled(self, rows: sparse.csr_matrix, springs: NDArray[np.float64]) -> Factor:
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
-        unreached = np.isin(self.components[self._first_vertices], self._component_of(rows), invert=True)
+        unreached = np.isin(self.components[self._first_vertices], self._component_of(rows[springs > 0]), invert=True)
         matrix = _grounded(matrix, self._first_vertices[unreached])
         before: list[Factor] = self._of_this_pattern(fingerprint(matrix.indptr, matrix.indices), list)
         factor = self.factorize(matrix, like=before[0]) if before else self.factorize(matrix)

@@ -44,18 +44,22 @@ class SpringIntegration(DirectIntegration):
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
         """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, also over the constants of groups; see Eq. 14.
 
-        S is the diagonal matrix of the `springs`, in place of the multipliers of Eq. 14.
+        S is the diagonal matrix of the `springs`, in place of the multipliers of Eq. 14. A group of one sample, whose
+        constant may be anything, has no spring.
         """
         rows = source.interpolation
         springs = self.springs(source)
+        if levels.groups is not None:
+            springs = np.where(np.bincount(levels.groups)[levels.groups] > 1, springs, 0.0)
         factor = self._pulled_factor(rows, springs)
         pull = sparse.csr_matrix(rows.T @ sparse.diags_array(springs))
         values, fitted = self.corrected(levels.values, lambda at: factor.solve(divergence + pull @ at), source)
         if levels.groups is None:
             return self._reached(fitted, rows)
-        parts = self._component_of(rows)
-        first = levels.groups[np.unique(parts, return_index=True)[1]]  # one group of each part keeps its level
-        others = np.setdiff1d(levels.groups, first)
+        held = springs > 0
+        groups, parts = levels.groups[held], self._component_of(rows[held])
+        first = groups[np.unique(parts, return_index=True)[1]]  # one group of each part keeps its level
+        others = np.setdiff1d(groups, first)
         if len(others):
             chosen = np.flatnonzero(np.isin(levels.groups, others))
             entries = np.ones(len(chosen)), (chosen, np.searchsorted(others, levels.groups[chosen]))
@@ -65,7 +69,7 @@ class SpringIntegration(DirectIntegration):
             for begin in range(0, len(others), BATCH):
                 lifted = members[:, begin : begin + BATCH].toarray()
                 balance[:, begin : begin + BATCH] = forces @ (lifted - rows @ factor.solve(pull @ lifted))
-            constants = np.linalg.solve(balance, forces @ (rows @ fitted - values))
+            constants = np.linalg.lstsq(balance, forces @ (rows @ fitted - values), rcond=None)[0]
             fitted = fitted + factor.solve(pull @ (members @ constants))
         return self._centered(fitted, source)
 

@@ -174,6 +174,21 @@ def test_each_component_is_the_minimum_over_all_constants():
         assert energy(best.values) < energy(solver.distance(curves, sh.LevelValues(constants + nudge)).values)
 
 
+def test_single_points_at_levels_of_their_own_constrain_nothing():
+    """Each takes the level that φ has there anyway, beside a curve or alone."""
+    mesh = bumpy()
+    solver, points = sh.SignedHeatSolver(mesh, intrinsic=False), sh.SurfacePoints([3, 80, 200], np.full((3, 3), 1 / 3))
+    alone, free = (solver.distance(points, each).values for each in (sh.EachComponent(), sh.Free()))
+    assert np.abs(alone - free).max() < 1e-13
+    curve = loops(mesh)[1]
+    beside = solver.distance([curve, points], sh.EachComponent())
+    rows, single = beside.source.interpolation, beside.source.source_ids == 1
+    phi = rows @ beside.values
+    level = np.average(phi[~single], weights=beside.source.weights[~single])
+    held = solver.distance([curve, points], sh.LevelValues([0.0, *(phi[single] - level)])).values
+    assert np.ptp(held - beside.values) < 1e-6 * np.ptp(held)
+
+
 def test_dependent_rows_are_no_obstacle():
     """Two crossings of one edge, a curve given twice, and all corners of a face through its inside."""
     mesh = bumpy()
