@@ -38,6 +38,8 @@ FOUND = [
     ("space queries", 400, 3031), ("space queries", 400, 5229),
     # polygons that overlap, and shapes without any face, in bands
     ("space queries", 1122, 41), ("space queries", 1122, 466),
+    # a picture of 230 bytes that announces 75 million pixels
+    ("files masks", 20261122, 753),
     # arguments that are quoted, compared or counted
     ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
     ("arguments", 206, 22), ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),

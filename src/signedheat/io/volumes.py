@@ -136,12 +136,28 @@ def _read_picture(path: PathLike) -> tuple[NDArray[np.float64], NDArray[np.float
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about pictures that are large: they are compared with the memory
         opened = Image.open(io.BytesIO(data))
+        _refuse_missing_pixels(opened, len(data), path)
         ensure_fits(16 * opened.width * opened.height, path)
         picture = opened.convert("RGBA")
     white = Image.new("RGBA", picture.size, "white")
     brightness = np.asarray(Image.alpha_composite(white, picture).convert("L")) / 255
     return brightness[::-1].T, np.zeros(2), np.ones(2)
 
+
+def _refuse_missing_pixels(picture: Any, size: int, path: PathLike) -> None:
+    """Check that the parts of a picture cover it, and that its bytes are not too few for its pixels, in any packing."""
+    n_pixels = picture.width * picture.height
+    covered = sum((right - left) * (upper - lower) for _, (left, lower, right, upper), *_ in picture.tile)
+    if covered < n_pixels or n_pixels > 8 * MOST_PACKED * size:
+        raise FileFormatError(
+            f"it announces {picture.width} × {picture.height} pixels, and has fewer",
+            remedy="write or download it again",
+            path=path,
+        )
+
+
+MOST_PACKED = 1 << 14
+"""Bytes that a byte of a picture may stand for: pages without a mark, line by line, some thousands."""
 
 VOLUME_READERS = {".npy": _read_plain_npy, ".nrrd": _read_nrrd, ".vti": read_vti}
 
