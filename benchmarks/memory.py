@@ -16,8 +16,9 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.extensions.joining import Shape
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
-from signedheat.extensions.solid_memory import bytes_of_faces, bytes_per_node
+from signedheat.extensions.solid_memory import BYTES_IF_OPEN, bytes_of_faces, bytes_per_node
 from signedheat.extensions.steps import Steps
 from signedheat.geometry.surfels import count_surfels
 from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate
@@ -37,6 +38,10 @@ SIZES = {
     "intrinsic": (70, 140, 200),
     "piecewise": (50, 100, 200),
     "piecewise, exact": (40, 60, 80),
+    "grids, φ alone": (96, 160, 256),
+    "closed solids": (96, 160, 288),
+    "solids with holes": (96, 160, 288),
+    "points as solids": (96, 160, 256),
     "noisy soups": (96, 144, 192),
 }
 """Of each kind: parallels of a globe, points, voxels and cells along an edge, nodes along the longest side."""
@@ -107,20 +112,32 @@ def piecewise(size: int, exact: bool = False) -> tuple[Callable[[], object], flo
     return lambda: sh.piecewise_distance(mesh, half, exact=exact), piecewise_estimate(mesh.n_faces, exact)
 
 
-def noisy_soup(size: int) -> tuple[Callable[[], object], float]:
-    """A soup of 20,480 faces in a grid of this resolution."""
-    mesh = samples.soup(samples.sphere(5), 0.02)
-    steps = Steps(True, True, True, sh.ZeroSet(), 1.0)
+def phi_alone(size: int) -> tuple[Callable[[], object], float]:
+    """The method alone, around a ball with holes."""
+    mesh = samples.without_patches(samples.sphere(5), 4, 0.1)
     grid = sh.Grid.around(mesh.bounds, size)
-    estimate = grid_estimate(grid, bytes_per_node(mesh, steps, closed=True), bytes_of_faces(mesh)) - libraries()
-    return lambda: sh.solid_distance(mesh, grid), estimate
+    return lambda: sh.signed_distance(mesh, grid), grid_estimate(grid) - libraries()
+
+
+def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable[[], object], float]:
+    """A solid in a grid of this resolution."""
+    made = shape()
+    steps = Steps(True, True, True, sh.ZeroSet(), 1.0)
+    grid = sh.Grid.around(made.bounds, size)
+    beside = bytes_of_faces(made) + (0 if closed else BYTES_IF_OPEN)
+    estimate = grid_estimate(grid, bytes_per_node(made, steps, closed), beside) - libraries()
+    return lambda: sh.solid_distance(made, grid), estimate
 
 
 CASES = {
+    "grids, φ alone": phi_alone,
+    "closed solids": partial(solid, lambda: samples.sphere(5), True),
+    "solids with holes": partial(solid, lambda: samples.without_patches(samples.sphere(5), 4, 0.1), False),
+    "points as solids": partial(solid, lambda: sh.PointCloud(samples.sphere(5).vertices), True),
+    "noisy soups": partial(solid, lambda: samples.soup(samples.sphere(5), 0.02), True),
     "intrinsic": refined,
     "piecewise": piecewise,
     "piecewise, exact": partial(piecewise, exact=True),
-    "noisy soups": noisy_soup,
 }
 
 

@@ -93,7 +93,7 @@ DOMAINS = {
     "points": (sh.PointCloud(BALL.vertices), lambda d: d.points_at(0)),
     "faces of voxels": (sh.DigitalSurface(np.ones((9, 9, 9), dtype=bool)), lambda d: d.points_at(0)),
     "tets": (boxes((3, 3, 3), 0.3), lambda d: INSIDE),
-    "grid": (sh.Grid((0, 0, 0), 0.1, (9, 9, 9)), lambda d: INSIDE),
+    "grid": (sh.Grid((-0.4, -0.4, -0.4), 0.1, (17, 17, 17)), lambda d: INSIDE),
 }
 
 
@@ -131,7 +131,7 @@ def test_noisy_soups_are_refused_before_their_faces_are_turned(monkeypatch):
     """With memory for a closed ball, but not for its faces in layers."""
     soup = samples.soup(BALL, 0.02)
     grid = sh.Grid.around(soup.bounds, 64)
-    closed = memory_estimate(grid, BYTES_IF_CLOSED, bytes_of_faces(BALL))
+    closed = memory_estimate(grid, BYTES_IF_CLOSED, bytes_of_faces(soup))
     monkeypatch.setattr(memory, "_free", lambda: closed + 1_000_000)
     monkeypatch.setattr(solid_distance, "_oriented", lambda *_: pytest.fail("turned"))
     with refused(sh.MemoryLimitError) as caught:

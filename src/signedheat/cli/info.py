@@ -12,7 +12,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError, SourceError
 from ..extensions.orientation import Orientation, orientation
-from ..extensions.solid_memory import BYTES_PER_NODE
+from ..extensions.solid_memory import BYTES_IF_OPEN, BYTES_PER_NODE, bytes_of_faces
 from ..extensions.thickness import Thickness, thickness
 from ..io import read, read_curves, read_polylines
 from ..io.files import extension
@@ -160,14 +160,18 @@ def _least_spacing(shape: Any) -> float | None:
     available = available_memory()
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    return float(fitting_spacing(Grid.around(shape.bounds, 128), available, BYTES_PER_NODE).max())
+    return float(fitting_spacing(Grid.around(shape.bounds, 128), available, BYTES_PER_NODE, _beside(shape)).max())
 
 
 def _memory(shape: Any, resolution: int) -> int | None:
     """Estimate for a grid around the shape; nothing where the shape is a single place."""
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    return memory_estimate(Grid.around(shape.bounds, resolution), BYTES_PER_NODE)
+    return memory_estimate(Grid.around(shape.bounds, resolution), BYTES_PER_NODE, _beside(shape))
+
+
+def _beside(shape: Any) -> float:
+    return bytes_of_faces(shape) + BYTES_IF_OPEN
 
 
 def _table(summary: dict[str, Any]) -> str:

@@ -44,7 +44,7 @@ from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .shape_sides import sides_of_shape
 from .sharpening import sharpen
 from .sides import FAR
-from .solid_memory import bytes_of_faces, bytes_per_node
+from .solid_memory import BYTES_IF_OPEN, bytes_of_faces, bytes_per_node
 from .steps import Steps
 from .thin_walls import telling_at, with_thin_walls
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, without_covered, wound
@@ -239,7 +239,7 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
         field = _bounded(merged, grid, steps, overlaps, notes, stopwatch)
         if field is not None:
             return field
-    refuse_beyond_memory(grid, bytes_per_node(merged.shape, steps, closed=False))
+    refuse_beyond_memory(grid, bytes_per_node(merged.shape, steps, closed=False), BYTES_IF_OPEN)
     discretization = discretize(grid)
     with stopwatch("unite"):
         merged, samples, winding = _united(merged, grid, steps, overlaps, notes)

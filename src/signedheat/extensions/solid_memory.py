@@ -10,14 +10,14 @@ from ..domains.triangle_mesh import TriangleMesh
 from .joining import Shape
 from .steps import Steps
 
-BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 54, 42, 31
-"""Measured peak memory: of points and shapes with holes or overlaps; of φ alone; of shapes whose parts are closed."""
-BYTES_IF_SCATTERED = 62
-"""The same of noisy soups, whose faces lie in layers."""
+BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 54, 42, 30
+"""Measured peak memory: of shapes with holes or overlaps; of φ alone; of shapes whose parts are closed."""
+BYTES_IF_SCATTERED, BYTES_IF_POINTS = 62, 46
+"""The same of noisy soups, whose faces lie in layers, and of points."""
 BYTES_PER_FACE, BYTES_PER_SCATTERED_FACE = 400, 1200
 """What each triangle of the shape adds, and each of a noisy soup, which share no edges."""
-BYTES_OF_POINTS = 190_000_000
-"""What turning points takes, of however many: the libraries and kernels that only it needs."""
+BYTES_IF_OPEN, BYTES_OF_POINTS = 20_000_000, 210_000_000
+"""Of libraries and kernels that only shapes which are not closed, and turning points, need."""
 ONCE = 0.9
 """Share of the vertices with a coordinate of their own from which on a soup has noise, so that it is never joined."""
 
@@ -26,6 +26,8 @@ def bytes_per_node(shape: Shape, steps: Steps, closed: bool) -> int:
     """Peak for each node of a grid, of a shape whose parts are closed, or may be: the least then."""
     if not steps.sharpen:
         return BYTES_IF_PLAIN
+    if isinstance(shape, PointCloud):
+        return BYTES_IF_POINTS
     if isinstance(shape, TriangleMesh) and is_scattered(shape):
         return BYTES_IF_SCATTERED
     return BYTES_IF_CLOSED if closed and steps.orient else BYTES_PER_NODE
@@ -37,7 +39,9 @@ def bytes_of_faces(shape: Shape) -> float:
         return float(BYTES_OF_POINTS)
     if isinstance(shape, PolygonMesh):
         return float(BYTES_PER_FACE * len(shape.corners))
-    return float((BYTES_PER_SCATTERED_FACE if is_scattered(shape) else BYTES_PER_FACE) * shape.n_faces)
+    if is_scattered(shape):
+        return float(BYTES_IF_OPEN + BYTES_PER_SCATTERED_FACE * shape.n_faces)
+    return float(BYTES_PER_FACE * shape.n_faces)
 
 
 def is_scattered(mesh: TriangleMesh) -> bool:

@@ -27,10 +27,6 @@ SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the simplices into which faces are bisected."""
 BYTES_PER_NODE = 46
 """Measured peak memory of a distance computation."""
-BASE, BESIDE_LIBRARIES = 200_000_000, 20_000_000
-"""The part that does not depend on the number of nodes: libraries and compiled kernels; and besides what libraries
-still take, of what is estimated by its own bytes for each node.
-"""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
 
@@ -47,8 +43,7 @@ def memory_estimate(grid: Grid, per_node: float | None = None, beside: float = 0
     """
     if per_node is None:
         per_node = BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS[grid.dimension]
-        return int(per_node * grid.n_nodes + beside) + BASE
-    return int(per_node * grid.n_nodes + beside) + BESIDE_LIBRARIES + libraries()
+    return int(per_node * grid.n_nodes + beside) + libraries()
 
 
 def refuse_beyond_memory(grid: Grid, per_node: float | None = None, beside: float = 0.0) -> None:
@@ -68,7 +63,7 @@ def fitting_spacing(
     grid: Grid, available: int, per_node: float | None = None, beside: float = 0.0
 ) -> NDArray[np.float64]:
     """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
-    base = BASE + int(beside) if per_node is None else memory_estimate(grid, 0.0, beside)
+    base = memory_estimate(grid, 0.0, beside)
     whole = memory_estimate(grid, per_node, beside) - base
     spacing = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
     per_node = whole / grid.n_nodes
