@@ -34,6 +34,8 @@ FOUND = [
     ("surface use", 412, 1359),
     # paths through edges that are a rounding shorter than none
     ("surface use", 202, 43), ("surface curves", 300, 4876),
+    # a part of the surface that no curve reaches, and whose sides touch one
+    ("surface curves", 20261123, 3919),
     # bands around shapes all of whose faces lie in layers
     ("space queries", 400, 3031), ("space queries", 400, 5229),
     # polygons that overlap, and shapes without any face, in bands

@@ -112,7 +112,7 @@ def sharpened_to_curves(
     sides, known = there.sides, there.sides.regions != 0
     beside = sides.reach <= distance * (1 + 1e-9)
     side = np.where(known, sides.regions, np.where(beside, sides.nearby, 0))
-    turned = (side != 0) & (np.sign(values) != side)
+    turned = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
     values = np.where(turned, np.copysign(distance, side), values)
     missing, more = missing_parts(triangles, values, parts, there, spacing, tolerance, report)
     counts += more
