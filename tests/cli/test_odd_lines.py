@@ -1,0 +1,102 @@
+"""Every command with a file, a name or a number that is odd: a status that tells, and one line, never a traceback."""
+
+from __future__ import annotations
+
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+from signedheat.cli import main
+
+LINES = {
+    "volume": ["{file}", "-o", "{out}.vti"],
+    "offset": ["{file}", "{number}", "-o", "{out}.stl"],
+    "morph": ["dilate", "{file}", "{number}", "-o", "{out}.stl"],
+    "sample": ["{file}", "-o", "{out}.npz"],
+    "surface": ["{file}", "{curves}", "-o", "{out}.vtp"],
+    "close": ["{file}", "{curves}", "-o", "{out}.obj"],
+    "contour": ["{field}", "{number}", "-o", "{out}.stl"],
+    "info": ["{file}"],
+    "view": ["{file}", "-o", "{out}.png"],
+}
+WRITING = sorted(set(LINES) - {"info"})
+NUMBERS = {
+    "volume": ["--resolution", "--spacing", "--padding", "--band", "--diffusion"],
+    "offset": ["--resolution", "--spacing", "--padding", "--diffusion"],
+    "morph": ["--resolution", "--spacing", "--padding", "--diffusion"],
+    "sample": ["--samples", "--resolution"],
+    "surface": ["--contours", "--diffusion"],
+    "close": ["--diffusion", "--up"],
+    "info": ["--resolution"],
+    "demo": ["--resolution"],
+}
+ODD_FILES = [
+    "missing.stl",
+    "folder",
+    "folder.stl",
+    "empty.stl",
+    "text.stl",
+    "shape.xyzzy",
+    "shape",
+    "",
+    "\0.stl",
+    "ä" * 300,
+]
+ODD_OUTPUTS = ["missing/made", "folder", "ä" * 300, "empty.stl/made"]
+ODD_NUMBERS = ["nan", "-inf", "1e400", "-1", "abc", "", "0x10", "1,5", "٣x", "9" * 400]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("odd")
+    for ending in ("", ".stl", ".vti", ".npz", ".vtp", ".obj", ".png"):
+        (made / f"folder{ending}").mkdir()
+    (made / "empty.stl").touch()
+    for name in ("text.stl", "shape.xyzzy", "shape"):
+        (made / name).write_text("what\nis this\n")
+    ball = samples.sphere(1)
+    sh.save(ball, made / "ball.stl")
+    (made / "curves.csv").write_text("1,0,0\n0,1,0\n")
+    sh.signed_distance(ball, resolution=6).save(made / "field.npz")
+    return made
+
+
+def ended(folder, capsys, command, changed, *options):
+    """The status of a command whose parts are as they should be, but for one."""
+    parts = {"file": "ball.stl", "curves": "curves.csv", "field": "field.npz", "number": "0.1", "out": "made"} | changed
+    paths = {name: part if name == "number" or not part else f"{folder}/{part}" for name, part in parts.items()}
+    status = main([command, *(part.format(**paths) for part in LINES.get(command, [])), "--quiet", *options])
+    told = capsys.readouterr().err
+    assert "Traceback" not in told
+    last = told.rstrip("\n").rpartition("\n")[2]
+    assert status in (1, 2) and last.startswith("signedheat") and "bug" not in last, (status, told, changed, options)
+    return status
+
+
+@pytest.mark.parametrize("command", LINES)
+def test_odd_inputs(folder, capsys, command):
+    names = {part.strip("{}") for part in LINES[command]} & {"file", "curves", "field"}
+    for name in names:
+        for odd in ODD_FILES:
+            assert ended(folder, capsys, command, {name: odd}) in (1, 2)
+
+
+@pytest.mark.parametrize("command", WRITING)
+def test_odd_outputs(folder, capsys, command):
+    for odd in ODD_OUTPUTS:
+        ended(folder, capsys, command, {"out": odd})
+    assert ended(folder, capsys, command, {}, "--output", f"{folder}/made.xyzzy") in (1, 2)
+    assert not list(folder.glob("made*"))
+
+
+@pytest.mark.parametrize("command", NUMBERS)
+def test_odd_numbers(folder, capsys, command):
+    for option in NUMBERS[command]:
+        for odd in ODD_NUMBERS:
+            assert ended(folder, capsys, command, {}, f"{option}={odd}") in (1, 2), (option, odd)
+
+
+@pytest.mark.parametrize("command", ["offset", "morph", "contour"])
+@pytest.mark.parametrize("odd", ["nan", "inf", "abc", "", "1e400"])
+def test_odd_distances(folder, capsys, command, odd):
+    assert ended(folder, capsys, command, {"number": odd}) in (1, 2)
