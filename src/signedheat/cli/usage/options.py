@@ -100,7 +100,9 @@ def units(word: str) -> str:
 
 def add_up_option(parser: Parser) -> None:
     """Add the option for pictures in space."""
-    parser.add_argument("--up", choices=["x", "y", "z"], default="z", help="axis that points upwards in the picture (z)")
+    parser.add_argument(
+        "--up", choices=["x", "y", "z"], default="z", help="axis that points upwards in the picture (z)"
+    )
 
 
 def add_label_option(parser: Parser) -> None:
