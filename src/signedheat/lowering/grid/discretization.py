@@ -25,7 +25,7 @@ from .source import GridSource
 
 SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the simplices into which faces are bisected."""
-BYTES_PER_NODE = 46
+BYTES_PER_NODE = 42
 """Measured peak memory of a distance computation."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
