@@ -127,6 +127,16 @@ def test_meshes_that_do_not_fit_are_refused_before_they_are_refined(monkeypatch)
         sh.SignedHeatSolver(BALL, intrinsic=True).distance(BALL.points_at(0))
 
 
+def test_rows_are_imposed_exactly_only_where_there_is_memory_for_it(monkeypatch):
+    """With memory for the default, which takes half as much."""
+    grid = sh.Grid.around(BALL, 40)
+    monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 60 * grid.n_nodes)
+    sh.SignedHeatSolver(grid).distance(BALL)
+    with refused(sh.MemoryLimitError) as caught:
+        sh.SignedHeatSolver(grid).distance(BALL, sh.ZeroSet(hard=True))
+    assert "hard=True" in caught.value.remedy
+
+
 def test_noisy_soups_are_refused_before_their_faces_are_turned(monkeypatch):
     """With memory for a closed ball, but not for its faces in layers."""
     soup = samples.soup(BALL, 0.02)

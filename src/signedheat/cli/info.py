@@ -11,6 +11,7 @@ from ..domains.inspection import inspect
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError, SourceError
+from ..extensions.joining import joined_shape
 from ..extensions.orientation import Orientation, orientation
 from ..extensions.solid_memory import BYTES_IF_OPEN, BYTES_PER_NODE, bytes_of_faces
 from ..extensions.thickness import Thickness, thickness
@@ -171,7 +172,7 @@ def _memory(shape: Any, resolution: int) -> int | None:
 
 
 def _beside(shape: Any) -> float:
-    return bytes_of_faces(shape) + BYTES_IF_OPEN
+    return bytes_of_faces(joined_shape(shape)) + BYTES_IF_OPEN
 
 
 def _table(summary: dict[str, Any]) -> str:

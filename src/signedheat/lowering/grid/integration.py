@@ -11,6 +11,7 @@ from scipy.sparse.linalg import lsqr
 from ...discretization import Levels, SolvesEach
 from ...domains.grid import Grid
 from ...linear.conjugate_gradients import conjugate_gradients
+from ...memory import refuse_beyond_memory
 from ...operators.grid.multilevel import collapse, diffuse_multilevel, skip_finest
 from ...operators.grid.node_sources import NodeSources
 from ...operators.grid.readout import quotients
@@ -25,7 +26,8 @@ LEAST, STIFFEST = 1e-6, 30.0
 """Of penalties, relative to the default: in the preconditioner, and as a penalty."""
 MULTIPLIER_STEPS = 5
 """Steps of the augmented Lagrangian."""
-
+BYTES_IF_EXACT = 83
+"""Measured peak memory for each node, beyond what is held already, of imposing rows exactly."""
 NEGLIGIBLE = 1e-6
 """Rows of samples that differ by less are taken as equal, and their levels as contradictory."""
 
@@ -77,7 +79,18 @@ class GridIntegration(SolvesEach):
 
         The multipliers take up what the penalty leaves, except for what nearly dependent rows hide from it: that is
         small, and corrected directly. Rows that contradict each other are met in the least-squares sense.
+
+        Raises
+        ------
+        MemoryLimitError
+            If that does not fit into the memory that is left.
         """
+        refuse_beyond_memory(
+            f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
+            self.grid.n_nodes,
+            lambda count: BYTES_IF_EXACT * count,
+            lambda count: f"leave out hard=True, or use at most {count:,} nodes",
+        )
         strength = self.soft_weight
         phi = self.fit(divergence.copy(), source, levels)
         multipliers = np.zeros(len(source.weights))
