@@ -33,8 +33,9 @@ ROWS, ROW = 16, 64
 """Lines of a tile of nodes, and nodes of each, in which samples are asked one after the other."""
 BEFORE = np.array(sorted(filter(lambda step: step < (0, 0, 0), product((-1, 0, 1), repeat=3)), key=np.linalg.norm))
 """(13, 3) ways to the neighbours of a node that come before it, the three along the axes first."""
-CLOSE = 8.0
-"""Cells from the surface within which neighbours across are asked as well as those along the axes."""
+CLOSE, APART = 4.0, 1.0
+"""Cells from the surface within which neighbours across are asked as well as those along the axes; beyond, cells
+between feet from which on a neighbour's is taken to be on another part of the surface: a walk came by the others."""
 BESIDE, SLACK = 3.0, 0.1
 """Cells from the surface within which neighbours' faces lead on that are farther, by at most so many cells."""
 ROUNDING = 1e-6
@@ -254,7 +255,7 @@ def _nearest_to_neighbours(
     The distance d to a triangle is convex, so at x it is at least ``d(y) + ∇d(y) · (x − y)``: most neighbours' faces
     need not be asked. Others are, before a walk begins from them, unless the node is nearest to a crossing.
     """
-    rows = links[0]
+    rows, across = links[0], links[3]
     planes, n1, n2 = nearest.shape
     points, candidates = np.empty((len(BEFORE) * n2, 3)), np.empty((len(BEFORE) * n2, 1), dtype=np.int32)
     found, squares = np.empty(len(BEFORE) * n2, dtype=np.int32), np.empty(len(BEFORE) * n2)
@@ -285,6 +286,16 @@ def _nearest_to_neighbours(
                 )
                 if least >= near * value * (1.0 - ROUNDING):
                     continue
+                if (
+                    value >= CLOSE * cell
+                    and nearest[i, j, k] >= 0
+                    and across[other, 0] >= 0
+                    and across[other, 1] >= 0
+                    and across[other, 2] >= 0
+                ):
+                    square = (feet[a, b, c, 0] - feet[i, j, k, 0]) ** 2 + (feet[a, b, c, 1] - feet[i, j, k, 1]) ** 2
+                    if square + (feet[a, b, c, 2] - feet[i, j, k, 2]) ** 2 < (APART * cell) ** 2:
+                        continue
                 x, y, z = (first + i) * steps[0], j * steps[1], k * steps[2]
                 most = value + (SLACK * cell if value < BESIDE * cell else 0.0)
                 if nearest[i, j, k] >= 0 and foot_on_triangle(rows, other, x, y, z)[0] >= most * most:
