@@ -128,6 +128,33 @@ def test_several_processes_at_once(cache, tmp_path):
     assert not list(cache.glob(".*"))
 
 
+def test_digests_are_the_same_in_every_process():
+    code = """
+        import importlib, pkgutil
+        import signedheat.operators
+        from signedheat.compiled import Kernel, _parts
+        from signedheat.kernel_cache import digest_of
+        kernels = {}
+        for module in pkgutil.walk_packages(signedheat.operators.__path__, "signedheat.operators."):
+            kernels |= vars(importlib.import_module(module.name))
+        kernels = {n: digest_of(k.function, k.options, _parts) for n, k in kernels.items() if isinstance(k, Kernel)}
+        def constants(x):
+            return x in ("one", "two") or x in {"three", "four", "five"}
+        print(len(kernels) > 50, *sorted(kernels.items()), digest_of(constants, {}, _parts))
+    """
+    told = {
+        subprocess.run(
+            [sys.executable, "-c", textwrap.dedent(code)],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            stdout=subprocess.PIPE,
+            check=True,
+            text=True,
+        ).stdout
+        for seed in ("1", "3")
+    }
+    assert len(told) == 1 and told.pop().startswith("True")
+
+
 @pytest.mark.parametrize("threads", ["0", "-1", "many", "1000000"])
 def test_numbers_of_threads_that_are_none(monkeypatch, threads, cache, shifted):
     monkeypatch.setenv("NUMBA_NUM_THREADS", threads)

@@ -161,10 +161,10 @@ def digest_of(function: Callable[..., Any], options: dict[str, Any], called: Cal
         if one in seen:
             continue
         seen.add(one)
-        digest.update(repr((one.__module__, one.__qualname__, sorted(how.items()), one.__defaults__)).encode())
+        digest.update(_text((one.__module__, one.__qualname__, sorted(how.items()), one.__defaults__)).encode())
         for code in _codes(one.__code__):
             own = [c for c in code.co_consts if not isinstance(c, CodeType)]
-            digest.update(code.co_code + repr((own, code.co_names, code.co_varnames, code.co_freevars)).encode())
+            digest.update(code.co_code + _text((own, code.co_names, code.co_varnames, code.co_freevars)).encode())
             values = [(name, one.__globals__[name]) for name in code.co_names if name in one.__globals__]
             cells = zip(one.__code__.co_freevars, one.__closure__ or (), strict=False)
             for name, value in [*values, *((name, cell.cell_contents) for name, cell in cells)]:
@@ -174,8 +174,17 @@ def digest_of(function: Callable[..., Any], options: dict[str, Any], called: Cal
                 elif isinstance(value, np.ndarray):
                     digest.update(f"{name}{value.dtype.str}{value.shape}".encode() + value.tobytes())
                 elif isinstance(value, int | float | complex | str | tuple | np.generic):
-                    digest.update(f"{name}={value!r}".encode())
+                    digest.update(f"{name}={_text(value)}".encode())
     return digest.hexdigest()
+
+
+def _text(value: Any) -> str:
+    """A value as text that is the same in every process: sets have no order of their own."""
+    if isinstance(value, tuple | list):
+        return f"({', '.join(map(_text, value))})"
+    if isinstance(value, set | frozenset):
+        return f"{{{', '.join(sorted(map(_text, value)))}}}"
+    return repr(value)
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
