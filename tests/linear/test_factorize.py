@@ -156,6 +156,18 @@ def test_factors_like_others_are_independent_of_them(surface, backend, together)
     np.testing.assert_allclose(factors[0].solve(whole(matrices[1]) @ truth), truth, atol=1e-9)
 
 
+def test_libraries_that_make_factors_anew_are_known_on_every_processor(surface):
+    """Whatever its rounding: the answer of the second of two factors tells what the library can."""
+    if not pardiso.is_available():
+        pytest.skip("needs MKL")
+    first = sparse.csr_matrix(sparse.triu(surface.stiffness + sparse.identity(surface.triangles.n_vertices)))
+    second = first + sparse.diags_array(np.linspace(1, 2, first.shape[0]), format="csr")
+    factor = pardiso.PardisoFactor(first)
+    truth = np.random.default_rng(0).normal(size=first.shape[0])
+    able = np.abs(factor._again(second).solve(whole(second) @ truth) - truth).max() < 1e-6
+    assert (factor.like_this(second) is not None) == able
+
+
 def test_libraries_that_cannot_make_a_factor_anew_are_not_asked_to(surface, monkeypatch):
     """As all of MKL before 2026.2: the answer would be that of the first matrix."""
     if not pardiso.is_available():

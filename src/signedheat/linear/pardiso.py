@@ -206,7 +206,8 @@ def _library() -> ctypes.CDLL:
 def _makes_factors_anew() -> bool:
     """Whether the library can: before 2026.2 a factor in two levels stays that of the first matrix, in silence."""
     one, two = (sparse.csr_matrix(np.array([[diagonal]])) for diagonal in (1.0, 2.0))
-    return bool(PardisoFactor(one)._again(two).solve(np.ones(1))[0] == 0.5)
+    half = PardisoFactor(one)._again(two).solve(np.ones(1))[0]
+    return bool(abs(half - 0.5) < 0.25)  # some processors round it
 
 
 def is_available() -> bool:
