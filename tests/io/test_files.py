@@ -19,6 +19,7 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.geometry import nearest
 from signedheat.io import files
 from signedheat.io.files import ensure_writable, replacing
 from signedheat.parallel import run_limited
@@ -346,3 +347,31 @@ def test_odd_fields(tmp_path, name):
     with pytest.raises(sh.FileFormatError) as caught:
         sh.load_field(tmp_path / name)
     assert caught.value.path == str(tmp_path / name)
+
+
+def test_what_cannot_be_compiled_says_nothing_about_the_file(tmp_path, monkeypatch):
+    def broken(*arguments):
+        raise TypeError("the compiler failed")
+
+    path = tmp_path / "curves.json"
+    path.write_text(json.dumps({"polylines": [{"points": [[1.0, 0.1, 0.2], [0.0, 1.0, -0.1]]}]}))
+    assert len(sh.read_curves(path, BALL)) == 1
+    monkeypatch.setattr(type(nearest._weights), "__call__", broken)
+    with pytest.raises(TypeError, match="compiler"):
+        sh.read_curves(path, samples.sphere(1))
+    monkeypatch.undo()
+    path.write_text(json.dumps({"polylines": [{"points": [[1.0, "a", 0.2], [0.0, 1.0, -0.1]]}]}))
+    with pytest.raises(sh.FileFormatError):
+        sh.read_curves(path, BALL)
+
+
+@pytest.mark.parametrize("where", ["signedheat.domains.grid", "signedheat.compiled", "signedheat.io.ply", "meshio"])
+def test_faults_of_parsers_are_damage_and_our_own_are_not(where):
+    def read():
+        namespace = {"__name__": where}
+        exec("def parse():\n    raise IndexError('out of bounds')", namespace)
+        with files.reading("shape.ply"):
+            namespace["parse"]()
+
+    with pytest.raises(sh.FileFormatError if where in ("signedheat.io.ply", "meshio") else IndexError):
+        read()

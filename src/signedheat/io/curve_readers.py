@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,27 +155,12 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
     """Vertex ids and weights, independent of any order of edges; or polylines in space."""
     try:
         content = json.loads(text(path))
-        if "polylines" in content:
-            return [
-                domain.polyline(np.array(line["points"], dtype=np.float64), closed=bool(line.get("closed", False)))
-                for line in content["polylines"]
-            ]
-        base, groups = int(content.get("index_base", 0)), []
-        for group in content["groups"]:
-            nodes = [
-                Node(tuple(int(v) - base for v in node["v"]), tuple(float(w) for w in node["w"]))
-                for node in group["nodes"]
-            ]
-            if any(len(n.vertices) != len(n.weights) or not 0 < len(n.vertices) <= 3 for n in nodes):
-                raise ValueError("a node needs one to three vertices and as many weights")
-            if group["kind"] == POINTS:
-                groups.append(Group(POINTS, nodes))
-            elif group["kind"] in (SIGNED, UNSIGNED):
-                segments = [(int(i), int(j)) for i, j in group["segments"]]
-                groups += polylines_of_segments(path, group["kind"], nodes, segments)
-            else:
-                raise ValueError(f"the kind '{group['kind']}' is none of {SIGNED}, {UNSIGNED}, {POINTS}")
-        return groups
+        if "polylines" not in content:
+            return groups_of(path, content)
+        lines = [
+            (np.array(line["points"], dtype=np.float64), bool(line.get("closed", False)))
+            for line in content["polylines"]
+        ]
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         if isinstance(error, (FileFormatError, SourceError)):
             raise
@@ -183,6 +168,26 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
             f"these are no curves with vertex ids and weights ({error!r})",
             path=path,
         ) from error
+    return [domain.polyline(points, closed=closed) for points, closed in lines]
+
+
+def groups_of(path: PathLike, content: dict[str, Any]) -> list[Group]:
+    """Curves with vertex ids and weights."""
+    base, groups = int(content.get("index_base", 0)), []
+    for group in content["groups"]:
+        nodes = [
+            Node(tuple(int(v) - base for v in node["v"]), tuple(float(w) for w in node["w"])) for node in group["nodes"]
+        ]
+        if any(len(n.vertices) != len(n.weights) or not 0 < len(n.vertices) <= 3 for n in nodes):
+            raise ValueError("a node needs one to three vertices and as many weights")
+        if group["kind"] == POINTS:
+            groups.append(Group(POINTS, nodes))
+        elif group["kind"] in (SIGNED, UNSIGNED):
+            segments = [(int(i), int(j)) for i, j in group["segments"]]
+            groups += polylines_of_segments(path, group["kind"], nodes, segments)
+        else:
+            raise ValueError(f"the kind '{group['kind']}' is none of {SIGNED}, {UNSIGNED}, {POINTS}")
+    return groups
 
 
 def read_csv(path: PathLike, domain: EmbeddedSurface) -> list[Curve]:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, redirect_stderr, suppress
 from io import StringIO
 from pathlib import Path
+from traceback import walk_tb
 from typing import Any, TypeVar
 
 import numpy as np
@@ -26,6 +27,9 @@ from ..parallel import run_limited
 
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")
+PACKAGE = f"{__package__.partition('.')[0]}."
+READERS = f"{__package__}.", f"{PACKAGE}parallel", f"{PACKAGE}packages"
+"""Modules that read, and those by which they call parsers of other packages."""
 
 
 def extension(path: PathLike) -> str:
@@ -55,7 +59,8 @@ def reading(path: PathLike) -> Iterator[None]:
     MemoryLimitError
         If what the file announces does not fit into memory.
     FileFormatError
-        For everything else: the file is damaged.
+        For everything else: the file is damaged. What our own code beyond the readers raises, as when a kernel cannot
+        be compiled, says nothing about the file, and stays as it is.
     """
     try:
         with np.errstate(all="ignore"):  # values are looked at by the shapes and fields that are made of them
@@ -71,12 +76,21 @@ def reading(path: PathLike) -> Iterator[None]:
             path=path,
         ) from error
     except Exception as error:  # parsers, ours and those of others, meet damage with exceptions of any type
+        if _is_ours(error):
+            raise
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(
             f"it is damaged, or of another kind ({reason:.200})",
             remedy="write or download it again",
             path=path,
         ) from error
+
+
+def _is_ours(error: BaseException) -> bool:
+    """Whether an exception comes from our code beyond the readers, or from what that calls."""
+    names = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
+    ours = [name for name in names if name.startswith(PACKAGE)]
+    return bool(ours) and not ours[-1].startswith(READERS)
 
 
 def parsed_by_others(parse: Callable[[], T], size: int) -> T:
