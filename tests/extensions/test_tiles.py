@@ -1,5 +1,6 @@
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from shapes.grid_cases import assert_closed_manifold, sphere
+from signedheat.extensions import band_plan
 from signedheat.extensions.band_stores import TilesComputed
 
 pytest.importorskip("zarr")
@@ -76,6 +78,51 @@ def test_processes_give_the_same_bits(tmp_path, single):
         band = sh.tiled_distance(holed(), tmp_path / "store", resolution=RESOLUTION, band=BAND, scheduler=pool)
     assert_same(band, single)
     assert band.diagnostics.note(TilesComputed).peak_memory > 1e7
+
+
+def test_another_shape_in_the_same_folder_is_not_taken_for_the_first(tmp_path):
+    store = tmp_path / "store"
+    for radius in (1.0, 0.5):
+        ball = sphere(300, radius)
+        grid = sh.Grid((-1.3,) * 3, 2.6 / 64, (65,) * 3)
+        band = sh.tiled_distance(ball, store, grid, band=0.1)
+        assert abs(band([[radius + 0.05, 0.0, 0.0]])[0] - 0.05) < 0.02
+        shutil.rmtree(store)
+
+
+@pytest.fixture
+def steep(monkeypatch):
+    """Grids as those of thousands of nodes: 8 of them for each of the coarse grid, and a band between the two."""
+    monkeypatch.setattr(band_plan, "FEWEST", 10)
+    monkeypatch.setattr(band_plan, "MOST", 24)
+    monkeypatch.setattr(band_plan, "STEEPEST", 8)
+
+
+def test_far_finer_bands_have_one_between_and_come_as_near_to_the_truth(single, steep, tmp_path):
+    band = sh.solid_distance(holed(), resolution=RESOLUTION, band=BAND)
+    h = float(band.grid.spacing[0])
+    assert band.coarse.grid.spacing[0] == pytest.approx(8 * h)
+    nodes = (band.blocks.places[:, None] * 8 + np.argwhere(np.ones((8, 8, 8)))).reshape(-1, 3)
+    points = band.grid.origin + nodes[(nodes < band.grid.shape).all(axis=1)] * h
+    truth = np.linalg.norm(points, axis=1) - 1
+    points, truth = points[np.abs(truth) < 3 * h], truth[np.abs(truth) < 3 * h]
+    error, other = (np.sqrt(np.mean((field(points) - truth) ** 2)) for field in (band, single))
+    assert error < 1.15 * other
+    wrong = [((field(points) < 0) != (truth < 0)).mean() for field in (band, single)]
+    assert wrong[0] < 1.15 * wrong[1]
+    for level in (0.0, 0.04):
+        assert_closed_manifold(band.contour(level))
+    store = tmp_path / "store"
+
+    def stop(fraction, step):
+        if step == "tiles":  # of the band between
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sh.tiled_distance(holed(), store, resolution=RESOLUTION, band=BAND, progress=stop)
+    with refused(sh.FileFormatError, file="between"):
+        sh.tiled_distance(holed(), store, resolution=RESOLUTION + 1, band=BAND)
+    assert_same(sh.tiled_distance(holed(), store, resolution=RESOLUTION, band=BAND), band)
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..geometry.box_tree import BoxTree
 from ..geometry.face_features import FaceFeatures
@@ -19,6 +21,7 @@ from ..geometry.face_tree import FaceTree
 from ..geometry.touching_faces import touching_faces
 from ..geometry.winding_tree import WindingTree
 from ..operators.grid.blocks import CUBE, SIDE
+from ..operators.grid.exact_surface import ExactSurface
 from .rims import Rims, rims_of
 
 TILE = SIDE * CUBE
@@ -31,6 +34,9 @@ FAR = 1.5
 """Cells from any face beyond which a zero set stands in for missing surface."""
 RATIO = 4
 """Spacing of the coarse grid over that of the band, where nothing speaks against it."""
+STEEPEST = 16
+"""The same from which on another band is computed between them: near the ends of the surface fine nodes within some
+coarse cells are solved for, whose number grows with its square."""
 FEWEST, MOST = 64, 257
 """Nodes of the coarse grid along its longest side: with fewer it misses what it must complete, with more it is slow."""
 SLACK = 0.75
@@ -54,8 +60,8 @@ class BandPlan:
     ----------
     grid : Grid
         Of the band's nodes, few of which are there.
-    coarse : GridField
-        Distance on the whole box; first node at that of `grid`.
+    coarse : GridField or BandField
+        Distance on coarser nodes, of the whole box or in a band that is wide enough; first node at that of `grid`.
     width : float
         Distance up to which the band reaches on both sides, in units of length.
     features : FaceFeatures
@@ -75,7 +81,7 @@ class BandPlan:
     """
 
     grid: Grid
-    coarse: GridField
+    coarse: GridField | BandField
     width: float
     features: FaceFeatures
     telling: NDArray[np.bool_]
@@ -99,6 +105,11 @@ class BandPlan:
     def coarse_cell(self) -> float:
         """The same of the coarse grid."""
         return float(self.coarse.grid.spacing.max())
+
+    @property
+    def far(self) -> GridField:
+        """Distance on the whole box."""
+        return self.coarse.coarse if isinstance(self.coarse, BandField) else self.coarse
 
     @cached_property
     def faces(self) -> FaceTree | None:
@@ -236,8 +247,8 @@ class BandPlan:
             rest = np.flatnonzero(~near)
             within = self.open_reach + radius
             rest = rest[self.open_places.query(centres[rest], distance_upper_bound=within)[0] <= within]
-            height = np.abs(self.coarse_function(centres[rest]))
-            near[rest] = height <= self.reach + radius + SLACK * self.coarse_cell
+            heights, cells = self._coarse_heights(centres[rest])
+            near[rest] = np.abs(heights) <= self.reach + radius + SLACK * cells
             if self.end_tree is not None:  # where the fine surface need not be where the coarse one is
                 rest = rest[~near[rest]]
                 near[rest] = self.end_tree.query(centres[rest], distance_upper_bound=within)[0] <= within
@@ -252,9 +263,40 @@ class BandPlan:
 
     def coarse_function(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) the coarse field at places around the first node."""
-        index = (points / self.coarse.grid.spacing).T
-        values: NDArray[np.float64] = scipy.ndimage.map_coordinates(self.coarse.values, index, order=1, mode="nearest")
-        return values
+        return self._coarse_heights(points)[0]
+
+    def coarse_confidence(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+        """(n,) confidence of the coarse field at places around the first node."""
+        if self.coarse.confidence is None:
+            return np.ones(len(points), dtype=np.float32)
+        if isinstance(self.coarse, BandField):
+            return self.coarse.confidence_at(self.grid.origin + points)
+        return _linear(self.coarse.confidence, self.coarse.grid, points)
+
+    def _coarse_heights(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n,) the coarse field at places around the first node, and the cells between whose nodes it is told."""
+        far_cell = float(self.far.grid.spacing.max())
+        if not isinstance(self.coarse, BandField):
+            return _linear(self.far.values, self.far.grid, points), np.full(len(points), far_cell)
+        values = self.coarse.blocks.interpolated(self.coarse.values, points / self.coarse.grid.spacing)
+        beyond = np.flatnonzero(np.isnan(values))
+        values[beyond] = _linear(self.far.values, self.far.grid, points[beyond])
+        cells = np.full(len(points), self.coarse_cell)
+        cells[beyond] = far_cell
+        return values, cells
+
+    def surface(self, crossings: NDArray[np.float64]) -> ExactSurface:
+        """What the band has distances to: the faces, and (c, 18) crossings where they are missing."""
+        telling = None if self.telling.all() else self.telling
+        origin, steps = np.array(self.grid.origin), np.array(self.steps)
+        return ExactSurface(self.features, crossings, origin, steps, telling, None, self.asked, self.share, self.closed)
+
+
+def _linear(values: NDArray[Any], grid: Grid, points: NDArray[np.float64]) -> NDArray[Any]:
+    """(n,) values of nodes at places around the first, linear between them, and beyond the walls as at them."""
+    index = (points / grid.spacing).T
+    result: NDArray[Any] = scipy.ndimage.map_coordinates(values, index, order=1, mode="nearest")
+    return result
 
 
 def coarse_grid(grid: Grid) -> Grid:
@@ -267,8 +309,22 @@ def coarse_grid(grid: Grid) -> Grid:
     return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
 
 
-def plan_band(coarse: GridField, grid: Grid, band: float) -> BandPlan:
-    """The plan of a band of half width `band` on a grid, from the distance on its `coarse_grid`.
+def grid_between(coarse: Grid, grid: Grid) -> Grid | None:
+    """That of another band, where the grid of a band is far finer than its coarse one; None where it is not."""
+    if round(float((coarse.spacing / grid.spacing).max())) < STEEPEST:
+        return None
+    return Grid(grid.origin, RATIO * grid.spacing, [1 - (-(n - 1) // RATIO) for n in grid.shape])
+
+
+def width_between(grid: Grid, band: float) -> float:
+    """Half width of the band of that: wherever blocks of a band are computed, it tells their coarse field."""
+    fine = float(grid.spacing.max())
+    beside = float(np.linalg.norm(SIDE * grid.spacing)) + (max(FAR, ENDS) + SLACK) * RATIO * fine
+    return max(float(band), LEAST * fine) + float(np.linalg.norm(grid.spacing)) + beside
+
+
+def plan_band(coarse: GridField | BandField, grid: Grid, band: float) -> BandPlan:
+    """The plan of a band of half width `band` on a grid, from the distance on a coarser one.
 
     Raises
     ------

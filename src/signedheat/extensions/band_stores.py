@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,11 @@ from numpy.typing import NDArray
 from ..diagnostics import Note
 from ..domains.grid import Grid
 from ..errors import FileFormatError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..geometry.box_tree import BoxTree
 from ..geometry.face_features import FaceFeatures
+from ..operators.grid.blocks import Blocks
 from ..operators.grid.exact_surface import ExactSurface
 from ..packages import lazy_module
 from .band_plan import BandPlan
@@ -56,10 +59,16 @@ def save_plan(plan: BandPlan, folder: Path, fingerprint: str) -> None:
     place.mkdir(parents=True, exist_ok=True)
     surface = plan.coarse.surface
     arrays = {f"feature_{each.name}": getattr(plan.features, each.name) for each in fields(FaceFeatures)}
-    arrays |= {"telling": plan.telling, "asked": plan.asked, "ends": plan.ends, "coarse_values": plan.coarse.values}
+    arrays |= {"telling": plan.telling, "asked": plan.asked, "ends": plan.ends, "far_values": plan.far.values}
     arrays["crossings"] = np.zeros((0, 18)) if surface is None else surface.crossings
-    if plan.coarse.confidence is not None:
-        arrays["coarse_confidence"] = plan.coarse.confidence
+    if plan.far.confidence is not None:
+        arrays["far_confidence"] = plan.far.confidence
+    between = {}
+    if isinstance(plan.coarse, BandField):
+        arrays |= {"coarse_places": plan.coarse.blocks.places, "coarse_values": plan.coarse.values}
+        if plan.coarse.confidence is not None:
+            arrays["coarse_confidence"] = plan.coarse.confidence
+        between = {"coarse_shape": list(plan.coarse.grid.shape), "coarse_width": plan.coarse.width}
     if plan.faces is not None:
         arrays |= {"bounds": plan.faces.tree.bounds, "items": plan.faces.tree.items}
     for name, array in arrays.items():
@@ -70,9 +79,11 @@ def save_plan(plan: BandPlan, folder: Path, fingerprint: str) -> None:
         "spacing": plan.grid.spacing.tolist(),
         "shape": list(plan.grid.shape),
         "coarse_spacing": plan.coarse.grid.spacing.tolist(),
+        "far_spacing": plan.far.grid.spacing.tolist(),
         "width": plan.width,
         "share": plan.share,
         "closed": plan.closed,
+        **between,
     }
     temporary = place / "about.part"
     temporary.write_text(json.dumps(about))
@@ -88,8 +99,10 @@ def saved_fingerprint(folder: Path) -> str | None:
 
 
 @lru_cache(maxsize=2)
-def load_plan(folder: Path) -> BandPlan:
+def load_plan(folder: Path, fingerprint: str) -> BandPlan:
     """A plan whose arrays are mapped: what a tile does not need is not read, and processes share what they read.
+
+    The fingerprint is the one it was saved with: a folder may be used for something else later.
 
     Raises
     ------
@@ -101,12 +114,9 @@ def load_plan(folder: Path) -> BandPlan:
         about = json.loads((place / "about.json").read_text())
         arrays = {path.stem: np.asarray(np.load(path, mmap_mode="c")) for path in place.glob("*.npy")}
         features = FaceFeatures(**{each.name: arrays[f"feature_{each.name}"] for each in fields(FaceFeatures)})
-        values = arrays["coarse_values"]
         origin = np.array(about["origin"])
         surface = ExactSurface(features, arrays["crossings"], origin, np.array(about["coarse_spacing"]))
-        confidence = arrays.get("coarse_confidence")
-        grid = Grid(origin, about["coarse_spacing"], values.shape)
-        coarse = GridField(grid, values, confidence=confidence, surface=surface)
+        coarse = _coarse_field(about, arrays, surface)
         tree = BoxTree(arrays["bounds"], arrays["items"]) if "bounds" in arrays else None
         fine = Grid(origin, about["spacing"], about["shape"])
         faces = arrays["telling"], arrays["ends"], arrays["asked"]
@@ -117,10 +127,26 @@ def load_plan(folder: Path) -> BandPlan:
         ) from error
 
 
-def solve_into(folder: str, tile: tuple[int, int, int]) -> tuple[int, int]:
+def _coarse_field(
+    about: dict[str, Any], arrays: dict[str, NDArray[Any]], surface: ExactSurface
+) -> GridField | BandField:
+    """That of a plan, from what is written of it."""
+    values = arrays["far_values"]
+    box = Grid(about["origin"], about["far_spacing"], values.shape)
+    far = GridField(box, values, confidence=arrays.get("far_confidence"), surface=surface)
+    if "coarse_shape" not in about:
+        return far
+    grid = Grid(about["origin"], about["coarse_spacing"], about["coarse_shape"])
+    blocks = Blocks(arrays["coarse_places"], (grid.shape[0], grid.shape[1], grid.shape[2]))
+    confidence = arrays.get("coarse_confidence")
+    width = float(about["coarse_width"])
+    return BandField(grid, blocks, arrays["coarse_values"], far, width, confidence=confidence, surface=surface)
+
+
+def solve_into(folder: str, fingerprint: str, tile: tuple[int, int, int]) -> tuple[int, int]:
     """Compute a tile and write it; returns its number of blocks, and the bytes that this process has had at most."""
     place = Path(folder)
-    write_tile(place, tile, solve_tile(load_plan(place), np.array(tile)))
+    write_tile(place, tile, solve_tile(load_plan(place, fingerprint), np.array(tile)))
     return tile_blocks(place, tile) or 0, peak_memory()
 
 

@@ -207,7 +207,7 @@ def _completed(
     gap, _ = tree.query(centres)
     in_band = np.minimum(gap - radius, distances.min(axis=1)) <= plan.reach  # the others are not kept
     rows = np.flatnonzero(in_band & (gap - radius < distances.max(axis=1)))
-    trusted = _trusted(plan, crossings)
+    trusted = plan.coarse_confidence(crossings[:, 1:4])
     reach = float(np.linalg.norm(plan.steps))
     inner = np.linalg.norm(
         block_points(np.zeros((1, 3), dtype=np.int32), plan.steps) - 0.5 * (SIDE - 1) * plan.steps, axis=1
@@ -224,12 +224,3 @@ def _completed(
         distances_to_crossings(points, nearest.astype(np.int32), crossings, reach, other)
         taken = block, node
         distances[taken], confidence[taken] = np.minimum(other, distances[taken]), trusted[nearest]
-
-
-def _trusted(plan: BandPlan, crossings: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(c,) confidence in crossings: that of the coarse field there."""
-    if plan.coarse.confidence is None:
-        return np.ones(len(crossings), dtype=np.float32)
-    index = (crossings[:, 1:4] / plan.coarse.grid.spacing).T
-    result: NDArray[np.float32] = scipy.ndimage.map_coordinates(plan.coarse.confidence, index, order=1, mode="nearest")
-    return result

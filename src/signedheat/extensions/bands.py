@@ -16,12 +16,14 @@ from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..memory import paged
 from ..operators.grid.blocks import Blocks
-from ..operators.grid.exact_surface import ExactSurface
 from ..parallel import n_threads
-from ..progress import Progress
+from ..progress import Progress, within
 from .band_memory import refuse_band_beyond_memory
-from .band_plan import BandPlan, plan_band
+from .band_plan import BandPlan, grid_between, plan_band, width_between
 from .band_tiles import Tile, solve_tile
+
+BETWEEN = 0.2
+"""Share of the progress that the band between a band and its coarse grid is."""
 
 
 def band_around(coarse: GridField, grid: Grid, band: float, progress: Progress | None = None) -> BandField:
@@ -48,6 +50,15 @@ def band_around(coarse: GridField, grid: Grid, band: float, progress: Progress |
     MemoryLimitError
         If the band cannot fit in memory; none of it has been computed then.
     """
+    between = grid_between(coarse.grid, grid)
+    if between is None:
+        return joined_band(coarse, grid, band, progress)
+    wide = band_around(coarse, between, width_between(grid, band), within(progress, 0.0, BETWEEN))
+    return joined_band(wide, grid, band, within(progress, BETWEEN, 1.0))
+
+
+def joined_band(coarse: GridField | BandField, grid: Grid, band: float, progress: Progress | None) -> BandField:
+    """A band from the next coarser field; see `band_around`."""
     plan = plan_band(coarse, grid, band)
     refuse_band_beyond_memory(plan)
     tiles = plan.tiles
@@ -83,6 +94,5 @@ def joined(plan: BandPlan, tiles: list[Tile], diagnostics: Diagnostics) -> BandF
         rows = blocks.rows(tile.places)
         values[rows] = tile.values
         confidence[rows] = tile.confidence
-    telling = plan.telling if not plan.telling.all() else None
-    surface = ExactSurface(plan.features, crossings, np.array(plan.grid.origin), np.array(plan.steps), telling)
-    return BandField(plan.grid, blocks, values, plan.coarse, plan.width, diagnostics, confidence, surface)
+    surface = plan.surface(crossings)
+    return BandField(plan.grid, blocks, values, plan.far, plan.width, diagnostics, confidence, surface)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Protocol
@@ -20,14 +21,14 @@ from ..domains.grid import Grid
 from ..domains.kinds import ShapeLike
 from ..errors import FileFormatError, SignedHeatError, SourceError
 from ..fields.band_field import BandField
+from ..fields.grid_field import GridField
 from ..lowering.area_elements import area_elements, bounds_around
 from ..operators.grid.blocks import SIDE, Blocks
-from ..operators.grid.exact_surface import ExactSurface
 from ..packages import lazy_module, require
 from ..parallel import n_threads
 from ..progress import Progress, within
 from ..solver import checked
-from .band_plan import BandPlan, plan_band
+from .band_plan import BandPlan, coarse_grid, grid_between, plan_band, width_between
 from .band_stores import TilesComputed, load_plan, read_tile, save_plan, saved_fingerprint, solve_into, tile_blocks
 from .joining import joined_shape
 from .solid_distance import coarse_distance
@@ -112,32 +113,54 @@ def tiled_distance(
     solid = joined_shape(shape)
     folder = Path(store).absolute()
     grid = Grid.around(bounds_around([solid]), resolution, padding, spacing) if domain is None else domain
-    options = (band, constraint, diffusion, as_oriented, keep_overlaps)
-    key = _key(solid, grid, options)
-    saved = saved_fingerprint(folder)
-    if saved is not None and saved != key:
+    key = _key(solid, grid, (band, constraint, diffusion, as_oriented, keep_overlaps))
+    steps = Steps(not as_oriented, not keep_overlaps, True, checked(constraint), diffusion)
+    run = _Run(key, scheduler, lambda told: coarse_distance(solid, grid, steps, told))
+    field, note = _in_tiles(run, folder, grid, band, progress)
+    return replace(field, diagnostics=field.diagnostics.noting(note))
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What bands in tiles that follow each other share: their fingerprint, who computes, and the coarsest field."""
+
+    key: str
+    scheduler: Executor | ClusterClient | str | None
+    coarsest: Callable[[Progress | None], GridField]
+
+
+def _in_tiles(
+    run: _Run, folder: Path, grid: Grid, band: float, progress: Progress | None
+) -> tuple[BandField, TilesComputed]:
+    """A band in tiles; before it the one between it and the coarsest grid, where it is far finer, likewise."""
+    diagnostics, saved = Diagnostics(), saved_fingerprint(folder)
+    if saved not in (None, run.key):
         raise FileFormatError(
             "the folder holds tiles of another shape, grid or band",
             remedy="name another folder, or remove it",
-            path=store,
+            path=folder,
         )
-    diagnostics = Diagnostics()
     if saved is None:
-        steps = Steps(not as_oriented, not keep_overlaps, True, checked(constraint), diffusion)
-        coarse = coarse_distance(solid, grid, steps, within(progress, 0.0, PLANNED))
+        coarse: GridField | BandField
+        between = grid_between(coarse_grid(grid), grid)
+        planned = within(progress, 0.0, PLANNED)
+        if between is None:
+            coarse = run.coarsest(planned)
+        else:
+            coarse, _ = _in_tiles(run, folder / "between", between, width_between(grid, band), planned)
         diagnostics = coarse.diagnostics
-        save_plan(plan_band(coarse, grid, band), folder, key)
+        save_plan(plan_band(coarse, grid, band), folder, run.key)
         del coarse
-    plan = load_plan(folder)
+    plan = load_plan(folder, run.key)
     places = [(int(a), int(b), int(c)) for a, b, c in plan.tiles]
     missing = [place for place in places if tile_blocks(folder, place) is None]
     peak = 0
-    for done, (_, memory) in enumerate(_computed(str(folder), missing, scheduler)):
+    for done, (_, memory) in enumerate(_computed(str(folder), run, missing)):
         peak = max(peak, memory)
         if progress is not None:
             progress(PLANNED + (1 - PLANNED) * (done + 1) / len(missing), "tiles")
     note = TilesComputed(len(places), len(places) - len(missing), peak)
-    return _gathered(plan, folder, places, diagnostics.noting(note))
+    return _gathered(plan, folder, places, diagnostics), note
 
 
 def _key(shape: object, grid: Grid, options: tuple[object, ...]) -> str:
@@ -148,17 +171,16 @@ def _key(shape: object, grid: Grid, options: tuple[object, ...]) -> str:
     return fingerprint(elements.corners, elements.vectors, numbers, words).hex()
 
 
-def _computed(
-    folder: str, places: list[Place], scheduler: Executor | ClusterClient | str | None
-) -> Iterator[tuple[int, int]]:
+def _computed(folder: str, run: _Run, places: list[Place]) -> Iterator[tuple[int, int]]:
     """What `solve_into` returns for each tile, as they are done."""
+    scheduler = run.scheduler
     if not places:
         return
     if scheduler is None:
         with ThreadPoolExecutor(n_threads()) as pool:
-            yield from _on_pool(folder, places, pool)
+            yield from _on_pool(folder, run.key, places, pool)
     elif isinstance(scheduler, Executor):
-        yield from _on_pool(folder, places, scheduler)
+        yield from _on_pool(folder, run.key, places, scheduler)
     elif isinstance(scheduler, str):
         try:
             client = distributed.Client(scheduler)
@@ -167,13 +189,13 @@ def _computed(
                 f"no Dask cluster answers at {scheduler} ({error})", remedy="check the address", element="scheduler"
             ) from error
         with client:
-            yield from _on_cluster(folder, places, client)
+            yield from _on_cluster(folder, run.key, places, client)
     else:
-        yield from _on_cluster(folder, places, scheduler)
+        yield from _on_cluster(folder, run.key, places, scheduler)
 
 
-def _on_pool(folder: str, places: list[Place], pool: Executor) -> Iterator[tuple[int, int]]:
-    jobs = [pool.submit(solve_into, folder, place) for place in places]
+def _on_pool(folder: str, key: str, places: list[Place], pool: Executor) -> Iterator[tuple[int, int]]:
+    jobs = [pool.submit(solve_into, folder, key, place) for place in places]
     try:
         for job in as_completed(jobs):
             yield job.result()
@@ -186,9 +208,9 @@ def _on_pool(folder: str, places: list[Place], pool: Executor) -> Iterator[tuple
             job.cancel()
 
 
-def _on_cluster(folder: str, places: list[Place], client: ClusterClient) -> Iterator[tuple[int, int]]:
+def _on_cluster(folder: str, key: str, places: list[Place], client: ClusterClient) -> Iterator[tuple[int, int]]:
     """Tiles that have the same input are different work: `pure` would let the cluster think that they are done."""
-    jobs = [client.submit(solve_into, folder, place, pure=False, retries=RETRIES) for place in places]
+    jobs = [client.submit(solve_into, folder, key, place, pure=False, retries=RETRIES) for place in places]
     try:
         for job in distributed.as_completed(jobs):
             yield job.result()
@@ -221,15 +243,13 @@ def _gathered(plan: BandPlan, folder: Path, places: list[Place], diagnostics: Di
         np.asarray(np.load(target / f"{name}.npy", mmap_mode="c")) for name in ("values", "confidence")
     ]
     blocks = Blocks(np.concatenate(where), (plan.grid.shape[0], plan.grid.shape[1], plan.grid.shape[2]))
-    telling = None if plan.telling.all() else plan.telling
-    surface = ExactSurface(plan.features, np.concatenate(crossings), plan.grid.origin, plan.grid.spacing, telling)
     return BandField(
         plan.grid,
         blocks,
         mapped[0].astype(np.float32, copy=False),
-        plan.coarse,
+        plan.far,
         plan.width,
         diagnostics,
         mapped[1].astype(np.float16, copy=False),
-        surface,
+        plan.surface(np.concatenate(crossings)),
     )
