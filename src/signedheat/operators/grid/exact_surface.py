@@ -28,6 +28,8 @@ PRESSES, FARTHEST = 2, 0.5
 """Times that a point is moved off its edge, and how many cells at most."""
 CLEARANCE = 1e-3
 """Fraction of a cell that points of a level keep from the nodes."""
+MANY = 1 << 20
+"""Points that are ordered together."""
 APART = 2.0
 """Cells between corners of the faces nearest to the nodes of an edge from which on more than these are asked."""
 _BENDING = ((0, 0, 10), (1, 0, 12), (1, 1, 13), (2, 0, 15), (2, 1, 16), (2, 2, 17))
@@ -114,11 +116,22 @@ class ExactSurface(Frozen):
         return scipy.spatial.cKDTree(self.crossings[:, 1:4])
 
     def nearest(self, points: NDArray[np.float64]) -> SurfacePlaces:
-        """The nearest place of each of (n, 3) points around `origin`, in time O(n log m), on all threads."""
-        return SurfacePlaces(*in_chunks(self._nearest_of_chunk, points))
+        """The nearest place of each of (n, 3) points around `origin`, in time O(n log m), on all threads.
 
-    def _nearest_of_chunk(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
-        """The attributes of `SurfacePlaces`, for points that are not many."""
+        Points are ordered along a curve through space: neighbours have nearly the same way through the tree.
+        """
+        parts = [self._nearest_of_many(points[begin : begin + MANY]) for begin in range(0, max(len(points), 1), MANY)]
+        return SurfacePlaces(*(np.concatenate(part) if len(part) > 1 else part[0] for part in zip(*parts, strict=True)))
+
+    def _nearest_of_many(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
+        """The attributes of `SurfacePlaces`, for points of which there is memory for some more."""
+        order = np.argsort(morton_codes(points), kind="stable") if len(points) else np.zeros(0, dtype=np.int64)
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        return tuple(part[back] for part in in_chunks(self._nearest_in_order, points[order]))
+
+    def _nearest_in_order(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
+        """The same for points that follow each other in space."""
         if not len(points):
             return (
                 np.empty(0),
@@ -128,16 +141,12 @@ class ExactSurface(Frozen):
                 np.empty(0, dtype=bool),
                 np.empty(0, dtype=bool),
             )
-        order = np.argsort(morton_codes(points), kind="stable")  # neighbours have nearly the same way through the tree
-        sorted_points = points[order]
-        found = self.tree.search(sorted_points) if len(self.features.corners) else None
+        found = self.tree.search(points) if len(self.features.corners) else None
         limits = np.full(len(points), np.inf) if found is None else found.distances + float(np.linalg.norm(self.steps))
         near, which = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
         if len(self.crossings):
-            near, which = self._nearest_crossings(sorted_points, limits)
-        back = np.empty(len(points), dtype=np.int64)
-        back[order] = np.arange(len(points))
-        return tuple(part[back] for part in self._nearer(sorted_points, found, near, which))
+            near, which = self._nearest_crossings(points, limits)
+        return self._nearer(points, found, near, which)
 
     def _nearest_to_nodes(self, points: NDArray[np.float64], labels: NDArray[np.int32]) -> tuple[NDArray[Any], ...]:
         """The same of what is nearest to some nodes around each point, (n, k) as `nodes` names it."""
@@ -172,7 +181,7 @@ class ExactSurface(Frozen):
         """(n,) signed distances of points between nodes; the side is that of `guess` where none is told, NaN if 0."""
         result = np.empty(len(points))
         for rows, found in (
-            (doubtful, self._nearest_of_chunk(points[doubtful])),
+            (doubtful, self._nearest_of_many(points[doubtful])),
             (~doubtful, self._nearest_to_nodes(points[~doubtful], labels[~doubtful])),
         ):
             result[rows] = self._signed(found, guess)
@@ -286,7 +295,7 @@ class ExactSurface(Frozen):
         at, off = self._crossings_of(*edges, labels, doubtful, level)
         step = float(self.steps.min())
         wrong = np.flatnonzero(~doubtful & (labels[:, :1] < 0).any(axis=1))  # on completed surface no walk leads on
-        wrong = wrong[np.abs(self._signed(self._nearest_of_chunk(at[wrong]), level) - level) > CLOSE * step]
+        wrong = wrong[np.abs(self._signed(self._nearest_of_many(at[wrong]), level) - level) > CLOSE * step]
         if len(wrong):
             again = edges[0][wrong], edges[1][wrong], edges[2][wrong], edges[3][wrong]
             at[wrong], off[wrong] = self._crossings_of(*again, labels[wrong], np.ones(len(wrong), dtype=bool), level)
@@ -339,7 +348,7 @@ class ExactSurface(Frozen):
         for _ in range(PRESSES):
             if not len(rows):
                 return
-            found = self._nearest_of_chunk(at[rows])
+            found = self._nearest_of_many(at[rows])
             off = self._signed(found, level) - level
             near = np.abs(off) < FARTHEST * cell  # not where it is NaN
             rows, off, signs = rows[near], off[near], np.where(self._signed(found, level)[near] < 0, -1.0, 1.0)
