@@ -34,6 +34,8 @@ FOUND = [
     ("surface use", 412, 1359),
     # paths through edges that are a rounding shorter than none
     ("surface use", 202, 43), ("surface curves", 300, 4876),
+    # curves across triangles as thin as rounding, which turn them
+    ("surface curves", 7003, 1478),
     # a part of the surface that no curve reaches, and whose sides touch one
     ("surface curves", 20261123, 3919),
     # bands around shapes all of whose faces lie in layers
@@ -45,6 +47,8 @@ FOUND = [
     # arguments that are quoted, compared or counted
     ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
     ("arguments", 206, 22), ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),
+    # boxes from one end of what can be written to the other
+    ("arguments", 7004, 197),
 ]  # fmt: skip
 
 

@@ -119,7 +119,8 @@ def refuse_extreme(
     lower: NDArray[np.float64], upper: NDArray[np.float64], name: str, error: type[SignedHeatError] = GeometryError
 ) -> None:
     """Refuse a box that reaches beyond `LARGEST`, or is smaller than `SMALLEST` but no point."""
-    farthest, extent = float(max(-lower.min(), upper.max())), float((upper - lower).max())
+    with np.errstate(over="ignore"):  # from one end of what can be written to the other
+        farthest, extent = float(max(-lower.min(), upper.max())), float((upper - lower).max())
     if farthest > LARGEST or 0 < extent < SMALLEST:
         what = f"reach as far as {farthest:.3g}" if farthest > LARGEST else f"extend over {extent:.3g} only"
         raise error(
