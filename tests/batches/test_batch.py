@@ -12,6 +12,7 @@ import pytest
 
 import signedheat as sh
 from batch_jobs import measure
+from refusals import refused
 from signedheat import samples
 from signedheat.batches.inputs import expand
 
@@ -226,3 +227,18 @@ def test_what_is_no_batch_says_so(tmp_path, files, monkeypatch):
     assert unknown.failures[0].state == "failed" and "batch_jobs" in unknown.failures[0].message
     missing = sh.batch(folder / "missing.ply", tmp_path / "out", sh.BatchJob(info=True), workers=1)
     assert missing.failures[0].state == "failed" and "no such file" in missing.failures[0].message
+
+
+@pytest.mark.parametrize("odd", [0, -1, 1.5, np.nan, "two", 10**6])
+@pytest.mark.parametrize("name", ["workers", "threads"])
+def test_odd_numbers_of_workers(tmp_path, name, odd):
+    with refused(sh.SignedHeatError, name):
+        sh.batch("shape.stl", tmp_path / "made", sh.BatchJob(info=True), **{name: odd})
+    assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("odd", [0, -1, np.nan, np.inf, "long", 1e30])
+def test_odd_time_limits(tmp_path, odd):
+    with refused(sh.SignedHeatError, "time limit"):
+        sh.batch("shape.stl", tmp_path / "made", sh.BatchJob(info=True), time_limit=odd)
+    assert not (tmp_path / "made").exists()

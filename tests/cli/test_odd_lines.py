@@ -30,6 +30,9 @@ NUMBERS = {
     "info": ["--resolution"],
     "demo": ["--resolution"],
 }
+BATCH = ["batch", "--quiet", "--info", "--volume", "--sample", "9", "--workers", "1"]
+NUMBERS_OF_BATCHES = ["--resolution", "--spacing", "--padding", "--band", "--diffusion", "--time-limit", "--workers"]
+NUMBERS_OF_BATCHES += ["--threads", "--near", "--widths", "--seed", "--offset", "--sample"]
 ODD_FILES = [
     "missing.stl",
     "folder",
@@ -94,6 +97,49 @@ def test_odd_numbers(folder, capsys, command):
     for option in NUMBERS[command]:
         for odd in ODD_NUMBERS:
             assert ended(folder, capsys, command, {}, f"{option}={odd}") in (1, 2), (option, odd)
+
+
+@pytest.mark.parametrize("odd", ["", "fish", "--", "bash zsh", "٣", "\0", "bash\n"])
+def test_odd_shells(folder, capsys, odd):
+    assert ended(folder, capsys, "completion", {}, odd) == 2
+
+
+def told_by_batch(capsys, *options):
+    """The status of a batch, and what it has told."""
+    status, told = main([*BATCH, *options]), capsys.readouterr().err.splitlines()
+    assert not any("Traceback" in line or "bug" in line for line in told), told
+    assert all(line.startswith("signedheat") for line in told), told
+    return status, told
+
+
+def test_batch_of_odd_files(folder, capsys):
+    odd = ["missing.stl", "empty.stl", "text.stl", "shape.xyzzy", "shape"]
+    status, told = told_by_batch(capsys, *(f"{folder}/{name}" for name in odd), "-o", f"{folder}/many")
+    assert status == 1 and len(told) == len(odd)
+    for name in ("", "\0.stl", "ä" * 300, f"{folder}/folder", f"{folder}/*.xyz"):
+        status, told = told_by_batch(capsys, name, "-o", f"{folder}/none")
+        assert status == 1 and len(told) == 1 and not (folder / "none").exists()
+
+
+@pytest.mark.parametrize("out", ["", "ball.stl", "ball.stl/made", "ä" * 300, "\0"])
+def test_odd_folders_of_batches(folder, capsys, monkeypatch, out):
+    monkeypatch.chdir(folder)
+    before = sorted(folder.iterdir())
+    status, told = told_by_batch(capsys, "ball.stl", "-o", out)
+    assert status == 1 and len(told) == 1 and sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("option", NUMBERS_OF_BATCHES)
+def test_odd_numbers_of_batches(folder, capsys, option):
+    for odd in set(ODD_NUMBERS) - {"-1", "9" * 400} | {"-0.5x"}:
+        status, told = told_by_batch(capsys, f"{folder}/ball.stl", "-o", f"{folder}/none", f"{option}={odd}")
+        assert status == 2 and len(told) == 1, (option, odd, told)
+    assert not (folder / "none").exists()
+
+
+def test_batches_that_cannot_be_timed(folder, capsys):
+    status, told = told_by_batch(capsys, f"{folder}/ball.stl", "-o", f"{folder}/none", "--time-limit=1e30")
+    assert status == 1 and len(told) == 1 and not (folder / "none").exists()
 
 
 @pytest.mark.parametrize("command", ["offset", "morph", "contour"])

@@ -36,15 +36,34 @@ def expand(inputs: Iterable[str | os.PathLike[str]], without: Path) -> list[Inpu
     Raises
     ------
     FileFormatError
-        If there is no such file or folder, or none that matches a pattern, or no shape at all.
+        If a name cannot be one, if there is no such file or folder, or none that matches a pattern, or no shape at all.
     """
     found: dict[Path, Path] = {}  # and what its name is relative to
     for each in inputs:
-        for path, root in _files(Path(each), without):
-            found.setdefault(path, root)
+        try:
+            for path, root in _files(named_path(each), without):
+                found.setdefault(path, root)
+        except OSError as error:
+            raise FileFormatError(
+                f"cannot be looked for ({error.strerror})", remedy="check the name", path=each
+            ) from error
     if not found:
         raise FileFormatError("there is no shape among the inputs", remedy="name files, folders or patterns")
     return [Input(path, name) for path, name in zip(found, _names(found), strict=True)]
+
+
+def named_path(name: str | os.PathLike[str]) -> Path:
+    """A path that is named: an empty name, as of a variable that is not set, does not mean the folder that one is in.
+
+    Raises
+    ------
+    FileFormatError
+        If the name is empty, or none.
+    """
+    if not os.fspath(name) or "\0" in str(name):
+        cause = "holds a null character" if os.fspath(name) else "is empty"
+        raise FileFormatError(f"the name {cause}", remedy="name a file or a folder, or . for this one", path=name)
+    return Path(name)
 
 
 def _files(path: Path, without: Path) -> list[tuple[Path, Path]]:

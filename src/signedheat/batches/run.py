@@ -13,11 +13,13 @@ from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from ..compiled import MOST_THREADS
+from ..domains.validation import positive_number, whole_number
 from ..errors import SignedHeatError
 from ..packages import lazy_module, require
 from ..parallel import n_threads
 from ..progress import Progress, logger
-from .inputs import Input, expand
+from .inputs import Input, expand, named_path
 from .manifest import Manifest, Outcome, State, job_text, source_of
 from .supervision import Worker
 from .task import Answer, Job, Task
@@ -109,7 +111,7 @@ def batch(
     FileFormatError
         If there is no input, or the folder cannot be made.
     SignedHeatError
-        If the job cannot be sent to workers, or none can be started.
+        If the job cannot be sent to workers, or none can be started; if numbers make no sense.
     MissingPackageError
         If a scheduler is given and Dask is not installed.
 
@@ -125,7 +127,8 @@ def batch(
     """
     if scheduler is not None:
         require(*CLUSTER)
-    target = Path(folder)
+    _refuse_odd(workers, threads, time_limit)
+    target = named_path(folder)
     every = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
     _make(target)
     named = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
@@ -156,6 +159,16 @@ def batch(
     outcomes = tuple(kept[each.name] for each in every)
     manifest.write(outcomes)
     return Batch(outcomes, manifest.path, len(every) - len(todo))
+
+
+def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
+    """Refuse numbers of processes, threads and seconds that make no sense."""
+    for name, number in (("workers", 1 if workers is None else workers), ("threads", threads)):
+        if whole_number(number, name, 1, SignedHeatError) > MOST_THREADS:
+            raise SignedHeatError(f"{name} must be at most {MOST_THREADS}, not {number}", element=name)
+    if time_limit is not None and positive_number(time_limit, "time limit") > threading.TIMEOUT_MAX:
+        cause = f"the time limit is {time_limit:g} s, longer than can be waited"
+        raise SignedHeatError(cause, remedy="leave it out", element="time limit")
 
 
 Result = tuple[int, State, Answer]
