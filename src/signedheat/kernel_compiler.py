@@ -23,6 +23,7 @@ from .kernel_steps import REPLACED, Constraints, Sequence, makes_references
 
 codegen: Any = import_module("numba.core.codegen")  # as far as type checkers are concerned, all of it is untyped
 compiler: Any = import_module("numba.core.compiler")
+config: Any = import_module("numba.core.config")
 environments: Any = import_module("numba.core.environment")
 llvm: Any = import_module("llvmlite.binding")
 machinery: Any = import_module("numba.core.compiler_machinery")
@@ -38,6 +39,8 @@ LINKED = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 OF_THE_CALLER = {"no_cpython_wrapper", "no_cfunc_wrapper", "release_gil"}
 UNNESTED = untyped_passes.InlineClosureLikes, untyped_passes.WithLifting
 """Steps that do nothing where no function is within another, nor objects of Python are used."""
+LEVEL = 2
+"""Of LLVM's optimisation: at 3, Numba's, compiling takes a thirtieth more, and kernels run no faster."""
 NEW_PASSES = hasattr(llvm, "create_new_function_pass_manager")
 
 _KNOWN: dict[Any, Any] = {}
@@ -107,7 +110,7 @@ class Library(codegen.JITCodeLibrary):  # type: ignore[misc]
         if self.has_references:  # into one function, so that most of them are found to be needless
             steps, builder = self._codegen._module_pass_manager(opt=0, loop_vectorize=False, cost="cheap")
             steps.run(self._final_module, builder)
-        steps, builder = self._codegen._module_pass_manager()
+        steps, builder = self._codegen._module_pass_manager(opt=min(LEVEL, int(config.OPT)))
         steps.run(self._final_module, builder)
 
 

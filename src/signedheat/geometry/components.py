@@ -17,7 +17,7 @@ def same_positions(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
     >>> same_positions(np.array([[0.0, 1.0], [2.0, 3.0], [-0.0, 1.0]])).tolist()
     [0, 1, 0]
     """
-    return _same_positions(np.ascontiguousarray(vertices) + 0.0)  # −0 becomes 0
+    return _same_rows((np.ascontiguousarray(vertices) + 0.0).view(np.uint64))  # −0 becomes 0
 
 
 def connected_components(n: int, one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -57,9 +57,8 @@ def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 @compiled(nogil=True)
-def _same_positions(vertices):
-    count, dimension = vertices.shape
-    bits = vertices.view(np.uint64)
+def _same_rows(bits):
+    count, dimension = bits.shape
     size = 16
     while size < 2 * count:
         size *= 2
@@ -91,7 +90,9 @@ def _same_positions(vertices):
 
 @compiled(nogil=True)
 def _element_components(elements, n):
-    parent = np.arange(n)
+    parent = np.empty(n, dtype=np.int64)
+    for i in range(n):
+        parent[i] = i
     for e in range(elements.shape[0]):
         for c in range(1, elements.shape[1]):
             a, b = elements[e, 0], elements[e, c]

@@ -191,6 +191,19 @@ def _boundary_areas(
     return total, completed
 
 
+@compiled
+def _levels_below(levels: NDArray[np.float64], value: float) -> int:
+    """How many of rising levels are below a value; all if it is NaN. NumPy's own compiles slowly."""
+    low, high = 0, len(levels)
+    while low < high:
+        middle = (low + high) // 2
+        if levels[middle] >= value:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
 @compiled(nogil=True)
 def _completion_areas(
     holes: NDArray[np.int64],
@@ -216,7 +229,7 @@ def _completion_areas(
                 hole = holes[i, j, k]
                 if hole == 0:
                     continue
-                here = np.searchsorted(levels, winding[i, j, k])  # filled at the levels before this
+                here = _levels_below(levels, winding[i, j, k])  # filled at the levels before this
                 room = longest
                 for n, at in ((n0, i), (n1, j), (n2, k)):
                     if n > 1:
@@ -249,7 +262,7 @@ def _completion_areas(
                         elif holes[a, b, c] != hole:
                             continue
                         else:
-                            last = np.searchsorted(levels, winding[a, b, c])
+                            last = _levels_below(levels, winding[a, b, c])
                             first = here
                             if first >= last:  # the neighbour counts it
                                 continue
