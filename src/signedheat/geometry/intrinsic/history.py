@@ -13,7 +13,7 @@ from ...frozen import Frozen
 from ..intrinsic_mesh import IntrinsicMesh
 from .delaunay import glue
 from .gluing_kernels import Gluing
-from .transfer_kernels import trace_both_ways, transfer
+from .transfer_kernels import find_successors, trace_both_ways, transfer_backward, transfer_forward
 
 
 class Lines(NamedTuple):
@@ -59,13 +59,24 @@ class History(Frozen):
         self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Points of `before`, and vectors (p, k, 3) at them, as points of `after`."""
-        return self._transfer(True, faces, barycentric, vectors)
+        faces, barycentric, vectors = copied(faces, barycentric, vectors)
+        transfer_forward(self.steps, self.weights, *self._successors, faces, barycentric, vectors)
+        return faces, barycentric, vectors
 
     def backward(
         self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Points of `after`, and vectors (p, k, 3) at them, as points of `before`."""
-        return self._transfer(False, faces, barycentric, vectors)
+        faces, barycentric, vectors = copied(faces, barycentric, vectors)
+        n_faces = max(self.before.n_faces, self.after.n_faces)
+        transfer_backward(self.steps, self.weights, n_faces, faces, barycentric, vectors)
+        return faces, barycentric, vectors
+
+    @cached_property
+    def _successors(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Which steps change each face, one after the other."""
+        first, later = find_successors(self.steps, max(self.before.n_faces, self.after.n_faces))
+        return first, later
 
     @cached_property
     def new_vertices(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -92,18 +103,13 @@ class History(Frozen):
         """The edges of `before`, from tail to head, as lines on `after`."""
         return straight_lines(self.gluing_after, *self.forward(*edge_middles(self.before)))
 
-    def _transfer(
-        self,
-        forward: bool,
-        faces: NDArray[np.int64],
-        barycentric: NDArray[np.float64],
-        vectors: NDArray[np.float64] | None,
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        faces, barycentric = np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64)
-        vectors = np.zeros((len(faces), 0, 3)) if vectors is None else np.array(vectors, dtype=np.float64)
-        n_faces = max(self.before.n_faces, self.after.n_faces)
-        transfer(self.steps, self.weights, forward, n_faces, faces, barycentric, vectors)
-        return faces, barycentric, vectors
+
+def copied(
+    faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64] | None
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Points and vectors at them, none by default, as kernels may change them."""
+    vectors = np.zeros((len(faces), 0, 3)) if vectors is None else np.array(vectors, dtype=np.float64)
+    return np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64), vectors
 
 
 def edge_middles(triangles: IntrinsicMesh) -> tuple[NDArray, NDArray, NDArray]:

@@ -24,20 +24,84 @@ OUTWARD = 1e-6
 
 
 @kernel
-def transfer(steps, weights, forward, n_faces, faces, barycentric, vectors):
-    """Transfer points and vectors at them through a history, forward or backward; in place.
+def faces_around(steps, n, around, start):
+    """The faces that step n of a history has or makes, and the corner of each that its first point is at."""
+    kind = steps[n, 0]
+    around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
+    start[0] = start[1] = start[2] = 0
+    if kind == TURN:
+        around[1] = around[2] = -1
+    elif kind != SPLIT_FACE:
+        around[0], start[0], around[2] = steps[n, 1] // 3, steps[n, 1] % 3, -1
+    if kind == FLIP:
+        around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
+
+
+@kernel
+def find_successors(steps, n_faces):
+    """First step that changes each face, and (n, 3) the next that changes each face of a step; −1 if there is none."""
+    first = np.full(n_faces, -1, np.int32)
+    later = np.full((len(steps), 3), -1, np.int32)
+    around, start = np.empty(3, np.int64), np.empty(3, np.int64)
+    for m in range(len(steps)):
+        n = len(steps) - 1 - m
+        faces_around(steps, n, around, start)
+        for k in range(3):
+            if around[k] >= 0:
+                later[n, k] = first[around[k]]
+        for k in range(3):
+            if around[k] >= 0:
+                first[around[k]] = n
+    return first, later
+
+
+@kernel
+def transfer_forward(steps, weights, first, later, faces, barycentric, vectors):
+    """Transfer points and vectors at them from the first triangulation of a history to the last; in place.
+
+    Every point takes the steps that change its face, and no others: the time does not depend on the length of the
+    history. `first` and `later` are as `find_successors` returns them; for the rest see `transfer_backward`.
+    """
+    around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
+    for p in range(len(faces)):
+        n = first[faces[p]]
+        while n >= 0:
+            faces_around(steps, n, around, start)
+            kind, place = steps[n, 0], 0
+            if kind == TURN:
+                swap_last(barycentric[p])
+                for k in range(vectors.shape[1]):
+                    swap_last(vectors[p, k])
+            else:
+                side = 1 if faces[p] == around[1] else 0
+                place = exchange(
+                    kind,
+                    weights[n],
+                    True,
+                    BEFORE[kind, side],
+                    start[side],
+                    AFTER[kind],
+                    start,
+                    barycentric[p],
+                    vectors[p],
+                )
+                faces[p] = around[place]
+            n = later[n, place]
+
+
+@kernel
+def transfer_backward(steps, weights, n_faces, faces, barycentric, vectors):
+    """Transfer points and vectors at them from the last triangulation of a history to the first; in place.
 
     Parameters
     ----------
     steps, weights : (n, 4) int and float
         The history.
-    forward : bool
-        From the first triangulation to the last, or back.
     n_faces : int
-        Number of faces of the finer triangulation.
+        Number of faces of the last triangulation.
     faces : (p,) int
-        Face of each point. Backward, points without a face (−1) stand for the new vertices, in the order in which they
-        were inserted, at the end of the array; they get the position at which they were inserted.
+        Face of each point. Points without a face (−1) stand for the new vertices, in the order in which they were
+        inserted, at the end of the array; they get the position at which they were inserted.
     barycentric : (p, 3) float
         Barycentric coordinates in the face.
     vectors : (p, k, 3) float
@@ -50,28 +114,22 @@ def transfer(steps, weights, forward, n_faces, faces, barycentric, vectors):
         if faces[p] >= 0:
             later[p] = first[faces[p]]
             first[faces[p]] = p
-    before, after = (BEFORE, AFTER) if forward else (AFTER, BEFORE)
     around, start, heads = np.empty(3, np.int64), np.zeros(3, np.int64), np.empty(3, np.int64)
     for m in range(len(steps)):
-        n = m if forward else len(steps) - 1 - m
+        n = len(steps) - 1 - m
         kind = steps[n, 0]
+        faces_around(steps, n, around, start)
         if kind == TURN:
-            p = first[steps[n, 1]]
+            p = first[around[0]]
             while p >= 0:
                 swap_last(barycentric[p])
                 for k in range(vectors.shape[1]):
                     swap_last(vectors[p, k])
                 p = later[p]
             continue
-        around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
-        start[0] = start[1] = start[2] = 0
-        if kind != SPLIT_FACE:
-            around[0], start[0] = steps[n, 1] // 3, steps[n, 1] % 3
-        if kind == FLIP:
-            around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
         for k in range(3):
             heads[k] = -1
-            if before[kind, k, 0] >= 0:
+            if AFTER[kind, k, 0] >= 0:
                 heads[k] = first[around[k]]
                 first[around[k]] = -1
         for k in range(3):
@@ -79,13 +137,13 @@ def transfer(steps, weights, forward, n_faces, faces, barycentric, vectors):
             while p >= 0:
                 q = later[p]
                 place = exchange(
-                    kind, weights[n], forward, before[kind, k], start[k], after[kind], start, barycentric[p], vectors[p]
+                    kind, weights[n], False, AFTER[kind, k], start[k], BEFORE[kind], start, barycentric[p], vectors[p]
                 )
                 faces[p] = around[place]
                 later[p] = first[faces[p]]
                 first[faces[p]] = p
                 p = q
-        is_last = not forward and steps[n, 3] >= 0 and (n == 0 or steps[n - 1, 3] != steps[n, 3])
+        is_last = steps[n, 3] >= 0 and (n == 0 or steps[n - 1, 3] != steps[n, 3])
         if is_last and born >= 0 and faces[born] < 0:
             faces[born] = around[0]
             for k in range(3):
