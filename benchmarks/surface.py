@@ -1,11 +1,14 @@
 """Distance on triangle meshes beside potpourri3d, and beside nothing but the two sparse solves it cannot do without.
 
     python benchmarks/surface.py [--levels 5 6 7 8] [--peer-up-to 7]
+    python benchmarks/surface.py --triangles
 
 Each program runs in a process of its own, one after the other, on the same mesh and curves: a bumpy sphere and level
 sets that cross its faces, nothing imposed but where said. Seconds of all threads or, with --wall, on the clock; memory
 in megabytes above what imports and input take. "ours" is the scheme of the peer, one diffusion time; "default" is
 `SignedHeatSolver(mesh)`, which combines three.
+
+With --triangles instead: what refining meshes of large angles and needles gains and costs (`auto_refinement.py`).
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import auto_refinement
 import numpy as np
 
 BATCH = 64
@@ -31,8 +35,12 @@ def main() -> None:
     parser.add_argument("--peer-up-to", type=int, default=7)
     parser.add_argument("--repeats", type=int, default=3, help="rounds of all programs in turn; the best times count")
     parser.add_argument("--wall", action="store_true", help="seconds on the clock instead of those of all threads")
+    parser.add_argument("--triangles", action="store_true", help="what refining bad triangles gains and costs instead")
     parser.add_argument("--worker", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
+    if arguments.triangles:
+        auto_refinement.table()
+        return
     if arguments.worker:
         program, file = arguments.worker
         clock = Clock(time.perf_counter if arguments.wall else time.process_time)

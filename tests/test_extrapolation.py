@@ -5,6 +5,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from signedheat.discretization import discretize
 from signedheat.extrapolation import EXPONENTS, blended, default_diffusion
 
 ROUND = (1.2, 0.6)  # half axes of an ellipse
@@ -83,13 +84,37 @@ def test_times_that_make_no_sense_are_refused(arguments):
 
 def test_the_default_is_extrapolated_on_surfaces_alone():
     mesh = lattice(10, 0.3)
-    assert default_diffusion(mesh) == sh.Extrapolated() == default_diffusion(sh.PointCloud(mesh.vertices))
-    assert default_diffusion(sh.Grid((0, 0), 1.0, (8, 8))) == 1.0
+    for surface in (mesh, sh.PointCloud(mesh.vertices)):
+        assert default_diffusion(discretize(surface)) == sh.Extrapolated()
+    assert default_diffusion(discretize(sh.Grid((0, 0), 1.0, (8, 8)))) == 1.0
     curve = mesh.level_set(np.hypot(*mesh.vertices[:, :2].T), 0.9)
     values = sh.SignedHeatSolver(mesh).distance(curve).values
     assert np.array_equal(values, sh.SignedHeatSolver(mesh, sh.Extrapolated()).distance(curve).values)
     assert not np.allclose(values, sh.SignedHeatSolver(mesh, 1.0).distance(curve).values, atol=1e-6)
     assert np.array_equal(values, sh.signed_distance(curve, mesh).values)
+
+
+def test_times_of_fine_surfaces_grow_so_that_their_error_falls():
+    """That of fixed times does not: what they leave of h²/t is a fraction of the distance, whatever h."""
+    mesh = lattice(170, 0.5)
+    radius = np.hypot(*mesh.vertices[:, :2].T)
+    curve = mesh.level_set(radius, 0.6)
+    solver = sh.SignedHeatSolver(mesh)
+    grown, fixed = (s.distance(curve).values for s in (solver, solver.with_diffusion(sh.Extrapolated())))
+    errors = [np.sqrt(np.mean((values - radius + 0.6) ** 2)) for values in (grown, fixed)]
+    assert errors[0] < 0.85 * errors[1]
+
+
+def test_times_depend_on_the_extent_of_a_part_in_h_alone():
+    """They grow like its power 2/3, whatever the unit, and whatever other parts there are."""
+    coarse, fine = lattice(140, 0.5), lattice(210, 0.5)
+    copies = 1e3 * (coarse.vertices + np.arange(3)[:, None, None])
+    faces = coarse.faces + coarse.n_vertices * np.arange(3)[:, None, None]
+    parts = sh.TriangleMesh(copies.reshape(-1, 3), faces.reshape(-1, 3))
+    one, three, finer = (default_diffusion(discretize(mesh)).middle for mesh in (coarse, parts, fine))
+    assert one > sh.Extrapolated().middle
+    assert three == pytest.approx(one, rel=1e-9)
+    assert finer / one == pytest.approx(1.5 ** (2 / 3), rel=1e-3)  # but for the edges of the boundary
 
 
 @pytest.mark.parametrize("rim", [True, False])

@@ -10,7 +10,7 @@ from typing import Any, Generic, Literal, TypeVar, overload
 
 from .constraints import Constraint, ZeroSet
 from .diagnostics import Diagnostics
-from .discretization import Adaptable, discretize
+from .discretization import Adaptable, Discretization, discretize
 from .domains.curves import CurvesAndPoints
 from .domains.foreign import ForeignShape, as_shapes, converted
 from .domains.grid import Dimension, Grid
@@ -88,9 +88,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             return refined
         return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)
 
-    @property
-    def _times(self) -> Diffusion:
-        return default_diffusion(self.domain) if self.diffusion is None else self.diffusion
+    def _times(self, discretization: Discretization) -> Diffusion:
+        return default_diffusion(discretization) if self.diffusion is None else self.diffusion
 
     def with_diffusion(self, diffusion: Diffusion | None) -> SignedHeatSolver[AnyDomain]:
         """The same solver with another τ; shares everything that does not depend on τ, such as the factor of C.
@@ -152,12 +151,13 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             discretization = self.discretization
         with stopwatch("sources"):
             discretization, adapted = discretization.adapt(as_list(sources))
-            sources_by_time = lowered_for_times(discretization, adapted, self._times)
+            times = self._times(discretization)
+            sources_by_time = lowered_for_times(discretization, adapted, times)
         with stopwatch("diffuse"):
             vectors = [diffuse(discretization, source) for source in sources_by_time]
         with stopwatch("normalize"):
             source = sources_by_time[0]
-            directions = blended(self._times, (normalize(discretization, each) for each in vectors), source)
+            directions = blended(times, (normalize(discretization, each) for each in vectors), source)
             del vectors
         with stopwatch("integrate"):
             values = integrate(discretization, directions, source, constraint)
@@ -199,17 +199,18 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             batch = []
             for entry in sources[begin : begin + _BATCH]:
                 discretization, adapted = self.discretization.adapt(as_list(entry))
-                batch.append((discretization, lowered_for_times(discretization, adapted, self._times)))
+                times = self._times(discretization)
+                batch.append((discretization, lowered_for_times(discretization, adapted, times)))
             for (discretization, _), run in groupby(batch, key=lambda entry: (entry[0], len(entry[1]))):
                 by_time = list(zip(*(sources for _, sources in run), strict=True))
-                lowered = by_time[0]
+                lowered, times = by_time[0], self._times(discretization)
                 stopwatch = Stopwatch(None, steps=1)
                 with stopwatch("together"):
                     diffused = [diffuse_many(discretization, each) for each in by_time]
                     together = zip(*diffused, strict=True)
                     cells = ([normalize(discretization, vectors) for vectors in each] for each in together)
                     pairs = zip(cells, lowered, strict=True)
-                    directions = (blended(self._times, each, source) for each, source in pairs)
+                    directions = (blended(times, each, source) for each, source in pairs)
                     solved = list(integrate_many(discretization, directions, lowered, constraint))
                 seconds = {step: total / len(lowered) for step, total in stopwatch.seconds.items()}
                 for source, values in zip(lowered, solved, strict=True):

@@ -73,6 +73,12 @@ class SurfaceDiscretization:
             object.__setattr__(self, "spacing", 0.5 * float(self.triangles.lengths_of_edges.mean()))
 
     @cached_property
+    def extent(self) -> float:
+        """Square root of the area of the largest connected part, in multiples of h."""
+        areas = np.bincount(self.triangles.face_components, self.triangles.face_areas)
+        return float(np.sqrt(areas.max(initial=0.0))) / self.spacing
+
+    @cached_property
     def integration(self) -> SurfaceIntegration:
         """Step 3."""
         ordered = partial(factorize, order=self.vertex_order)

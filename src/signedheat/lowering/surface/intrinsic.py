@@ -34,7 +34,7 @@ SMALL = 10.0
 ANGLE = 20.0
 """Smallest angle of "auto", in degrees: vertices that 28 would take are better spent on large triangles."""
 
-COARSEST = 1.25
+COARSEST = 1.41
 """Largest triangles of "auto", beside the mean one: curves on coarser ones are not resolved."""
 
 BYTES_REFINED = 750
