@@ -164,8 +164,9 @@ def convergence(page: Page) -> None:
     factor e along an edge, which triangles do not resolve: directions far from the source keep an error of the size
     h²/t, which depends on the triangles' shapes and not on their size, so that one time alone converges more slowly. A
     longer t smooths the source, an error of the size √t. The default, `Extrapolated`, combines three t so that both
-    cancel, on fine meshes longer ones, without which ε ceases to fall at about 40,000 vertices. "default" is `SignedHeatSolver(mesh).distance(curves)`, "one time" `SignedHeatSolver(mesh, 1.0)`, which is
-    the paper's; "falls": on how many ε falls at every level.
+    cancel, on fine meshes longer ones, without which ε ceases to fall at about 40,000 vertices. "default" is
+    `SignedHeatSolver(mesh).distance(curves)`, "one time" `SignedHeatSolver(mesh, 1.0)`, which is the paper's; "falls":
+    on how many ε falls at every level.
     """
     ways: dict[str, Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]] = {
         "default": lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
