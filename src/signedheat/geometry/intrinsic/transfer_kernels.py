@@ -9,6 +9,7 @@ fail, and a point on an edge that stays remains on it exactly.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .gluing_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, apex_position, diamond, following, kernel
 
@@ -24,7 +25,7 @@ OUTWARD = 1e-6
 
 
 @kernel
-def faces_around(steps, n, around, start):
+def faces_around(steps: NDArray[np.int64], n: int, around: NDArray[np.int64], start: NDArray[np.int64]) -> None:
     """The faces that step n of a history has or makes, and the corner of each that its first point is at."""
     kind = steps[n, 0]
     around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
@@ -38,7 +39,7 @@ def faces_around(steps, n, around, start):
 
 
 @kernel
-def find_successors(steps, n_faces):
+def find_successors(steps: NDArray[np.int64], n_faces: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """First step that changes each face, and (n, 3) the next that changes each face of a step; −1 if there is none."""
     first = np.full(n_faces, -1, np.int32)
     later = np.full((len(steps), 3), -1, np.int32)
@@ -56,7 +57,15 @@ def find_successors(steps, n_faces):
 
 
 @kernel
-def transfer_forward(steps, weights, first, later, faces, barycentric, vectors):
+def transfer_forward(
+    steps: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    first: NDArray[np.int32],
+    later: NDArray[np.int32],
+    faces: NDArray[np.int64],
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+) -> None:
     """Transfer points and vectors at them from the first triangulation of a history to the last; in place.
 
     Every point takes the steps that change its face, and no others: the time does not depend on the length of the
@@ -90,7 +99,14 @@ def transfer_forward(steps, weights, first, later, faces, barycentric, vectors):
 
 
 @kernel
-def transfer_backward(steps, weights, n_faces, faces, barycentric, vectors):
+def transfer_backward(
+    steps: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    n_faces: int,
+    faces: NDArray[np.int64],
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+) -> None:
     """Transfer points and vectors at them from the last triangulation of a history to the first; in place.
 
     Parameters
