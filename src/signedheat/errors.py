@@ -64,7 +64,7 @@ class SourceError(SignedHeatError):
 
 
 class CancellingNormalsError(SourceError):
-    """A source whose normals cancel each other everywhere: doubled walls, of which neither side is inside."""
+    """A source whose normals cancel each other everywhere: doubled walls, loops inside single faces."""
 
 
 class ConstraintError(SignedHeatError):

@@ -23,7 +23,7 @@ from .extrapolation import Diffusion, Extrapolated, blended, default_diffusion, 
 from .fields.band_field import BandField
 from .fields.grid_field import GridField
 from .fields.tet_field import TetField
-from .fields.to_field import Field, to_field
+from .fields.to_field import Field, to_field, warned
 from .fields.vertex_field import VertexField
 from .frozen import Frozen
 from .lowering.area_elements import grid_around
@@ -142,7 +142,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         ConstraintError
             If the constraint does not fit the sources.
         """
-        return self._distance(sources, constraint)
+        return warned(self._distance(sources, constraint))
 
     def _distance(self, sources: Sources, constraint: Constraint | None) -> Field:
         constraint = checked(constraint)
@@ -215,8 +215,19 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
                 seconds = {step: total / len(lowered) for step, total in stopwatch.seconds.items()}
                 for source, values in zip(lowered, solved, strict=True):
                     diagnostics = Diagnostics(timings=seconds, time=source.time)
-                    fields.append(to_field(discretization, values, source, diagnostics))
+                    fields.append(warned(to_field(discretization, values, source, diagnostics)))
         return fields
+
+
+@overload
+def distance_unwarned(
+    solver: SignedHeatSolver[AnySurface], sources: CurvesAndPoints, constraint: Constraint | None
+) -> VertexField[AnySurface]: ...
+@overload
+def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field: ...
+def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field:
+    """`SignedHeatSolver.distance` for those who measure anew to what it would warn of."""
+    return solver._distance(sources, constraint)
 
 
 def checked(constraint: Constraint | None) -> Constraint:
@@ -381,4 +392,4 @@ def signed_distance(
         if not isinstance(domain, Grid) or constraint is not None:
             raise UnsupportedTypeError("a band lies on a grid, and takes no constraint", remedy="leave out the band")
         return band_of_phi(source, domain, band, diffusion, progress)
-    return SignedHeatSolver(domain, diffusion, progress)._distance(source, constraint)
+    return warned(SignedHeatSolver(domain, diffusion, progress)._distance(source, constraint))

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.domain_cases import ball, error, globe, sphere_points
 from shapes.surface_cases import book
 from shapes.surfaces import disk
-from signedheat.diagnostics import SharpenedToCurves
+from signedheat.diagnostics import SharpenedToCurves, SmallLoops
+from signedheat.errors import CancellingNormalsError
 from signedheat.samples import sphere, torus
 
 
@@ -47,6 +49,44 @@ def test_closed_polygons_in_the_plane(rings, seed):
     clear = exact > 1e-9
     assert ((phi.values > 0) == inside(mesh.vertices, corners))[clear].all()
     assert phi.diagnostics.note(SharpenedToCurves).sides_by_curves > 0.9
+
+
+@pytest.mark.parametrize("as_oriented", [True, False])
+def test_loops_inside_single_faces(as_oriented):
+    """The method refuses them, as their heat cancels; the one call gives the faces vertices where they need some."""
+    mesh = disk(3)
+    center = mesh.vertices[mesh.faces[40]].mean(axis=0)
+    size = np.sqrt(mesh.face_areas[40])
+    corners = center + 0.15 * size * np.array([[1, 0, 0], [0.3, 1, 0], [-1, 0.4, 0], [-0.2, -1, 0]])
+    loop = mesh.polyline(corners, closed=True)
+    assert len(np.unique(loop.faces)) == 1
+    with refused(CancellingNormalsError, "curves"):
+        sh.SignedHeatSolver(mesh).distance(loop)
+    phi = sh.curve_distance(mesh, loop, as_oriented=as_oriented)
+    assert np.abs(phi.values + to_polygon(mesh.vertices, corners, True)).max() < 2e-5
+
+
+def test_loops_smaller_than_triangles_are_told():
+    """The method hardly sees them; whoever measures to them, or to triangles made for them, needs no word."""
+    mesh = disk(20)
+    radius = 20**-1
+    angle = np.linspace(0, 2 * np.pi, 9)[:-1] + 0.1
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    loops = [mesh.polyline(r * ring + [0.31, 0.2, 0], closed=True) for r in (0.5 * radius, 6 * radius)]
+    solver = sh.SignedHeatSolver(mesh)
+    for measured in (
+        lambda: solver.distance(loops),
+        lambda: solver.distance_many([loops])[0],
+        lambda: sh.signed_distance(loops, mesh),
+    ):
+        with pytest.warns(sh.InexactWarning, match="closed curves"):
+            assert measured().diagnostics.note(SmallLoops).small_loops == 1
+    assert solver.distance(loops[1]).diagnostics.note(SmallLoops) is None
+    assert solver.distance(mesh.polyline(0.5 * radius * ring[:5])).diagnostics.note(SmallLoops) is None
+    sh.SignedHeatSolver(mesh, intrinsic=True).distance(loops)
+    phi = sh.curve_distance(mesh, loops[0])
+    away = np.linalg.norm(mesh.vertices - [0.31, 0.2, 0], axis=1)
+    assert np.abs(phi.values - 0.5 * radius + away).max() < 0.1 * radius
 
 
 @pytest.mark.parametrize("oriented", [True, False])

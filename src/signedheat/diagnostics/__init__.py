@@ -34,6 +34,7 @@ from .surfaces import (
     RoundCorners,
     SharpenedToCurves,
     SlopeErrors,
+    SmallLoops,
     TetsTurned,
     VerticesAdded,
 )
@@ -61,6 +62,7 @@ __all__ = [
     "SharpenedToCurves",
     "SharpenedToShape",
     "SlopeErrors",
+    "SmallLoops",
     "TetsTurned",
     "VerticesAdded",
 ]

@@ -41,6 +41,16 @@ class LargeAngles(Note):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class SmallLoops(Note):
+    """Number of closed curves that are smaller than a few triangles, to which the method is inaccurate."""
+
+    small_loops: int
+
+    def __str__(self) -> str:
+        return f"closed curves smaller than a few triangles: {self.small_loops}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class VerticesAdded(Note):
     """Number of vertices added so that sources run along edges."""
 

@@ -13,7 +13,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, SourceError
 from ..fields.vertex_field import VertexField
 from ..progress import Progress
-from ..solver import SignedHeatSolver, as_list
+from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .curve_pieces import distance_to_pieces
 
 
@@ -95,7 +95,7 @@ def conforming_distance(
 
     def measured(solver: SignedHeatSolver[SurfaceDomain]) -> VertexField:
         if as_oriented or own_levels:
-            return solver.distance(curves, constraint)
+            return distance_unwarned(solver, curves, constraint)
         return distance_to_pieces(solver, curves, constraint, every_piece)[0]
 
     surface = cast("SurfaceDomain", converted(domain))

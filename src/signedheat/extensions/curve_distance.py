@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from ..constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..domains.curves import CurvesAndPoints
 from ..domains.kinds import AnySurface
-from ..errors import ConstraintError
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import CancellingNormalsError, ConstraintError
 from ..fields.vertex_field import VertexField
 from ..progress import Progress
-from ..solver import SignedHeatSolver
+from ..solver import SignedHeatSolver, distance_unwarned
 from .curve_pieces import distance_to_pieces
 from .sharpening import sharpen
 
@@ -82,9 +84,17 @@ def curve_distance(
         )
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
     solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
-    if as_oriented:
-        field, taken = solver.distance(curves, constraint), curves
-    else:
-        field, taken = distance_to_pieces(solver, curves, constraint, every_piece)
+
+    def measured(solver: SignedHeatSolver[AnySurface]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
+        if as_oriented:
+            return distance_unwarned(solver, curves, constraint), curves
+        return distance_to_pieces(solver, curves, constraint, every_piece)
+
+    try:
+        field, taken = measured(solver)
+    except CancellingNormalsError:
+        if intrinsic != "auto" or not isinstance(solver.domain, TriangleMesh):
+            raise
+        field, taken = measured(replace(solver, intrinsic=True))  # loops inside single faces
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
     return sharpen(field, taken, progress=rest)

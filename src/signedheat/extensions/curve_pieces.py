@@ -18,7 +18,7 @@ from ..domains.kinds import SurfaceDomain
 from ..errors import InexactWarning, warn_user
 from ..fields.vertex_field import VertexField
 from ..lowering.surface.discretization import SurfaceDiscretization
-from ..solver import SignedHeatSolver, as_list
+from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .curve_orientation import Votes, with_turned
 
 STRANGE = 0.12
@@ -83,16 +83,16 @@ def distance_to_pieces(
     surface = surface_of(solver)
     votes = Votes.of(surface, listed)
     if len(votes.pieces) < 2:
-        return solver.distance(listed, constraint), listed
+        return distance_unwarned(solver, listed, constraint), listed
     suspects = np.empty(0, dtype=np.int64) if every_piece else suspected(votes)
     taken = without(listed, votes, suspects)
-    field = solver.distance(list(taken.values()), constraint)
+    field = distance_unwarned(solver, list(taken.values()), constraint)
     lengths = dict(zip(votes.pieces.tolist(), votes.lengths.tolist(), strict=True))
     near = {k: max(ASTRAY * lengths[k], NEAR * surface.spacing) for k in suspects.tolist()}
     astray = np.array([k for k in near if is_astray(field, listed[k], near[k])], dtype=np.int64)
     if len(astray) < len(suspects):
         taken = without(listed, votes, astray)
-        field = solver.distance(list(taken.values()), constraint)
+        field = distance_unwarned(solver, list(taken.values()), constraint)
     turned = np.array([k for k, curve in taken.items() if curve is not listed[k]], dtype=np.int64)
     note = CurvesTaken(turned, astray)
     if len(astray):

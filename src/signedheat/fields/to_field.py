@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import singledispatch
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..diagnostics import Diagnostics, SampledSource, TetsTurned
-from ..errors import UnreachedWarning, UnsupportedTypeError, warn_user
+from ..diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
+from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..lowering.grid.discretization import GridDiscretization
 from ..lowering.grid.masked import MaskedGridDiscretization
 from ..lowering.grid.masked_source import MaskedSource
 from ..lowering.grid.source import GridSource
 from ..lowering.surface.discretization import SurfaceDiscretization
+from ..lowering.surface.small_loops import small_loops
 from ..lowering.surface.source import SurfaceSource
 from ..lowering.tets.discretization import TetDiscretization
 from ..lowering.tets.source import TetSource
@@ -25,6 +26,8 @@ from .vertex_field import VertexField
 
 Field = GridField | VertexField | TetField
 """What a solver returns."""
+
+AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
 
 
 @singledispatch
@@ -81,7 +84,9 @@ def _(
             f"{unreached[0]}: distance there is NaN. Put a source on every part, or join the parts",
             UnreachedWarning,
         )
-    told = replace(diagnostics, unreached=unreached).noting(*discretization.notes)
+    small = small_loops(source)
+    notes = (*discretization.notes, *([SmallLoops(small)] if small else []))
+    told = replace(diagnostics, unreached=unreached).noting(*notes)
     finer = None
     if triangulation is not None:
         finer = VertexField(triangulation, everywhere[: triangulation.n_vertices], told, source)
@@ -108,3 +113,15 @@ def _(
 
 def sampled(source: GridSource) -> SampledSource:
     return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)
+
+
+def warned(field: AnyField) -> AnyField:
+    """The field; with a warning if it is that of the method, and curves are too small for its triangles."""
+    note = field.diagnostics.note(SmallLoops)
+    if note:
+        warn_user(
+            f"{note}. The method hardly sees them: curve_distance measures to the curves themselves, as does, on "
+            "triangle meshes, intrinsic=True by triangles that have them along edges",
+            InexactWarning,
+        )
+    return field

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, csr_matrix, vstack
 
 from ...domains.segments import segments_of_each
-from ...errors import SourceError
+from ...errors import CancellingNormalsError, SourceError
 from ...frozen import Frozen
 from ...geometry.components import connected_components
 from ...geometry.curve_segments import CurveSegments, interpolation_at
@@ -146,9 +146,9 @@ def surface_source(
         vectors = vectors + spacing * vertex_point_vectors(triangles, nodes.elements[at_vertex])
         vectors = vectors + np.sqrt(3) * spacing**2 * inner_point_vectors(triangles, nodes[~at_vertex])
     elif np.abs(vectors.data).max(initial=0.0) <= 1e-12 * max(part.lengths.max() for part in parts):
-        raise SourceError(
+        raise CancellingNormalsError(
             "the curves cancel: all of them run both ways, or close inside single faces, so that no side is positive",
-            remedy="make them unoriented (oriented=False), or the faces smaller",
+            remedy="make them unoriented (oriented=False), or the faces smaller, as intrinsic=True does",
             element="curves",
         )
 
