@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from signedheat.extensions.piecewise import memory_estimate as piecewise_estimat
 from signedheat.extensions.solid_memory import BYTES_IF_OPEN, bytes_of_faces, bytes_per_node
 from signedheat.extensions.steps import Steps
 from signedheat.geometry.surfels import count_surfels
+from signedheat.lowering.grid.discretization import bytes_of_area
 from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate
 from signedheat.lowering.surface.digital_surfaces import BYTES_PER_VOXEL
 from signedheat.lowering.surface.intrinsic import BYTES_REFINED
@@ -38,7 +40,9 @@ SIZES = {
     "intrinsic": (70, 140, 200),
     "piecewise": (50, 100, 200),
     "piecewise, exact": (40, 60, 80),
-    "grids, φ alone": (96, 160, 256),
+    "φ alone, a ball": (96, 160, 256),
+    "φ alone, 8 balls": (96, 160, 256),
+    "φ alone, 64 balls": (96, 160, 256),
     "closed solids": (96, 160, 288),
     "solids with holes": (96, 160, 288),
     "points as solids": (96, 160, 256),
@@ -112,11 +116,14 @@ def piecewise(size: int, exact: bool = False) -> tuple[Callable[[], object], flo
     return lambda: sh.piecewise_distance(mesh, half, exact=exact), piecewise_estimate(mesh.n_faces, exact)
 
 
-def phi_alone(size: int) -> tuple[Callable[[], object], float]:
-    """The method alone, around a ball with holes."""
-    mesh = samples.without_patches(samples.sphere(5), 4, 0.1)
+def phi_alone(balls: int, size: int) -> tuple[Callable[[], object], float]:
+    """The method alone, around balls in a cube, of which one has holes."""
+    around = itertools.product(range(balls), repeat=3)
+    mesh = samples.union(*(samples.sphere(3, center=tuple(2.6 * x for x in at)) for at in around))
+    mesh = samples.without_patches(mesh, 4, 0.1)
     grid = sh.Grid.around(mesh.bounds, size)
-    return lambda: sh.signed_distance(mesh, grid), grid_estimate(grid) - libraries()
+    surface = bytes_of_area(float(mesh.face_areas.sum()), grid.spacing, grid.n_nodes)
+    return lambda: sh.signed_distance(mesh, grid), grid_estimate(grid) + surface - libraries()
 
 
 def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable[[], object], float]:
@@ -130,7 +137,9 @@ def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable
 
 
 CASES = {
-    "grids, φ alone": phi_alone,
+    "φ alone, a ball": partial(phi_alone, 1),
+    "φ alone, 8 balls": partial(phi_alone, 2),
+    "φ alone, 64 balls": partial(phi_alone, 4),
     "closed solids": partial(solid, lambda: samples.sphere(5), True),
     "solids with holes": partial(solid, lambda: samples.without_patches(samples.sphere(5), 4, 0.1), False),
     "points as solids": partial(solid, lambda: sh.PointCloud(samples.sphere(5).vertices), True),

@@ -19,7 +19,7 @@ from shapes.tet_cases import boxes
 from signedheat import memory, samples
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
 from signedheat.extensions.solid_memory import BYTES_IF_CLOSED, BYTES_IF_SCATTERED, bytes_of_faces
-from signedheat.lowering.grid.discretization import fitting_spacing, memory_estimate
+from signedheat.lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
 from signedheat.lowering.surface import intrinsic
 from signedheat.memory import available_memory
 
@@ -59,6 +59,48 @@ def test_the_spacing_that_is_proposed_fits(shape):
         _ = sh.SignedHeatSolver(grid).discretization
 
 
+def test_libraries_that_others_have_imported_and_nobody_used():
+    """Of Numba, what its import leaves to be taken; the first process fills the cache."""
+    code = """
+import sys, numpy as np, signedheat as sh, memory
+from signedheat.memory import libraries
+if sys.argv[1] == "imported":
+    import numba
+plate = sh.TriangleMesh(np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0.02], [0, 2, 0.02]]), [[0, 1, 2], [0, 2, 3]])
+before, told = memory.resident("VmRSS"), libraries()
+sh.signed_distance(plate, sh.Grid((-1, -1, -1), 0.2, (21, 21, 11)))
+print(told / (memory.resident("VmHWM") - before))
+"""
+    ratios = []
+    for how in ("not", "not", "imported"):
+        command = [sys.executable, "-c", code, how]
+        made = subprocess.run(command, capture_output=True, text=True, check=True, cwd=BENCHMARK.parent)
+        ratios.append(float(made.stdout))
+    assert all(0.75 < ratio < 1.3 for ratio in ratios[1:]), ratios
+
+
+def test_how_much_surface_there_is_counts(monkeypatch):
+    """On the same grid, of which one ball takes little."""
+    grid = sh.Grid((0, 0, 0), 0.1, (60, 60, 60))
+    one = sh.TriangleMesh(BALL.vertices + 3, BALL.faces)
+    at = [(x, y, z) for x in (1, 2.2, 3.4, 4.6) for y in (1, 2.2, 3.4, 4.6) for z in (1, 2.2, 3.4, 4.6)]
+    many = samples.union(*(sh.TriangleMesh(0.5 * BALL.vertices + place, BALL.faces) for place in at))
+    sh.signed_distance(one, grid)
+    free = memory.libraries() + 32 * grid.n_nodes
+    monkeypatch.setattr(memory, "_free", lambda: free)
+    sh.signed_distance(one, grid)
+    with refused(sh.MemoryLimitError):
+        sh.signed_distance(many, grid)
+
+
+def test_the_spacing_that_is_proposed_fits_with_the_surface():
+    grid, area, free = sh.Grid((0, 0, 0), 0.01, (900, 900, 900)), 200.0, 8_000_000_000
+    spacing = fitting_spacing(grid, free, area=area)
+    counts = np.floor((grid.upper - grid.origin) / spacing).astype(int) + 1
+    fitting = memory_estimate(sh.Grid(grid.origin, spacing, counts)) + bytes_of_area(area, spacing, counts.prod())
+    assert 0.9 * free < fitting <= free
+
+
 solid_distance = importlib.import_module("signedheat.extensions.solid_distance")
 BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "memory.py"
 
@@ -73,6 +115,8 @@ BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "memory.py"
         ("tets", 20, 6),
         ("piecewise", 30, 10),
         ("noisy soups", 64, 64),
+        ("φ alone, a ball", 128, 24),
+        ("φ alone, 64 balls", 128, 24),
     ],
 )
 def test_estimates_are_near_the_peak_of_a_process_of_its_own(kind, size, small):

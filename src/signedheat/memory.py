@@ -21,13 +21,16 @@ LIMITS = (
 """Files with the memory limit of a container and its present use, for version 2 and version 1 of cgroups."""
 
 
-UNLOADED, LOADED = 130_000_000, 20_000_000
-"""Bytes that libraries and compiled kernels still take, whatever is computed, before and after their first use."""
+UNLOADED, IMPORTED, LOADED = 130_000_000, 65_000_000, 20_000_000
+"""Bytes that libraries and compiled kernels still take, whatever is computed: at first; where others have imported
+Numba, which takes as much again when it is first used; and after the first use of a kernel."""
 
 
 def libraries() -> int:
     """What libraries still take: most of it is the compiler, which the first kernel loads."""
-    return LOADED if "numba" in sys.modules else UNLOADED
+    if "signedheat.kernel_compiler" in sys.modules:
+        return LOADED
+    return IMPORTED if "numba" in sys.modules else UNLOADED
 
 
 def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]) -> None:

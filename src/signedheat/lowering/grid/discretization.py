@@ -25,8 +25,10 @@ from .source import GridSource
 
 SAMPLE_SIZE = 1.0
 """Longest edge, in cells, of the simplices into which faces are bisected."""
-BYTES_PER_NODE = 42
-"""Measured peak memory of a distance computation."""
+BYTES_PER_NODE, BYTES_PER_AREA = {1: 42, 2: 42, 3: 25, 4: 42}, 930
+"""Measured peak memory of a distance computation, by dimension; and what each square cell of surface adds in space."""
+MOST_PER_NODE = 22
+"""What surface adds for each node where it is everywhere."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
 
@@ -42,16 +44,34 @@ def memory_estimate(grid: Grid, per_node: float | None = None, beside: float = 0
     True
     """
     if per_node is None:
-        per_node = BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS[grid.dimension]
+        per_node = (BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS)[grid.dimension]
     return int(per_node * grid.n_nodes + beside) + libraries()
 
 
-def refuse_beyond_memory(grid: Grid, per_node: float | None = None, beside: float = 0.0) -> None:
-    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing."""
+def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> float:
+    """What so much surface adds on a grid of this spacing, in space.
+
+    Examples
+    --------
+    >>> bytes_of_area(0.5, np.full(3, 0.01), 10**6)
+    4650000.0
+    """
+    if len(spacing) != 3:
+        return 0.0
+    return min(round(BYTES_PER_AREA * area / float(np.prod(spacing)) ** (2 / 3), 1), MOST_PER_NODE * n_nodes)
+
+
+def refuse_beyond_memory(grid: Grid, per_node: float | None = None, beside: float = 0.0, area: float = 0.0) -> None:
+    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing.
+
+    Of φ alone, more is known when the area of the surface is.
+    """
     available, needed = available_memory(), memory_estimate(grid, per_node, beside)
+    needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting_spacing(grid, available, per_node, beside)))
+    fitting = fitting_spacing(grid, available, per_node, beside, area)
+    spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     raise MemoryLimitError(
         f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
         f"and {available / 1e9:.1f} GB are free",
@@ -60,14 +80,19 @@ def refuse_beyond_memory(grid: Grid, per_node: float | None = None, beside: floa
 
 
 def fitting_spacing(
-    grid: Grid, available: int, per_node: float | None = None, beside: float = 0.0
+    grid: Grid, available: int, per_node: float | None = None, beside: float = 0.0, area: float = 0.0
 ) -> NDArray[np.float64]:
     """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
     base = memory_estimate(grid, 0.0, beside)
     whole = memory_estimate(grid, per_node, beside) - base
     spacing = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
     per_node = whole / grid.n_nodes
-    while per_node * np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1) + base > max(available, 2 * base):
+
+    def needed() -> float:
+        nodes = float(np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1))
+        return per_node * nodes + bytes_of_area(area, spacing, nodes) + base
+
+    while needed() > max(available, 2 * base):
         spacing *= 1.01
     return spacing
 
@@ -88,6 +113,7 @@ class GridDiscretization(DiffusesEach):
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
         """X₀ and the rows that interpolate φ on the source: Eq. 11 in space, area vectors spread to the nodes."""
         samples = sample_on_grid(sources, self.grid, SAMPLE_SIZE)
+        refuse_beyond_memory(self.grid, area=float(samples.weights.sum()))
         return GridSource(samples, self.grid, diffusion)
 
     def diffuse(self, source: GridSource) -> list[Level]:
