@@ -29,13 +29,15 @@ FOUND = [
     # more samples in few tets than these can follow exactly
     ("space tets", 207, 222),
     # levels far from zero, interpolated
-    ("surface use", 300, 927), ("surface use", 300, 1913),
+    ("surface use", 7007, 2403), ("surface use", 300, 927), ("surface use", 300, 1913),
     # points that nearly coincide, each at a level of its own
     ("surface use", 412, 1359),
     # paths through edges that are a rounding shorter than none
     ("surface use", 202, 43), ("surface curves", 300, 4876),
     # curves across triangles as thin as rounding, which turn them
     ("surface curves", 7003, 1478),
+    # segments whose ends are one to rounding
+    ("surface triangulation", 7007, 1631),
     # a part of the surface that no curve reaches, and whose sides touch one
     ("surface curves", 20261123, 3919),
     # bands around shapes all of whose faces lie in layers
@@ -48,7 +50,7 @@ FOUND = [
     ("arguments", 100, 6), ("arguments", 100, 88), ("arguments", 100, 152), ("arguments", 100, 211),
     ("arguments", 206, 22), ("arguments", 108, 89), ("arguments", 102, 126), ("arguments", 103, 15),
     # boxes from one end of what can be written to the other
-    ("arguments", 7004, 197),
+    ("arguments", 7004, 197), ("arguments", 7008, 1101),
 ]  # fmt: skip
 
 

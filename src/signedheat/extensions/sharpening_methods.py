@@ -154,9 +154,8 @@ class Convex:
             phi = np.nan_to_num(values)
             reach = max(float(np.ptp(phi)), typical_size(sizes, elements.slopes(phi).shape[1]))
             pull = elements.masses * np.sign(phi) / reach
-            relaxed = slopes = elements.slopes(phi)
-            dual = np.zeros_like(slopes)
-            limited = at_most_one(slopes)
+            relaxed = limited = at_most_one(elements.slopes(phi))  # which may be the slopes of rounding alone
+            dual = np.zeros_like(limited)
             number, residual = 0, np.inf
             while number < self.max_rounds and residual > self.tolerance:
                 before, limited = limited, at_most_one(relaxed + dual)

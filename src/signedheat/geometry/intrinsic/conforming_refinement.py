@@ -260,7 +260,8 @@ class FaceCutter:
             for u, v in pairwise(chain):
                 edge = (edge_of.get((u, v)) or edge_of[v, u])[0]
                 tail, head, over = frames[edge]
-                vector = merged.vectors[p] * np.conj(positions[head] - positions[tail]) / whole
+                step = np.conj(positions[head] - positions[tail])
+                vector = merged.vectors[p] * step / whole if whole > 0 else 0j  # its ends are nearer than rounding
                 ends_here = self.node(vertices[u]), self.node(vertices[v])
                 self.pieces.append(
                     NewSegment(*ends_here, -1, edge, np.conj(vector) if over else vector, merged.owners[p])

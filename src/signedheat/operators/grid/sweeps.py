@@ -48,6 +48,7 @@ def diffuse_by_sweeps(
     """
     shape = sources.shape
     vectors = untouched_zeros((*shape, 4), np.float32) if given is None else given
+    ratios = np.minimum(ratios, 1e30)
     lines = shape[0] * shape[1] * shape[2]
     sweep_lines(
         _sweep_tiles,
@@ -58,7 +59,7 @@ def diffuse_by_sweeps(
         sources.places.reshape(lines, -1),
         active.reshape(lines, -1),
         np.array(shape),
-        np.minimum(ratios, 1e30).astype(np.float32),
+        ratios.astype(np.float32),
         line_pivots(shape, ratios),
     )
     return vectors
