@@ -182,6 +182,13 @@ def test_progress_estimates_and_stops(tmp_path, files):
     assert len(lines(tmp_path / "out")) == 2
 
 
+def test_links_that_lead_nowhere_are_told(tmp_path, files):
+    folder = files("a.ply", "b.ply")
+    (folder / "lost.ply").symlink_to(tmp_path / "not there.ply")
+    for inputs in (folder, str(folder / "*.ply")):
+        assert [each.name for each in expand([inputs], tmp_path / "out")] == ["a", "b", "lost"]
+
+
 def test_names_follow_files(tmp_path, files):
     folder = files("a.ply", "parts/a.ply", "parts/b.stl", "parts/b.obj", "parts/deep/c.v2.off", "notes.txt")
     out = folder / "out"

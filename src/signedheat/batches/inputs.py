@@ -70,17 +70,22 @@ def _files(path: Path, without: Path) -> list[tuple[Path, Path]]:
     """Files, and the folder that the names of each are relative to."""
     text = str(path)
     if path.is_dir():
-        inner = sorted(file for file in path.rglob("*") if extension(file) in READERS and file.is_file())
+        inner = sorted(file for file in path.rglob("*") if extension(file) in READERS and _is_meant_for_a_file(file))
         avoided = without.resolve()
         return [(file, path) for file in inner if not file.resolve().is_relative_to(avoided)]
     if path.exists() or not MAGIC & set(text):
         return [(path, path.parent)]  # whether it can be read is for its worker to say
     root = Path(*[part for part in _before_magic(path)])
     matches = sorted(Path(match) for match in glob.glob(text, recursive=True))
-    files = [(match, root) for match in matches if match.is_file()]
+    files = [(match, root) for match in matches if _is_meant_for_a_file(match)]
     if not files:
         raise FileFormatError("no file matches the pattern", remedy="check the pattern", path=path)
     return files
+
+
+def _is_meant_for_a_file(path: Path) -> bool:
+    """Links that lead nowhere are told as shapes that cannot be read, lest they be missed."""
+    return path.is_file() or (path.is_symlink() and not path.exists())
 
 
 def _before_magic(path: Path) -> list[str]:

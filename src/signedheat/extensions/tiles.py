@@ -19,6 +19,7 @@ from ..constraints import Constraint
 from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
 from ..domains.kinds import ShapeLike
+from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError, SignedHeatError, SourceError
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
@@ -165,10 +166,14 @@ def _in_tiles(
 
 def _key(shape: object, grid: Grid, options: tuple[object, ...]) -> str:
     """Tells runs with different arguments apart."""
-    elements = area_elements(shape)
+    if isinstance(shape, PointCloud):
+        arrays = [part for part in (shape.points, shape.normals, shape.areas) if part is not None]
+    else:
+        elements = area_elements(shape)
+        arrays = [elements.corners, elements.vectors]
     numbers = np.concatenate([grid.origin, grid.spacing, np.array(grid.shape, dtype=np.float64)])
     words = np.frombuffer(repr(options).encode(), dtype=np.uint8)
-    return fingerprint(elements.corners, elements.vectors, numbers, words).hex()
+    return fingerprint(*arrays, numbers, words).hex()
 
 
 def _computed(folder: str, run: _Run, places: list[Place]) -> Iterator[tuple[int, int]]:

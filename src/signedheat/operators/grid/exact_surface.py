@@ -120,8 +120,12 @@ class ExactSurface(Frozen):
 
         Points are ordered along a curve through space: neighbours have nearly the same way through the tree.
         """
-        parts = [self._nearest_of_many(points[begin : begin + MANY]) for begin in range(0, max(len(points), 1), MANY)]
-        return SurfacePlaces(*(np.concatenate(part) if len(part) > 1 else part[0] for part in zip(*parts, strict=True)))
+        results = _empty_places(len(points))
+        for begin in range(0, len(points), MANY):
+            here = slice(begin, begin + MANY)
+            for result, part in zip(results, self._nearest_of_many(points[here]), strict=True):
+                result[here] = part
+        return SurfacePlaces(*results)
 
     def _nearest_of_many(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
         """The attributes of `SurfacePlaces`, for points of which there is memory for some more."""
@@ -133,14 +137,7 @@ class ExactSurface(Frozen):
     def _nearest_in_order(self, points: NDArray[np.float64]) -> tuple[NDArray[Any], ...]:
         """The same for points that follow each other in space."""
         if not len(points):
-            return (
-                np.empty(0),
-                np.empty((0, 3)),
-                np.empty((0, 3)),
-                np.empty(0),
-                np.empty(0, dtype=bool),
-                np.empty(0, dtype=bool),
-            )
+            return _empty_places(0)
         found = self.tree.search(points) if len(self.features.corners) else None
         limits = np.full(len(points), np.inf) if found is None else found.distances + float(np.linalg.norm(self.steps))
         near, which = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -354,6 +351,12 @@ class ExactSurface(Frozen):
             rows, off, signs = rows[near], off[near], np.where(self._signed(found, level)[near] < 0, -1.0, 1.0)
             at[rows] -= (off * signs)[:, None] * found[2][near]
             rows = rows[np.abs(off) > CLOSE * cell]
+
+
+def _empty_places(n: int) -> tuple[NDArray[Any], ...]:
+    """Room for the attributes of `SurfacePlaces`."""
+    flags = np.empty(n, dtype=bool), np.empty(n, dtype=bool)
+    return np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n), *flags
 
 
 @compiled(nogil=True)
