@@ -35,7 +35,7 @@ FOUND = [
     # paths through edges that are a rounding shorter than none
     ("surface use", 202, 43), ("surface curves", 300, 4876),
     # curves across triangles as thin as rounding, which turn them
-    ("surface curves", 7003, 1478),
+    ("surface curves", 7003, 1478), ("surface triangulation", 7007, 684),
     # segments whose ends are one to rounding
     ("surface triangulation", 7007, 1631),
     # a part of the surface that no curve reaches, and whose sides touch one

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from ..errors import GeometryError
+from ..geometry.intrinsic.history import turned_lines
 from ..geometry.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .polygon_mesh import PolygonMesh
@@ -36,7 +37,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     Raises
     ------
     GeometryError
-        If the argument is not an intrinsic triangulation.
+        If the argument is not an intrinsic triangulation, or has triangles as thin as rounding.
 
     Examples
     --------
@@ -74,6 +75,13 @@ def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], 
     """
     triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
+    lost = turned_lines(triangles, lines, triangulation.history.before.lengths_of_edges)
+    if len(lost):
+        raise GeometryError(
+            f"edge {lost[0]} of the mesh crosses triangles as thin as rounding, which turn it",
+            remedy="merge the vertices that nearly coincide",
+            element=f"edge {lost[0]}",
+        )
     starts = locate_points(triangles, lines.faces, lines.starts)
     ends = locate_points(triangles, lines.faces, lines.ends)
     last = np.append(np.diff(lines.owners) > 0, True)

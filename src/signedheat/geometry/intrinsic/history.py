@@ -165,3 +165,11 @@ def straight_lines(
     first_half = np.flatnonzero(against[:-1] & ~against[1:] & (owners[:-1] == owners[1:]))  # they meet in the middle
     finish[first_half] = finish[first_half + 1]
     return Lines(*(np.delete(a, first_half + 1, axis=0) for a in (owners, faces, begin, finish, vectors)))
+
+
+def turned_lines(triangles: IntrinsicMesh, lines: Lines, lengths: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Lines that have become longer than they were on their way: triangles as thin as rounding have turned them."""
+    along, corners = lines.vectors[:, 0], triangles.corner_positions[lines.faces]
+    with np.errstate(all="ignore"):  # they may have overflowed
+        found, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
+    return np.unique(lines.owners[~(found <= 2 * lengths[lines.owners] + rounding)])

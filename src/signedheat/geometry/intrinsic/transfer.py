@@ -22,7 +22,7 @@ from ..surface_points import (
     unique_points,
 )
 from .conforming_refinement import FaceCutter, MergedSources, affected_elements
-from .history import History, Lines, straight_lines
+from .history import History, straight_lines, turned_lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,13 @@ def transfer_segments(
     vectors = np.stack([along, growth], axis=1)
     middle = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
     lines = straight_lines(history.gluing_after, *middle)
-    _ensure_followed(after, lines, np.abs(at_piece))
+    lost = turned_lines(after, lines, np.abs(at_piece))
+    if len(lost):
+        raise SourceError(
+            f"segment {lost[0]} of the curves crosses triangles as thin as rounding, which turn it",
+            remedy="merge the vertices that nearly coincide, or compute with intrinsic=False",
+            element=f"segment {lost[0]}",
+        )
     owners, faces, carried = lines.owners, lines.faces, lines.vectors
     starts, ends = locate_points(after, faces, lines.starts), locate_points(after, faces, lines.ends)
     located = concatenated([nodes, ends, starts])
@@ -165,21 +171,6 @@ def transfer_segments(
         np.where(on_edge, after.in_edge_frames(grown, faces, side), grown),
         source.oriented,
     )
-
-
-def _ensure_followed(triangles: IntrinsicMesh, lines: Lines, lengths: NDArray[np.float64]) -> None:
-    """Refuse lines that have become longer on their way, since edges as short as rounding have turned them."""
-    along, corners = lines.vectors[:, 0], triangles.corner_positions[lines.faces]
-    with np.errstate(all="ignore"):  # they may have overflowed
-        found, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
-    lost = np.flatnonzero(~(found <= 2 * lengths[lines.owners] + rounding))
-    if len(lost):
-        raise SourceError(
-            f"segment {lines.owners[lost[0]]} of the curves crosses triangles as thin as rounding, beyond which its "
-            "direction is lost",
-            remedy="merge the vertices that nearly coincide, or compute with intrinsic=False",
-            element=f"segment {lines.owners[lost[0]]}",
-        )
 
 
 def _joined(

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .gluing_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, apex_position, diamond, following, kernel
+from .gluing_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, Gluing, apex_position, diamond, following, kernel
 
 BEFORE = np.full((4, 3, 3), -1)
 """By kind of step, face and corner: which of the four points is that corner before the step; `AFTER`, after it."""
@@ -22,6 +22,8 @@ BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2,
 
 OUTWARD = 1e-6
 """Sine of the angle up to which a line that leaves the surface is one along its boundary, but for rounding."""
+ROUNDING = 1e-10
+"""Of squared lengths, in parts of the size of their terms."""
 
 
 @kernel
@@ -217,14 +219,27 @@ def shift(x, c, lead, gone, amount):
 
 
 @kernel
+def squared_length(g: Gluing, f: int, v: NDArray[np.float64]) -> tuple[float, float]:
+    """Of a vector in a face, and the sum of the sizes of its terms."""
+    square, size = 0.0, 0.0
+    for k in range(3):
+        term = v[k] * v[(k + 1) % 3] * g.length[g.edge[3 * f + k]] ** 2
+        square -= term
+        size += abs(term)
+    return square, size
+
+
+@kernel
 def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
     """Trace a geodesic from a point along its first vector, or against it, over its length; other vectors are carried.
 
     Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
-    it, and the vectors there. Returns the next row.
+    it, and the vectors there. Returns the next row. A line ends where faces as thin as rounding have made it longer.
     """
     f, left, slides = face, 1.0, 0
     w, v = barycentric.copy(), vectors.copy()
+    square, rounding = squared_length(g, f, v[0])
+    longest = 4.0 * (abs(square) + ROUNDING * rounding)
     sign = 1.0 if forward else -1.0
     for _ in range(1000000):
         step, leaving = left, -1
@@ -249,7 +264,8 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
                 out_ends[n, k] = w[k]
         n += 1
         left -= step
-        if leaving < 0 or left < 1e-12:
+        square, rounding = squared_length(g, f, v[0])
+        if leaving < 0 or left < 1e-12 or not square <= longest + ROUNDING * rounding:
             break
         h = 3 * f + (leaving + 1) % 3
         t = g.sibling[h]
