@@ -46,3 +46,16 @@ def test_the_finer_solution_is_used():
     assert len(phi.contour(0.3)) == 1
     shifted = sh.VertexField(mesh, phi.values + 1.0, finer=phi.finer)
     assert shifted.finest is shifted
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.05, 0.1])
+@pytest.mark.parametrize("seed", [2, 3])
+def test_gaps_of_curves_far_smaller_than_the_triangles_are_closed(radius, seed):
+    """Of 28 points on a circle, in uneven steps, pieces of five are left: completed beside the circle."""
+    mesh, center = box(), np.array([3.4, 1.9, 1.0])
+    angle = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, 28))
+    ring = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + center
+    found = sh.close_curves(mesh, [mesh.polyline(ring[7 * k : 7 * k + 5]) for k in range(4)])
+    assert len(found) == 1 and found[0].closed
+    places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
+    assert np.abs(np.linalg.norm(places - center, axis=1) / radius - 1).max() < 0.6

@@ -12,6 +12,7 @@ from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, SourceError
 from ..fields.vertex_field import VertexField
+from ..lowering.surface.intrinsic import RetriangulatedForZeroSet
 from ..progress import Progress
 from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .curve_pieces import distance_to_pieces
@@ -39,7 +40,8 @@ def close_curves(
     curves : Curve or a sequence of them
         Oriented curves, open or closed, noisy, overlapping, crossing.
     diffusion : float
-        τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18).
+        τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18). On triangle meshes h is at most half
+        the length of the pieces, unless the triangles made along them are larger.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
         Imposed on φ at the curves; with `ZeroSet`, the default, the result passes through them. With `EachComponent`
         and `LevelValues` curves are taken as given.
@@ -101,10 +103,20 @@ def conforming_distance(
     surface = cast("SurfaceDomain", converted(domain))
     if isinstance(surface, TriangleMesh):
         try:
-            return measured(SignedHeatSolver(surface, diffusion, progress, intrinsic=True))
+            return measured(for_zero_set(surface, diffusion, progress))
         except GeometryError:
             pass
     return measured(SignedHeatSolver(surface, diffusion, progress))
+
+
+def for_zero_set(
+    mesh: TriangleMesh, diffusion: float, progress: Progress | None = None
+) -> SignedHeatSolver[TriangleMesh]:
+    """A solver with ``intrinsic=True``, and with diffusion times that suit the pieces, however small they are."""
+    solver = SignedHeatSolver(mesh, diffusion, progress, intrinsic=True)
+    report = None if progress is None else lambda share, _: progress((1 + share) / 5, "refine")
+    solver.__dict__["discretization"] = RetriangulatedForZeroSet(mesh, report)
+    return solver
 
 
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:
