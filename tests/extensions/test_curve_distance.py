@@ -66,6 +66,21 @@ def test_loops_inside_single_faces(as_oriented):
     assert np.abs(phi.values + to_polygon(mesh.vertices, corners, True)).max() < 2e-5
 
 
+@pytest.mark.parametrize("radius", [0.05, 0.3])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_pieces_of_curves_smaller_than_the_triangles_are_completed(radius, seed):
+    """Five of every seven points on a circle, in uneven steps, on a cube of twelve triangles: as the whole, all but."""
+    corners = np.array([[x, y, z] for x in (-2, 2) for y in (-2, 2) for z in (-2, 2)])
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    cube = sh.TriangleMesh(corners, [face for a, b, c, d in quads for face in ([a, b, c], [a, c, d])])
+    angle = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, 28))
+    ring = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + [0.4, -0.1, 2]
+    whole = sh.curve_distance(cube, cube.polyline(ring, closed=True)).values
+    pieces = sh.curve_distance(cube, [cube.polyline(ring[7 * k : 7 * k + 5]) for k in range(4)]).values
+    assert (whole < 0).all()
+    assert np.abs(pieces - whole).max() < 6 * radius
+
+
 def test_loops_smaller_than_triangles_are_told():
     """The method hardly sees them; whoever measures to them, or to triangles made for them, needs no word."""
     mesh = disk(20)

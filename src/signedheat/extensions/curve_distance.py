@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from itertools import chain
+from typing import Any, Literal
 
 from ..constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..domains.curves import CurvesAndPoints
 from ..domains.kinds import AnySurface
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import CancellingNormalsError, ConstraintError
+from ..errors import CancellingNormalsError, ConstraintError, GeometryError
 from ..fields.vertex_field import VertexField
 from ..progress import Progress
 from ..solver import SignedHeatSolver, distance_unwarned
-from .curve_pieces import distance_to_pieces
+from .close_curves import for_zero_set
+from .curve_pieces import distance_to_pieces, flattened, surface_of
 from .sharpening import sharpen
+
+SHORT = 16.0
+"""Length of all curves together, in h, below which triangles are made for them."""
 
 
 def curve_distance(
@@ -84,17 +89,29 @@ def curve_distance(
         )
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
     solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
+    mesh = solver.domain if intrinsic == "auto" and isinstance(solver.domain, TriangleMesh) else None
 
-    def measured(solver: SignedHeatSolver[AnySurface]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
+    def measured(by: SignedHeatSolver[Any]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
         if as_oriented:
-            return distance_unwarned(solver, curves, constraint), curves
-        return distance_to_pieces(solver, curves, constraint, every_piece)
+            return distance_unwarned(by, curves, constraint), curves
+        return distance_to_pieces(by, curves, constraint, every_piece)
 
     try:
+        small = mesh is not None and are_small(solver, curves)
+        field, taken = measured(for_zero_set(mesh, diffusion, share) if mesh is not None and small else solver)
+    except GeometryError:  # too thin to be triangulated anew
         field, taken = measured(solver)
-    except CancellingNormalsError:
-        if intrinsic != "auto" or not isinstance(solver.domain, TriangleMesh):
+    except CancellingNormalsError:  # loops inside single faces
+        if mesh is None:
             raise
-        field, taken = measured(replace(solver, intrinsic=True))  # loops inside single faces
+        field, taken = measured(replace(solver, intrinsic=True))
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
     return sharpen(field, taken, progress=rest)
+
+
+def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
+    """Whether all oriented curves together are so short that triangles do not resolve how they go on between pieces."""
+    surface = surface_of(solver)
+    parts = chain.from_iterable(surface.segments(flattened(curves)))
+    lengths = [float(part.lengths.sum()) for part in parts if part.oriented]
+    return bool(lengths) and sum(lengths) < SHORT * surface.spacing
