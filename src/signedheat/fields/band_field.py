@@ -14,7 +14,7 @@ from ..diagnostics import Diagnostics
 from ..domains.display import Displayed, to_pyvista
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import refuse_extreme
+from ..domains.validation import finite_number, refuse_extreme
 from ..errors import GeometryError, OutsideError
 from ..geometry.edge_flips import flipped_along_creases
 from ..operators.grid.block_contours import block_contour
@@ -211,6 +211,7 @@ class BandField(Displayed, Combinable):
         OutsideError
             If the level is not within the band, or φ does not take it.
         """
+        level = finite_number(level, "level")
         self._refuse_beyond(level)
         vertices, faces = block_contour(self.blocks, self.values, self.grid.spacing, level, self._refined(level))
         return TriangleMesh(vertices, faces if self.surface is None else flipped_along_creases(vertices, faces))
@@ -248,6 +249,7 @@ class BandField(Displayed, Combinable):
         >>> 2 * vertices - faces  # closed, without handles
         4
         """
+        level = finite_number(level, "level")
         self._refuse_beyond(level)
         refined = self._refined(level)
         return save_parts(contour_parts(self.blocks, self.values, self.grid.spacing, level, refined), path)
@@ -270,7 +272,7 @@ class BandField(Displayed, Combinable):
         OutsideError
             If φ does not take the value in the band, or the offset leaves the grid although the shape does not.
         """
-        self.coarse.refuse_beyond_walls(distance)
+        self.coarse.refuse_beyond_walls(finite_number(distance, "distance"))
         return self.contour(distance)
 
     def dense(self) -> GridField:

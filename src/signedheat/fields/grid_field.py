@@ -16,7 +16,7 @@ from ..domains.display import Displayed, to_pyvista
 from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import contiguous
+from ..domains.validation import contiguous, finite_number
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.edge_flips import flipped_along_creases
@@ -204,7 +204,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         GeometryError
             If the grid has neither 2 nor 3 dimensions, or values are infinite.
         """
-        grid = self.grid
+        grid, level = self.grid, finite_number(level, "level")
         if grid.dimension == 2:
             lines = level_lines(self.values, grid.origin, grid.spacing, level)
             return [Polyline(points, closed) for points, closed in lines]
@@ -238,7 +238,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             If φ does not take the value on the grid, or the offset leaves the grid although the shape itself does not:
             the grid then needs more padding.
         """
-        self.refuse_beyond_walls(distance)
+        self.refuse_beyond_walls(finite_number(distance, "distance"))
         return self.contour(distance)
 
     def refuse_beyond_walls(self, distance: float) -> None:

@@ -15,7 +15,7 @@ from ..discretization import SourceTerm
 from ..domains.display import Displayed, to_pyvista
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import contiguous
+from ..domains.validation import contiguous, finite_number
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.box_tree import BoxTree
@@ -154,6 +154,7 @@ class TetField(Displayed, Combinable, Frozen):
         OutsideError
             If φ does not take the level anywhere in the mesh.
         """
+        level = finite_number(level, "level")
         return TriangleMesh(*closed_level_set(self.mesh, self.values, self._vertex_gradients, level))
 
     def offset(self, distance: float) -> TriangleMesh:
@@ -174,6 +175,7 @@ class TetField(Displayed, Combinable, Frozen):
         OutsideError
             If φ does not take the value in the mesh, or the offset leaves the mesh although the shape itself does not.
         """
+        distance = finite_number(distance, "distance")
         walls = self.values[np.unique(self.mesh.boundary.faces)]
         low, high = np.nanmin(walls), np.nanmax(walls)
         bounded = low > 0 or high < 0
