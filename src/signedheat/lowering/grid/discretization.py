@@ -58,7 +58,8 @@ def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> 
     """
     if len(spacing) != 3:
         return 0.0
-    return min(round(BYTES_PER_AREA * area / float(np.prod(spacing)) ** (2 / 3), 1), MOST_PER_NODE * n_nodes)
+    cells = float(area / float(np.prod(spacing)) ** (2 / 3))
+    return min(round(BYTES_PER_AREA * cells, 1), MOST_PER_NODE * n_nodes)
 
 
 def refuse_beyond_memory(grid: Grid, per_node: float | None = None, beside: float = 0.0, area: float = 0.0) -> None:
