@@ -36,6 +36,10 @@ FOUND = [
     ("surface use", 202, 43), ("surface curves", 300, 4876),
     # curves across triangles as thin as rounding, which turn them
     ("surface curves", 7003, 1478), ("surface triangulation", 7007, 684),
+    # geodesics past edges so short that windows on them are lost
+    ("surface curves", 7009, 1312),
+    # an image in space whose origin is one of the plane
+    ("files labels", 7008, 2630),
     # segments whose ends are one to rounding
     ("surface triangulation", 7007, 1631),
     # a part of the surface that no curve reaches, and whose sides touch one

@@ -158,6 +158,13 @@ def test_damaged_and_skewed_images_are_refused(tmp_path, labels):
         with pytest.raises(sh.SignedHeatError) as caught:
             sh.read_labels(tmp_path / name)
         assert caught.value.path == str(tmp_path / name)
+    whole = (tmp_path / "skewed.nrrd").read_bytes()
+    begin = whole.index(b"space origin: (")
+    end = whole.index(b"\n", begin)
+    (tmp_path / "origin.nrrd").write_bytes(whole[:begin] + b"space origin: (1,2)" + whole[end:])
+    with pytest.raises(sh.FileFormatError) as caught:
+        sh.read_labels(tmp_path / "origin.nrrd")
+    assert "origin" in str(caught.value)
     with pytest.raises(sh.FileFormatError):
         sh.read_labels(tmp_path / "labels.stl")
 

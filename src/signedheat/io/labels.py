@@ -225,6 +225,8 @@ def read_labels(path: PathLike) -> LabelImage:
         labels, axes, origin, space = _read(path)
         if labels.ndim != 3 or labels.dtype.kind not in "biuf":
             raise FileFormatError(f"the image has {labels.ndim} axes of {labels.dtype}, not 3 of numbers", path=path)
+        if axes.shape != (3, 3) or origin.shape != (3,):
+            raise FileFormatError("its axes or its origin are not those of space", remedy="write it again", path=path)
         lengths = np.linalg.norm(axes, axis=0)
         if not (np.isfinite(axes).all() and (lengths > 0).all() and np.isfinite(origin).all()):
             raise FileFormatError("its axes have no directions", remedy="write it again", path=path)

@@ -136,7 +136,10 @@ def _distances(
         continue_search(faces, search, slack, tolerance, min(search.counts[MADE] + _CHUNK, limit))
     if search.queue.size[0] > 0:
         return _along_edges(triangles, search.distance), limit
-    return search.distance, min(int(search.counts[MADE]), limit - 1)
+    distance, missed = search.distance, np.isinf(search.distance)
+    if missed.any():  # on other parts, or past edges so short that windows on them are lost in rounding
+        distance[missed] = _along_edges(triangles, distance)[missed]
+    return distance, min(int(search.counts[MADE]), limit - 1)
 
 
 def _along_edges(triangles: IntrinsicMesh, distance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -28,7 +28,7 @@ PRESSES, FARTHEST = 2, 0.5
 """Times that a point is moved off its edge, and how many cells at most."""
 CLEARANCE = 1e-3
 """Fraction of a cell that points of a level keep from the nodes."""
-MANY = 1 << 20
+MANY = 1 << 18
 """Points that are ordered together."""
 APART = 2.0
 """Cells between corners of the faces nearest to the nodes of an edge from which on more than these are asked."""
