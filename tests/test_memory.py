@@ -60,7 +60,10 @@ def test_the_spacing_that_is_proposed_fits(shape):
 
 
 def test_libraries_that_others_have_imported_and_nobody_used():
-    """Of Numba, what its import leaves to be taken; the first process fills the cache."""
+    """Of Numba, what its import leaves to be taken; the first process fills the cache.
+
+    How much of a library's file is resident after its import differs between machines by some 20 MB.
+    """
     code = """
 import sys, numpy as np, signedheat as sh, memory
 from signedheat.memory import libraries
@@ -69,14 +72,14 @@ if sys.argv[1] == "imported":
 plate = sh.TriangleMesh(np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0.02], [0, 2, 0.02]]), [[0, 1, 2], [0, 2, 3]])
 before, told = memory.resident("VmRSS"), libraries()
 sh.signed_distance(plate, sh.Grid((-1, -1, -1), 0.2, (21, 21, 11)))
-print(told / (memory.resident("VmHWM") - before))
+print((told - (memory.resident("VmHWM") - before)) / 1e6)
 """
-    ratios = []
+    excess = []
     for how in ("not", "not", "imported"):
         command = [sys.executable, "-c", code, how]
         made = subprocess.run(command, capture_output=True, text=True, check=True, cwd=BENCHMARK.parent)
-        ratios.append(float(made.stdout))
-    assert all(0.75 < ratio < 1.3 for ratio in ratios[1:]), ratios
+        excess.append(float(made.stdout))
+    assert all(abs(megabytes) < 35 for megabytes in excess[1:]), excess
 
 
 def test_how_much_surface_there_is_counts(monkeypatch):
