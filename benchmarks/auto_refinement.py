@@ -1,4 +1,6 @@
-"""What the default, ``intrinsic="auto"``, gains and costs on meshes of large angles and needles, as CAD programs make.
+"""What the default, ``intrinsic="auto"``, gains and costs on meshes of large angles and needles.
+
+There is one table for meshes as CAD programs make, whose triangles are few, and one for decimated organic meshes.
 
 For each limit on the largest triangles (the default's first) and for the triangles as they are: error beside that of
 ``intrinsic=True``, which makes triangles for every curve; vertices; seconds of all threads for the first distance and a
@@ -13,6 +15,7 @@ import warnings
 from collections.abc import Callable, Iterator
 
 import numpy as np
+import pyvista
 import trimesh
 
 import signedheat as sh
@@ -22,11 +25,16 @@ from signedheat.samples import torus
 LIMITS = (intrinsic.COARSEST, 1.25, 2.0, np.inf)
 
 
-def table() -> None:
+def tables() -> None:
     warnings.simplefilter("ignore", sh.InexactWarning)
+    table(meshes())
+    table(decimated())
+
+
+def table(listed_meshes: Iterator[tuple[str, sh.TriangleMesh]]) -> None:
     rows: dict[str, list[tuple[float, ...]]] = {}
     default = intrinsic.COARSEST
-    for name, mesh in meshes():
+    for name, mesh in listed_meshes:
         if not intrinsic.is_spoiled(mesh):
             continue
         cases = [case(mesh, seed) for seed in (10, 11)]
@@ -73,6 +81,26 @@ def meshes() -> Iterator[tuple[str, sh.TriangleMesh]]:
         yield f"{name}/16", of(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).subdivide().subdivide())
     for around, across in ((120, 12), (240, 12), (20, 40)):
         yield f"torus {around}×{across}", torus(n_around=around, n_across=across)
+
+
+def decimated() -> Iterator[tuple[str, sh.TriangleMesh]]:
+    """Organic meshes by quadric decimation, and with each face in 16."""
+    for seed, faces in enumerate((1500, 1500, 4000, 4000, 12000)):
+        mesh = blobs(seed)
+        polygons = pyvista.make_tri_mesh(mesh.vertices, mesh.faces)
+        fewer = polygons.decimate(1 - faces / mesh.n_faces)
+        for suffix, some in {"": fewer, "/16": fewer.subdivide(2, "linear")}.items():
+            yield f"blobs {faces}{suffix}", sh.TriangleMesh(some.points.astype(float), some.regular_faces)
+
+
+def blobs(seed: int) -> sh.TriangleMesh:
+    """The largest part of a level set of a sum of bumps, smooth as scanned bodies are."""
+    centers = np.random.default_rng(seed).uniform(-0.6, 0.6, (12, 3))
+    grid = sh.Grid((-1.5, -1.5, -1.5), 0.03, (101, 101, 101))
+    heights = sum(np.exp(-(((grid.points - c) / 0.3) ** 2).sum(axis=-1)) for c in centers)
+    level = sh.GridField(grid, 0.6 - heights).contour()
+    parts = trimesh.Trimesh(level.vertices, level.faces, process=False).split(only_watertight=True)
+    return of(max(parts, key=lambda part: len(part.faces)))
 
 
 def of(mesh: trimesh.Trimesh) -> sh.TriangleMesh:

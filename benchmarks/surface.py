@@ -39,7 +39,7 @@ def main() -> None:
     parser.add_argument("--worker", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.triangles:
-        auto_refinement.table()
+        auto_refinement.tables()
         return
     if arguments.worker:
         program, file = arguments.worker
