@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import time
+from contextlib import suppress
 
-from fuzz.frame import LIMIT, Outcome, families, run, run_case
+from fuzz.frame import LIMIT, Outcome, Tally, families, run, run_case
 
 
 def main() -> int:
@@ -17,7 +19,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=10_000, help="of each family (10,000)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--limit", type=float, default=LIMIT, help="seconds for a case (30)")
+    parser.add_argument("--limit", type=float, default=LIMIT, help="processor seconds for a case (30)")
     parser.add_argument("--replay", metavar="SEED:NUMBER", help="run one case here, and show what it does")
     parser.add_argument("--list", action="store_true", help="name the families")
     arguments = parser.parse_args()
@@ -32,13 +34,18 @@ def main() -> int:
         outcomes = [run_case(known[name], int(seed), int(number)) for name in names]
         print(*outcomes, sep="\n")
         return int(any(outcome.failed for outcome in outcomes))
-    begin = time.monotonic()
+    begin, tally = time.monotonic(), Tally()
 
     def tell(outcome: Outcome) -> None:
+        tally.add(outcome)
         if outcome.failed:
             print(outcome, flush=True)
 
-    tally = run(names, arguments.cases, arguments.seed, arguments.workers, arguments.limit, tell)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if hasattr(signal, "SIGUSR1"):
+        signal.signal(signal.SIGUSR1, lambda *_: print(tally, flush=True))
+    with suppress(KeyboardInterrupt):
+        run(names, arguments.cases, arguments.seed, arguments.workers, arguments.limit, tell)
     print(tally)
     print(f"{time.monotonic() - begin:.0f} s")
     return int(bool(tally.failures))

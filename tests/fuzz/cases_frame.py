@@ -35,6 +35,11 @@ def _hang(_: float) -> str:
     return "late"
 
 
+def _compute(_: float) -> str:
+    while True:
+        pass
+
+
 def _crash(_: float) -> str:
     os.kill(os.getpid(), signal.SIGSEGV)
     return "alive"
@@ -50,5 +55,6 @@ family("frame wrong", build, _wrong)
 family("frame exception", build, lambda number: {}[str(number)])
 family("frame warning", build, _warn)
 family("frame hang", build, _hang)
+family("frame busy", build, _compute)
 family("frame crash", build, _crash)
 family("frame memory", build, _grow, memory=1 << 25)

@@ -19,7 +19,8 @@ What becomes of a case:
 * it raises a `SignedHeatError`: refused, which is right too (counted by type), provided that its cause is one line;
 * it raises `Wrong("changed input", "...")`, or any other exception, or a warning that is no `UserWarning` (NumPy's are
   not): a failure;
-* it takes longer than the limit (30 s), ends its process, or takes more memory than the family's limit: a failure.
+* it takes longer than the limit (30 s of a processor), ends its process, or takes more memory than the family's limit:
+  a failure.
 
 Everything that is random comes from the generator that `build` is given, which is made of the family's name, a seed and
 the number of the case: a failure is told with the command that runs it again, in the foreground::
@@ -29,12 +30,16 @@ the number of the case: a failure is told with the command that runs it again, i
     python -m fuzz spheres boxes --cases 500 --seed 7 --workers 2
     python -m fuzz spheres --replay 7:123           # one case, with its traceback
     python -m fuzz --list
+
+What a run has counted is told when it ends, is stopped (Ctrl-C, SIGTERM), and where there is one at SIGUSR1.
 """
 
 from __future__ import annotations
 
 import importlib
+import math
 import multiprocessing
+import os
 import pkgutil
 import resource
 import signal
@@ -56,7 +61,9 @@ import numpy as np
 from signedheat import SignedHeatError
 
 LIMIT = 30.0
-"""Seconds that a case may take."""
+"""Seconds that a case may take, of a processor; beside other work it may take longer."""
+PATIENCE = 4
+"""Times the limit that a case may take on the clock: a case that waits for ever uses no processor."""
 MEMORY = 1 << 30
 """Bytes by which a case may let its worker grow, unless the family says otherwise."""
 Job: TypeAlias = tuple[str, int, int]
@@ -212,11 +219,12 @@ class Worker:
         self.process.start()
         theirs.close()
         self.job: Job | None = None
-        self.begin, self.is_ready = time.monotonic(), False
+        self.begin, self.computed, self.is_ready = time.monotonic(), 0.0, False
 
     def give(self, job: Job) -> None:
         """Begin a case."""
-        self.job, self.begin = job, time.monotonic()
+        self.job, self.begin, self.computed = job, time.monotonic(), 0.0
+        self.computed = self._computed()
         self.pipe.send(job)
 
     def hear(self, has_spoken: bool, limit: float) -> Outcome | None:
@@ -229,9 +237,17 @@ class Worker:
                 return self._replaced("crash", seconds)
             self.is_ready, self.job = True, None
             return outcome
-        if self.job is not None and seconds > limit:
+        if self.job is not None and seconds > limit and (seconds > PATIENCE * limit or self._computed() > limit):
             return self._replaced("hang", seconds)
         return None
+
+    def _computed(self) -> float:
+        """Seconds of a processor since the case began; infinite where the system does not tell."""
+        try:
+            words = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            return math.inf
+        return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK") - self.computed
 
     def _replaced(self, kind: str, seconds: float) -> Outcome:
         if self.job is None:

@@ -13,6 +13,7 @@ EXPECTED = {
     "exception": {"KeyError"},
     "warning": {"RuntimeWarning"},
     "hang": {"hang"},
+    "busy": {"hang"},
     "crash": {"crash"},
     "memory": {"memory"},
 }
@@ -20,7 +21,7 @@ EXPECTED = {
 
 @pytest.fixture(scope="module")
 def tally():
-    return run([f"frame {name}" for name in EXPECTED], cases=2, limit=4.0)
+    return run([f"frame {name}" for name in EXPECTED], cases=2, limit=1.0)
 
 
 @pytest.mark.parametrize("name", EXPECTED)
