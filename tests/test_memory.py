@@ -31,21 +31,44 @@ def test_some_memory_is_free_but_not_more_than_there_is():
     assert 0 < available_memory() < installed
 
 
-def test_a_limit_on_address_space_counts():
+@pytest.mark.parametrize(("limit", "field"), [("RLIMIT_AS", "VmSize"), ("RLIMIT_DATA", "VmData")])
+def test_limits_of_the_process_count(limit, field):
     """In a process of its own, which lowers its limit to 1 GB more than it holds."""
     code = """
-import resource, signedheat as sh
+import resource, sys, signedheat as sh
 from signedheat.memory import available_memory, _fields
-held = 1024 * _fields("/proc/self/status")["VmSize"]
-resource.setrlimit(resource.RLIMIT_AS, (held + 10**9, resource.RLIM_INFINITY))
+held = 1024 * _fields("/proc/self/status")[sys.argv[2]]
+resource.setrlimit(getattr(resource, sys.argv[1]), (held + 10**9, resource.RLIM_INFINITY))
 assert 0.9e9 < available_memory() <= 1e9, available_memory()
 try:
     sh.SignedHeatSolver(sh.Grid((0, 0, 0), 1.0, (400, 400, 400))).discretization
 except sh.MemoryLimitError:
     print("refused")
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code, limit, field], capture_output=True, text=True, check=True)
     assert done.stdout == "refused\n"
+
+
+@pytest.mark.parametrize(
+    ("lines", "folder", "names", "cached"),
+    [
+        ("0::/jobs/17\n", "jobs", ("memory.max", "memory.current"), ""),
+        ("4:memory:/jobs/17\n0::/\n", "memory/jobs", ("memory.limit_in_bytes", "memory.usage_in_bytes"), "total_"),
+        ("0::/elsewhere/17\n", "", ("memory.max", "memory.current"), ""),
+    ],
+)
+def test_the_limit_of_a_job_counts_whose_files_are_given_back(tmp_path, monkeypatch, lines, folder, names, cached):
+    """Of a group around the process's own, of version 2 and 1, and of what a container sees as the whole."""
+    group = tmp_path / folder
+    (group / "17").mkdir(parents=True)
+    (tmp_path / "own").write_text(lines)
+    (group / names[0]).write_text("5000\n")
+    (group / names[1]).write_text("4000\n")
+    (group / "17" / names[0]).write_text("max\n")
+    (group / "memory.stat").write_text(f"anon 900\n{cached}inactive_file 2000\n{cached}active_file 1000\n")
+    monkeypatch.setattr(memory, "GROUPS", tmp_path / "own")
+    monkeypatch.setattr(memory, "ROOT", tmp_path)
+    assert available_memory() == 5000 - 4000 + 3000
 
 
 @pytest.mark.parametrize("shape", [(10_000, 10_000, 10_000), (20_000, 300, 70_000)])

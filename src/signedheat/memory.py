@@ -14,11 +14,12 @@ from numpy.typing import DTypeLike, NDArray
 
 from .errors import MemoryLimitError
 
-LIMITS = (
-    ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-    ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
-)
-"""Files with the memory limit of a container and its present use, for version 2 and version 1 of cgroups."""
+GROUPS = Path("/proc/self/cgroup")
+"""Where the system tells to which groups this process belongs, a line ``id:controllers:path`` for each."""
+ROOT = Path("/sys/fs/cgroup")
+"""Where the groups of version 2 are, and below ``memory`` those of version 1."""
+FILES = {"": ("memory.max", "memory.current"), "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes")}
+"""Files with the limit of a group and its present use, by the controllers that its line names: version 2 and 1."""
 
 
 UNLOADED, IMPORTED, LOADED = 130_000_000, 65_000_000, 20_000_000
@@ -99,10 +100,10 @@ def fitting_count(count: int, estimate: Callable[[int], float], available: float
 def available_memory() -> int | None:
     """Bytes that this process can still allocate; None if the system does not tell.
 
-    The least of what is free in the machine, what its container leaves (cgroups), and what its own limit on address
-    space leaves (``ulimit -v``).
+    The least of what is free in the machine, what the container or job leaves (cgroups, those around them too), and
+    what the process's own limits leave on address space (``ulimit -v``) and data (``ulimit -d``).
     """
-    known = [bound for bound in (_free(), *_container(), _address_space()) if bound is not None]
+    known = [bound for bound in (_free(), *_containers(), *_own_limits()) if bound is not None]
     return max(min(known), 0) if known else None
 
 
@@ -112,33 +113,48 @@ def _free() -> int | None:
     return None if kilobytes is None else 1024 * kilobytes
 
 
-def _container() -> list[int]:
+def _containers() -> list[int]:
+    """What each group around this process leaves, the machine's whole included: some see only their own there."""
+    lines = [line.split(":", 2) for line in _text(GROUPS).splitlines() if line.count(":") > 1]
+    own = {controllers: path for _, controllers, path in lines}
     left = []
-    for limit, used in LIMITS:
-        try:
-            words = Path(limit).read_text().strip(), Path(used).read_text().strip()
-        except OSError:
-            continue
-        if words[0].isdigit() and words[1].isdigit():
-            left.append(int(words[0]) - int(words[1]))
+    for controllers, names in FILES.items():
+        root = ROOT / controllers
+        group = root / own.get(controllers, "/").lstrip("/")
+        for place in (group, *(parent for parent in group.parents if parent.is_relative_to(root))):
+            limit, used = (_text(place / name).strip() for name in names)
+            if limit.isdigit() and used.isdigit():
+                left.append(int(limit) - int(used) + _cached(place))
     return left
 
 
-def _address_space() -> int | None:
+def _cached(group: Path) -> int:
+    """Bytes of files that a group holds, which the system takes back before it refuses any."""
+    words = dict(line.split(maxsplit=1) for line in _text(group / "memory.stat").splitlines() if " " in line)
+    total = "total_" if "total_inactive_file" in words else ""
+    return sum(int(words.get(f"{total}{name}", 0)) for name in ("inactive_file", "active_file"))
+
+
+def _own_limits() -> list[int]:
     if sys.platform == "win32":
-        return None
+        return []
     import resource
 
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    held = _fields("/proc/self/status").get("VmSize")
-    return None if limit == resource.RLIM_INFINITY or held is None else limit - 1024 * held
+    held = _fields("/proc/self/status")
+    kinds = {"VmSize": resource.RLIMIT_AS, "VmData": resource.RLIMIT_DATA}
+    limits = {name: resource.getrlimit(kind)[0] for name, kind in kinds.items() if name in held}
+    return [limit - 1024 * held[name] for name, limit in limits.items() if limit != resource.RLIM_INFINITY]
+
+
+def _text(path: Path | str) -> str:
+    """The text of a file of the system; nothing where there is none."""
+    try:
+        return Path(path).read_text()
+    except OSError:
+        return ""
 
 
 def _fields(path: str) -> dict[str, int]:
     """Whole numbers by name, from lines like ``MemAvailable:  1024 kB``."""
-    try:
-        lines = Path(path).read_text().splitlines()
-    except OSError:
-        return {}
-    pairs = (line.split(":", 1) for line in lines if ":" in line)
+    pairs = (line.split(":", 1) for line in _text(path).splitlines() if ":" in line)
     return {name: int(words[0]) for name, rest in pairs if (words := rest.split()) and words[0].isdigit()}
