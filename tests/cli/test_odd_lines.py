@@ -99,6 +99,14 @@ def test_odd_numbers(folder, capsys, command):
             assert ended(folder, capsys, command, {}, f"{option}={odd}") in (1, 2), (option, odd)
 
 
+@pytest.mark.parametrize("out", ["", "/", ".", "..", "folder/", ".stl"])
+def test_names_for_several_distances_that_are_none(folder, capsys, monkeypatch, out):
+    monkeypatch.chdir(folder)
+    before = sorted(folder.iterdir())
+    assert ended(folder, capsys, "offset", {"out": ""}, "--output", out, "--", "0.1", "0.2") in (1, 2)
+    assert sorted(folder.iterdir()) == before
+
+
 @pytest.mark.parametrize("odd", ["", "fish", "--", "bash zsh", "٣", "\0", "bash\n"])
 def test_odd_shells(folder, capsys, odd):
     assert ended(folder, capsys, "completion", {}, odd) == 2

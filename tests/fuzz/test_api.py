@@ -1,4 +1,4 @@
-"""A short run of the fuzzer on shapes, sources, constraints and arguments, here; `make fuzz` is the long one."""
+"""A short run of the fuzzer on shapes, sources, constraints, arguments and commands; `make fuzz` is the long one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 from fuzz.frame import families, run_case
 
-FAMILIES = sorted(name for name in families() if name.startswith(("surface ", "space ", "arguments")))
+FAMILIES = sorted(name for name in families() if name.startswith(("surface ", "space ", "arguments", "commands")))
 CASES = 12
 
 
@@ -18,4 +18,4 @@ def test_a_short_run(name):
 
 
 def test_every_domain_and_extension_has_a_family():
-    assert len(FAMILIES) == 12
+    assert len(FAMILIES) == 13

@@ -30,6 +30,8 @@ FOUND = [
     ("space tets", 207, 222),
     # levels far from zero, interpolated
     ("surface use", 7007, 2403), ("surface use", 300, 927), ("surface use", 300, 1913),
+    # thin faces that were refined for forty seconds
+    ("surface use", 7001, 1022),
     # points that nearly coincide, each at a level of its own
     ("surface use", 412, 1359),
     # paths through edges that are a rounding shorter than none

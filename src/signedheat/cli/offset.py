@@ -79,7 +79,7 @@ def counts(what: Any) -> dict[str, Any]:
 
 def output_names(output: str, distances: list[float]) -> list[str]:
     """The given name for one distance; a name with the distance in it for each of several."""
-    if len(distances) == 1:
-        return [output]
     path = Path(output)
+    if len(distances) == 1 or not path.name:  # a name that is none is refused as it is
+        return [output]
     return [str(path.with_name(f"{path.stem}_{distance:+g}{path.suffix}")) for distance in distances]

@@ -238,6 +238,12 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
             f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape",
             remedy="move or enlarge it",
         )
+    if not nodes.sums.any() and joined[1].any():
+        raise SourceError(
+            f"the shape is lost in the cells of the grid, whose spacing {grid.spacing.tolist()} is so much larger",
+            element="source",
+            remedy="choose a smaller spacing, or scale the shape",
+        )
     left = float(np.linalg.norm(joined[1], axis=1).sum() / joined[2].sum())
     if left < ROUNDING:
         raise CancellingNormalsError(

@@ -28,6 +28,14 @@ def test_sphere_plain_and_sharpened():
     assert relative_error(sh.sharpen(plain).values, exact) <= 0.0002
 
 
+@pytest.mark.parametrize("distance", [sh.signed_distance, sh.solid_distance])
+def test_points_that_are_lost_in_one_cell_are_refused(distance):
+    """Their area, 1e−59 of that of a cell, is no number in single precision."""
+    points = sphere(100).vertices
+    with refused(sh.SourceError, "source"):
+        distance(sh.PointCloud(1e-30 * points, points), sh.Grid((-1, -1, -1), 0.3, (8, 8, 8)))
+
+
 @pytest.mark.parametrize("n", [12, 24, 32, 33, 47])
 def test_few_nodes(n):
     grid = box(n)

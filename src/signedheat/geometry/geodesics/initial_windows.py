@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from ...memory import refuse_beyond_memory
 from ..intrinsic_mesh import IntrinsicMesh
 from .heap_kernels import Queue, push
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun, put
@@ -74,12 +75,20 @@ class Search(NamedTuple):
         return cls(np.full(n, np.inf), pseudosources, Queue.empty(3 * n_faces + n), *lists, windows, following, counts)
 
     def larger(self) -> Search:
-        """The same with at least the room that was wanted."""
-        more = max(len(self.windows), int(self.counts[WANTED]))
-        windows = np.concatenate([self.windows, np.empty((more, 6))])
-        return self._replace(
-            windows=windows, following=np.concatenate([self.following, np.empty(more, dtype=np.int64)])
-        )
+        """The same with at least the room that was wanted, in place: a copy would need twice the memory."""
+        room = len(self.windows) + max(len(self.windows) // 2, int(self.counts[WANTED]))
+        refuse_beyond_memory("exact distance along the surface", room - len(self.windows), _bytes_of_windows, _remedy)
+        for array in (self.windows, self.following):
+            array.resize((room, *array.shape[1:]), refcheck=False)
+        return self
+
+
+def _bytes_of_windows(number: int) -> float:
+    return 56.0 * number
+
+
+def _remedy(_: int) -> str:
+    return "use a coarser mesh, and merge faces that lie on each other"
 
 
 USED, FREE, MADE, WANTED = range(4)
