@@ -16,6 +16,7 @@ from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points, off
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
 from .band_completion import NONE, completed_function, needed_blocks
 from .band_plan import FAR, NEAR, BandPlan
+from .band_specks import without_specks
 from .shape_sharpening import stands_in
 
 TOGETHER = 512
@@ -52,12 +53,14 @@ class Tile:
 class _Sides:
     """Blocks with distances to faces, functions that are negative inside, confidence in the nearest face, and its ends.
 
-    `at_ends` tells whether the nearest place is on an edge or vertex beyond which the surface does not go on.
+    `told` tells whether the side is that of faces, `at_ends` whether the nearest place is on an edge or vertex beyond
+    which the surface does not go on.
     """
 
     blocks: Blocks
     distances: NDArray[np.float64]
     function: NDArray[np.float64]
+    told: NDArray[np.bool_]
     trusted: NDArray[np.float16]
     at_ends: NDArray[np.bool_]
 
@@ -69,6 +72,8 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     needed, wide = needed_blocks(plan, low, high)
     blocks = Blocks.of(needed, plan.grid.shape)
     sides = _sides(plan, blocks)
+    if wide and plan.faces is not None:
+        without_specks(blocks, sides.function, sides.told)
     own = ((blocks.places >= low) & (blocks.places < high)).all(axis=1)
     signs = np.where(sides.function[own] < 0, -1.0, 1.0)
     distances, places = sides.distances[own], blocks.places[own]
@@ -92,8 +97,8 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
     """Distances to faces, (n, 512), and signed functions: what the nearest face tells, else the coarse field."""
     n = len(blocks)
     distances, function = np.full((n, NODES), np.inf), np.empty((n, NODES))
-    doubtful, trusted = np.zeros((n, NODES), dtype=bool), np.ones((n, NODES), dtype=np.float16)
-    at_ends = np.zeros((n, NODES), dtype=bool)
+    told, doubtful, at_ends = (np.zeros((n, NODES), dtype=bool) for _ in range(3))
+    trusted = np.ones((n, NODES), dtype=np.float16)
     reached = _reached(plan, blocks)
     for begin in range(0, n, TOGETHER):
         some = slice(begin, begin + TOGETHER)
@@ -105,14 +110,15 @@ def _sides(plan: BandPlan, blocks: Blocks) -> _Sides:
             continue
         points = points.reshape(-1, NODES, 3)[here - begin].reshape(-1, 3)
         found = plan.faces.search(points)
-        signed, told, ended = _told(plan, points, found, coarse.reshape(-1, NODES)[here - begin].ravel())
+        signed, known, ended = _told(plan, points, found, coarse.reshape(-1, NODES)[here - begin].ravel())
         distances[here] = found.distances.reshape(-1, NODES)
         function[here] = signed.reshape(-1, NODES)
-        doubtful[here] = (~told & (plan.telling | plan.asked)[found.faces]).reshape(-1, NODES)
+        told[here] = known.reshape(-1, NODES)
+        doubtful[here] = (~known & (plan.telling | plan.asked)[found.faces]).reshape(-1, NODES)
         trusted[here] = plan.features.trusted[found.faces].reshape(-1, NODES)
         at_ends[here] = ended.reshape(-1, NODES)
     completed_function(plan, blocks, distances, function, doubtful)
-    return _Sides(blocks, distances, function, trusted, at_ends)
+    return _Sides(blocks, distances, function, told, trusted, at_ends)
 
 
 def _reached(plan: BandPlan, blocks: Blocks) -> NDArray[np.bool_]:
