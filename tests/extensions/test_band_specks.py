@@ -2,7 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
+import signedheat as sh
+from signedheat import samples
 from signedheat.extensions.band_specks import MOST, without_specks
 from signedheat.operators.grid.blocks import Blocks, block_points
 
@@ -66,3 +70,13 @@ def test_what_faces_tell_is_larger_or_reaches_what_is_not_known_stays(ball):
     seam = np.where(nodes_of(points, (11, 11, 15)), 0.1, function)
     assert cleared(blocks, seam)[1].any()
     assert not cleared(Blocks(blocks.places[some], SHAPE), seam[some])[1].any()
+
+
+def test_a_sphere_without_most_of_its_faces_has_a_surface_in_one_part():
+    """Winding numbers between few faces are rough: single nodes fall to the other side of their level."""
+    broken = samples.without_faces(samples.sphere(3), 0.6, seed=9)
+    grid = sh.Grid.around(broken.bounds, 56)
+    surface = sh.solid_distance(broken, grid, band=3 * float(grid.spacing[0])).contour()
+    a, b = surface.faces[:, [0, 1, 1, 2]].reshape(-1, 2).T
+    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(surface.n_vertices,) * 2)
+    assert connected_components(graph, directed=False)[0] == 1
