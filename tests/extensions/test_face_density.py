@@ -46,3 +46,22 @@ def test_what_is_whole_in_some_places_is_whole():
     plate = box((-1, -1, -0.1), (1, 1, 0.1))
     for shape in (ball, half, samples.without_patches(ball, 8, 0.4), flat, plate):
         assert density(shape) == 1.0
+
+
+def cover(thickness, hole):
+    """A ball's hollow wall without its top, whose inner side has a hole where ``x`` is above `hole`."""
+    ball = samples.sphere(4)
+    directions = ball.vertices[ball.faces].mean(axis=1)
+    below = directions[:, 2] < 0.5
+    inside = sh.TriangleMesh((1 - thickness) * ball.vertices, ball.faces[below & (directions[:, 0] < hole)][:, ::-1])
+    return samples.union(sh.TriangleMesh(ball.vertices, ball.faces[below]), inside)
+
+
+@pytest.mark.parametrize(("thickness", "hole"), [(0.015, 0.9), (0.03, 0.8)])
+def test_walls_thinner_than_cells_lack_nothing_and_enclose_nothing(thickness, hole):
+    """Winding numbers rise across them as little as if most of the faces were gone."""
+    shape = cover(thickness, hole)
+    assert density(shape) == 1.0
+    field = sh.solid_distance(shape, resolution=48)
+    deep = np.linalg.norm(field.grid.points, axis=-1) < 0.85
+    assert (field.values[deep] < 0).mean() < 0.002

@@ -21,6 +21,11 @@ SPARSE, WHOLE = 0.5, 0.8
 """Shares up to which winding numbers are divided by them, and from which on by 1: thin walls look like that, too."""
 THIN = 0.65
 """What winding numbers rise by at the least of `REACHES` across whole walls that are gone at the most of them."""
+OPPOSED = (0.12, 0.25)
+"""Shares of the area with as much that faces the other way beside it, up to which densities are believed, and from
+which on they are not: across walls thinner than cells winding numbers rise as little as where faces are missing."""
+BLOCK = 2.0
+"""Cells along the blocks that are searched for it."""
 LEAST = 0.05
 """Share that is not told from nothing."""
 ONE_SIDED = 0.6
@@ -66,8 +71,32 @@ def face_density(winding: NDArray[np.float64], positions: NDArray[np.float64], v
     close, far = (_quantile(rises[k], areas, 0.5) for k in (0, -1))
     thick = min(max(far / close, 0.0), 1.0) if close > 0 else 0.0
     share = _quantile(rise, areas, 0.5) / (THIN + (1.0 - THIN) * thick)
-    ramp = min(max((share - SPARSE) / (WHOLE - SPARSE), 0.0), 1.0)
-    return min(max(share + (1.0 - share) * ramp, LEAST), 1.0)
+    disbelief = max(_ramp(share, SPARSE, WHOLE), _ramp(opposed_share(positions, vectors), *OPPOSED))
+    return min(max(share + (1.0 - share) * disbelief, LEAST), 1.0)
+
+
+def opposed_share(positions: NDArray[np.float64], vectors: NDArray[np.float64]) -> float:
+    """Share of the area with as much that faces the other way in the same block of cells, along its main normal.
+
+    Examples
+    --------
+    >>> places = np.array([[0.2, 0.5, 0.5], [0.9, 0.5, 0.5], [4.5, 0.5, 0.5]])
+    >>> round(opposed_share(places, np.array([[-1.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0]])), 3)
+    0.667
+    """
+    block = np.unique(np.floor(positions / BLOCK).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
+    areas = np.linalg.norm(vectors, axis=1)
+    moments = np.zeros((int(block.max()) + 1, 3, 3))
+    np.add.at(moments, block, vectors[:, :, None] * vectors[:, None, :] / np.where(areas > 0, areas, 1)[:, None, None])
+    main = np.linalg.eigh(moments)[1][:, :, -1]
+    along = np.einsum("ij,ij->i", vectors, main[block])
+    sides = [np.bincount(block, np.maximum(side * along, 0.0)) for side in (1, -1)]
+    return float(2 * np.minimum(*sides).sum() / areas.sum())
+
+
+def _ramp(value: float, low: float, high: float) -> float:
+    """From 0 at `low` to 1 at `high`."""
+    return min(max((value - low) / (high - low), 0.0), 1.0)
 
 
 def _quantile(values: NDArray[np.float64], areas: NDArray[np.float64], share: float) -> float:
