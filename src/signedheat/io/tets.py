@@ -1,4 +1,4 @@
-"""Reading and writing of tet meshes, and of fields on them; meshio reads Medit, Gmsh and legacy VTK, and writes.
+"""Reading and writing of tet meshes, and of fields on them; meshio reads Medit and legacy VTK, and writes.
 
 What meshio reads is parsed within a limit of time: on some damaged files it does not end by itself.
 """
@@ -20,6 +20,7 @@ from ..errors import FileFormatError, GeometryError
 from ..fields.tet_field import TetField
 from ..packages import require
 from .files import PathLike, contents, extension, parsed_by_others, reading, replacing, unknown_extension
+from .gmsh import read_gmsh
 from .tetgen_files import read_tetgen, write_tetgen
 from .vtu import read_vtu
 
@@ -33,6 +34,8 @@ MODULES = {
     ".vtu": "vtu",
 }
 """meshio's module for each extension."""
+READERS = {".vtu": read_vtu, ".msh": read_gmsh}
+"""What is read without meshio."""
 TETGEN = frozenset({".ele", ".node"})
 """Extensions of the files of TetGen, which are read and written as a pair."""
 TET_FORMATS = frozenset(MODULES) | TETGEN
@@ -104,8 +107,8 @@ def load_tet_field(path: PathLike) -> TetField:
 
 
 def _load(path: PathLike) -> Any:
-    if extension(path) == ".vtu":
-        return read_vtu(path, (NAME,))
+    if (own := READERS.get(extension(path))) is not None:
+        return own(path, (NAME,))
     module, size = _module(path), len(contents(path))
     return parsed_by_others(lambda: module.read(str(path)), size)
 
