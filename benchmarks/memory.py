@@ -1,6 +1,7 @@
 """Peak memory of a first distance, in a process of its own, beside its estimate.
 
-``python benchmarks/memory.py`` prints the table of docs/reliability.md; ``… KIND SIZE`` measures one row, here.
+``python benchmarks/memory.py`` prints the table of docs/reliability.md, ``… KIND`` the rows that begin so, and
+``… KIND SIZE`` measures one of them, here.
 """
 
 from __future__ import annotations
@@ -17,8 +18,13 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.extensions.band_memory import memory_of_band
+from signedheat.extensions.band_plan import plan_band
+from signedheat.extensions.bands import joined_band
 from signedheat.extensions.joining import Shape
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
+from signedheat.extensions.sampling import BYTES_PER_SAMPLE
+from signedheat.extensions.solid_distance import coarse_distance
 from signedheat.extensions.solid_memory import BYTES_IF_OPEN, bytes_of_faces, bytes_per_node
 from signedheat.extensions.steps import Steps
 from signedheat.geometry.surfels import count_surfels
@@ -47,6 +53,9 @@ SIZES = {
     "solids with holes": (96, 160, 288),
     "points as solids": (96, 160, 256),
     "noisy soups": (96, 144, 192),
+    "bands, closed": (256, 512, 1024),
+    "bands, with holes": (256, 512, 1024),
+    "samples": (1_000_000, 2_000_000, 4_000_000),
 }
 """Of each kind: parallels of a globe, points, voxels and cells along an edge, nodes along the longest side."""
 
@@ -136,7 +145,29 @@ def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable
     return lambda: sh.solid_distance(made, grid), estimate
 
 
+def band(closed: bool, size: int) -> tuple[Callable[[], object], float]:
+    """A band four nodes wide to either side, from a coarse field that is there."""
+    ball = samples.sphere(5)
+    made = ball if closed else samples.without_patches(ball, 4, 0.1)
+    grid = sh.Grid.around(made.bounds, size)
+    steps = Steps(True, True, True, sh.ZeroSet(), 1.0)
+    coarse = coarse_distance(made, grid, steps, None)
+    width = 4 * float(grid.spacing.max())
+    estimate = sum(memory_of_band(plan_band(coarse, grid, width)))
+    return lambda: joined_band(coarse, grid, width, None), estimate
+
+
+def sampled(size: int) -> tuple[Callable[[], object], float]:
+    """Samples of a ball with holes."""
+    field = sh.solid_distance(samples.without_patches(samples.sphere(5), 4, 0.1), resolution=96)
+    sh.sample(field, 10)
+    return lambda: sh.sample(field, size), float(BYTES_PER_SAMPLE * size)
+
+
 CASES = {
+    "bands, closed": partial(band, True),
+    "bands, with holes": partial(band, False),
+    "samples": sampled,
     "φ alone, a ball": partial(phi_alone, 1),
     "φ alone, 8 balls": partial(phi_alone, 2),
     "φ alone, 64 balls": partial(phi_alone, 4),
@@ -179,12 +210,13 @@ def measure(kind: str, size: int) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
+    if len(sys.argv) == 3:
         print(json.dumps(measure(sys.argv[1], int(sys.argv[2]))))
     else:
         print("| domain | size | measured, MB | estimated, MB | ratio |\n|---|--:|--:|--:|--:|")
+        wanted = sys.argv[1] if len(sys.argv) > 1 else ""
         for kind, sizes in SIZES.items():
-            for size in sizes:
+            for size in sizes if kind.startswith(wanted) else ():
                 done = subprocess.run(
                     [sys.executable, __file__, kind, str(size)], capture_output=True, text=True, check=True
                 )

@@ -32,6 +32,16 @@ FOUND = [
     ("surface use", 7007, 2403), ("surface use", 300, 927), ("surface use", 300, 1913),
     # thin faces that were refined for forty seconds
     ("surface use", 7001, 1022),
+    # faces without area whose jumps nothing holds
+    ("surface piecewise", 20261201, 4234),
+    # triangulations that tell their area from lengths alone, at the start as at the end
+    ("surface triangulation", 20261201, 4556), ("surface triangulation", 20261201, 5745),
+    # windows of exact distance on a thousand sheets, which grew by copies
+    ("surface use", 20261201, 1747),
+    # values near the largest number, on surfaces without orientation
+    ("surface use", 20261201, 4888),
+    # points among faces without area
+    ("surface curves", 20261201, 5213),
     # points that nearly coincide, each at a level of its own
     ("surface use", 412, 1359),
     # paths through edges that are a rounding shorter than none

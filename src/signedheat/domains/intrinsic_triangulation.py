@@ -318,6 +318,7 @@ def intrinsic_delaunay(
     stopwatch = Stopwatch(progress, steps=3)
     with stopwatch("embed curves"):
         base, _ = laid_out(mesh, MARGIN)
+        refuse_other_area(mesh, base)
         listed = list(keep) if isinstance(keep, Sequence) else [keep]
         refinement = ConformingRefinement.of(
             base, list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))

@@ -72,6 +72,8 @@ def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.in
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
     of_corners = np.cross(normal[:, None], opposite)
     rise = values[mesh.faces[faces]]
+    most = np.abs(rise).max(axis=1, keepdims=True, initial=0.0)
+    rise = rise / np.where(most > 0, most, 1.0)  # lest their sum is beyond what can be written
     result: NDArray[np.float64] = np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
     return result
 

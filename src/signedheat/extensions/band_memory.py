@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +12,7 @@ from ..memory import available_memory, libraries
 from ..operators.grid.blocks import CUBE, NODES, SIDE
 from ..parallel import n_threads
 from .band_completion import near_ends, needed_blocks
-from .band_plan import BandPlan
+from .band_plan import TILE, BandPlan
 
 LOOKED_AT = 24
 """Tiles of which blocks are counted, at most."""
@@ -18,13 +20,15 @@ KEPT = 0.7
 """Share of the blocks counted that have nodes in the band."""
 BYTES, BYTES_AT_WORK, BYTES_SOLVED = 6, 30, 200
 """Measured: of each node of a band; of a node of a tile that is computed; and of one where the method is repeated."""
+BYTES_COMPLETED = 2 * 144
+"""Of each point of completed surface, which tiles have and the band gets from them."""
 
 ROOM = 1.1
 """By how much the spacing that is told to fit is larger than it must be."""
 LEAST = 0.01
 """Share of the values that is taken to fit where even less would not."""
-FIXED = 75_000_000
-"""Bytes that trees of faces and threads take besides."""
+FIXED, FIXED_AT_ENDS = 75_000_000, 50_000_000
+"""Bytes that trees of faces and threads take besides; and what solving takes where the surface ends."""
 
 
 def memory_of_band(plan: BandPlan) -> tuple[int, int]:
@@ -35,11 +39,24 @@ def memory_of_band(plan: BandPlan) -> tuple[int, int]:
     tiles = plan.tiles
     if not len(tiles):
         return 0, 0
-    some = tiles[np.unique(np.linspace(0, len(tiles) - 1, LOOKED_AT).astype(np.int64))]
-    counts = [_blocks_of(plan, tile) for tile in some]
+    counts = [_blocks_of(plan, tile) for tile in _some(tiles)]
     held = np.mean([own for own, _, _ in counts]) * len(tiles)
-    at_work = max(around * BYTES_AT_WORK + solved * BYTES_SOLVED for _, around, solved in counts)
-    return int(NODES * KEPT * held * BYTES), int(FIXED + NODES * n_threads() * at_work)
+    at_ends = [_blocks_of(plan, tile) for tile in _some(np.unique(plan.ends // (TILE * plan.steps), axis=0))]
+    at_work = max(around * BYTES_AT_WORK + solved * BYTES_SOLVED for _, around, solved in counts + at_ends)
+    values = NODES * KEPT * held * BYTES + BYTES_COMPLETED * completed_points(plan)
+    fixed = FIXED + (FIXED_AT_ENDS if len(plan.ends) else 0)
+    return int(values), int(fixed + NODES * n_threads() * at_work)
+
+
+def _some(tiles: NDArray[Any]) -> NDArray[Any]:
+    """At most `LOOKED_AT`, one after another."""
+    return tiles[np.unique(np.linspace(0, len(tiles) - 1, LOOKED_AT).astype(np.int64))] if len(tiles) else tiles
+
+
+def completed_points(plan: BandPlan) -> float:
+    """About how many points of completed surface a band has: as many as the coarse field for each of its squares."""
+    surface = plan.coarse.surface
+    return 0.0 if surface is None else len(surface.crossings) * (plan.coarse_cell / plan.cell) ** 2
 
 
 def refuse_band_beyond_memory(plan: BandPlan) -> None:
@@ -58,7 +75,7 @@ def refuse_band_beyond_memory(plan: BandPlan) -> None:
     )
 
 
-def _blocks_of(plan: BandPlan, tile: NDArray[np.integer]) -> tuple[int, int, int]:
+def _blocks_of(plan: BandPlan, tile: NDArray[Any]) -> tuple[int, int, int]:
     """Number of blocks of a tile, of those that are computed for it, and of those where the method is repeated."""
     low = np.asarray(tile, dtype=np.int64) * CUBE
     high = low + CUBE

@@ -22,7 +22,7 @@ from ..slots import Slot
 WIDTHS = (0.05, 0.0158)
 """Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
 
-BYTES_PER_SAMPLE = 200
+BYTES_PER_SAMPLE = 165
 """At the most, with what finding its nearest face takes."""
 BESIDE = 0.05
 """Cells from the rim of a hole beyond which its completion begins."""

@@ -16,7 +16,16 @@ from .ordering import elimination_order
 from .pardiso import PardisoFactor
 from .superlu import SuperLUFactor
 
-__all__ = ["Factor", "PardisoFactor", "available_backends", "elimination_order", "factorize", "upper_triangle", "whole"]
+__all__ = [
+    "Factor",
+    "PardisoFactor",
+    "available_backends",
+    "chosen_backend",
+    "elimination_order",
+    "factorize",
+    "upper_triangle",
+    "whole",
+]
 
 
 class Factor(Protocol):
@@ -36,6 +45,24 @@ def available_backends() -> list[str]:
         *(["cholmod"] if cholmod.is_available() else []),
         "superlu",
     ]
+
+
+def chosen_backend(backend: str | None = None) -> str:
+    """The name of the back end that `factorize` takes.
+
+    Raises
+    ------
+    SignedHeatError
+        If it is not available here.
+    """
+    available = available_backends()
+    name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
+    if name not in available:
+        raise SignedHeatError(
+            f"the solver {name!r} is not available here",
+            remedy=f"choose one of {', '.join(available)}",
+        )
+    return name
 
 
 def factorize(
@@ -79,13 +106,7 @@ def factorize(
     >>> factorize(sparse.csr_matrix([[2.0, 1.0], [1.0, 2.0]])).solve(np.array([3.0, 3.0])).round(12)
     array([1., 1.])
     """
-    available = available_backends()
-    name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
-    if name not in available:
-        raise SignedHeatError(
-            f"the solver {name!r} is not available here",
-            remedy=f"choose one of {', '.join(available)}",
-        )
+    name = chosen_backend(backend)
     upper = upper_triangle(matrix)
     if isinstance(like, PardisoFactor) and name == "pardiso" and (again := like.like_this(upper)):
         return again

@@ -238,10 +238,9 @@ def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr
     corner = np.argwhere(located.barycentric > 0)
     vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
     which, faces = incident_faces(triangles, points_at_vertices(triangles, vertices))
-    areas = triangles.face_areas[faces]
-    share = areas / np.bincount(which, areas, len(vertices))[which]
-    share = share * located.barycentric[corner[:, 0], corner[:, 1]][which]
-    outward = -1j * triangles.edge_vectors[faces] * (share / areas)[:, None]
+    area = np.bincount(which, triangles.face_areas[faces], len(vertices))
+    share = located.barycentric[corner[:, 0], corner[:, 1]] / np.where(area > 0, area, np.inf)
+    outward = -1j * triangles.edge_vectors[faces] * share[which][:, None]
     in_frames = triangles.in_edge_frames(outward, faces)
     return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
 
