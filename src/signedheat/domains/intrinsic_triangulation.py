@@ -344,9 +344,13 @@ def intrinsic_delaunay(
 def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
     """Refuse what lengths of edges cannot tell: triangles thinner than about the square root of rounding."""
     before, after = float(mesh.face_areas.sum()), float(triangles.face_areas.sum())
-    if not abs(after - before) <= AREA_ERROR * before:
+    longest, most = float(triangles.lengths_of_edges.max(initial=0.0)), float(mesh.edge_lengths.sum())
+    lost = "" if abs(after - before) <= AREA_ERROR * before else f"area would be {after:.6g}, and it is {before:.6g}"
+    if not longest <= most:
+        lost = f"longest edge would be {longest:.6g}, and all edges together are {most:.6g}"
+    if lost:
         raise GeometryError(
-            f"the faces are too thin to be triangulated anew: their area would be {after:.6g}, and it is {before:.6g}",
+            f"the faces are too thin to be triangulated anew: their {lost}",
             remedy="remove faces that are all but flat, or scale the shape where it is squashed",
             element="faces",
         )

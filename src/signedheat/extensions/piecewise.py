@@ -148,7 +148,6 @@ def piecewise_distance(
             continuous = partial(is_continuous, triangles, pairs, slopes, directions)
             solution = minimize_fast(problem, progress=inner, enough=continuous)
         values = centered(triangles, slopes + solution.constants[:, None], parts)
-        refuse_lost(values, float(triangles.lengths_of_edges.sum()))
     with stopwatch("finish"):
         if isinstance(domain, IntrinsicTriangulation):
             phi: PiecewiseField = IntrinsicPiecewiseField(domain, domain, values, triangles)
@@ -162,16 +161,6 @@ def piecewise_distance(
         warn_user(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning)
     notes = (jumps_of(phi, solution, error), *discretization.notes)
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
-
-
-def refuse_lost(values: NDArray[np.float64], length: float) -> None:
-    """Refuse values that no way along the edges, whose length is given, explains: rounding has made them."""
-    if np.abs(values[np.isfinite(values)]).max(initial=0.0) > length:
-        raise GeometryError(
-            "values are lost in rounding, since faces have no area",
-            remedy="remove faces that are degenerate",
-            element="faces",
-        )
 
 
 def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps:
