@@ -9,6 +9,7 @@ from functools import partial
 import broken_curves
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullFormatter
 from numpy.typing import NDArray
 
 import signedheat as sh
@@ -195,8 +196,11 @@ def convergence(page: Page) -> None:
         found_all = np.array(errors[name])
         pairs = zip(sizes, found_all, strict=True)
         orders = [float(np.polyfit(np.log(h), np.log(np.maximum(e, 1e-9)), 1)[0]) for h, e in pairs]
-        for k, (h, e) in enumerate(zip(sizes, found_all, strict=True)):
-            axes.loglog(h, e, color=color, lw=0.9, alpha=0.7, label=name if k == 0 else None)
+        for h, e in zip(sizes, found_all, strict=True):
+            axes.loglog(h, e, color=color, lw=0.7, alpha=0.3)
+        axes.loglog(
+            np.median(sizes, axis=0), np.median(found_all, axis=0), color=color, lw=2.2, label=f"{name}, median"
+        )
         page.add(
             method=name,
             **{"order, median": float(np.median(orders)), "least": min(orders)},
@@ -209,6 +213,10 @@ def convergence(page: Page) -> None:
             **{"worst ε % at the finest": float(found_all[:, -1].max())},
         )
     axes.set(xlabel="mean edge length", ylabel="ε %")
+    for axis, ticks in ((axes.xaxis, (0.02, 0.05, 0.1, 0.2, 0.4)), (axes.yaxis, (0.05, 0.1, 0.2, 0.5, 1.0, 2.0))):
+        axis.set_major_locator(FixedLocator(ticks))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
     axes.legend()
     page.draw(picture)
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frozen import Frozen
+from ..frozen import Frozen, read_only
 from .triangle_kernels import find_edges
 
 
@@ -30,10 +31,10 @@ class EdgeTable(Frozen):
     face_edges: NDArray[np.int64]
     forward: NDArray[np.bool_]
 
-    @property
+    @cached_property
     def face_counts(self) -> NDArray[np.int64]:
         """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
-        return np.bincount(self.face_edges.ravel(), minlength=len(self.vertices))
+        return read_only(np.bincount(self.face_edges.ravel(), minlength=len(self.vertices)))
 
     def per_edge(self, values: NDArray[Any]) -> NDArray[Any]:
         """(e,) what (m, 3) values at the sides of faces say of each edge: the last of its faces; zero where none is."""
