@@ -103,3 +103,36 @@ def test_lines_from_rim_to_rim_are_complete(mesh):
     found = sh.curve_orientation(lines, mesh)
     assert not found.turned.any()
     assert (found.agreement == 1).all()
+
+
+def tube(n_around: int = 48, n_along: int = 49, length: float = 4.0) -> sh.TriangleMesh:
+    """An open tube of radius 1 round the z axis."""
+    angle, z = np.meshgrid(2 * np.pi * np.arange(n_around) / n_around, np.linspace(-0.5, 0.5, n_along) * length)
+    grid = np.arange(n_around * n_along).reshape(n_along, n_around)
+    a, b = grid[:-1], grid[1:]
+    c, d = np.roll(a, -1, axis=1), np.roll(b, -1, axis=1)
+    faces = np.concatenate([np.stack([a, c, d], axis=-1), np.stack([a, d, b], axis=-1)]).reshape(-1, 3)
+    return sh.TriangleMesh(np.stack([np.cos(angle), np.sin(angle), z], axis=-1).reshape(-1, 3), faces)
+
+
+def rings(mesh: sh.TriangleMesh, apart: float, n: int, lost: float) -> list[sh.Curve]:
+    """The boundary of a band round a tube, each of its two rings in n pieces, a part of the length of each lost."""
+    pieces = []
+    for ring in mesh.level_set(np.abs(mesh.vertices[:, 2]) - apart / 2 + 1e-4, 0.0):
+        for k in range(n):
+            run = np.arange(k * ring.n_points // n, int((k + 1 - lost) * ring.n_points / n) + 1)
+            pieces.append(sh.Curve(ring.faces[run], ring.barycentric[run]))
+    return pieces
+
+
+@pytest.mark.parametrize("apart", [0.6, 1.2])
+@pytest.mark.parametrize(("n", "lost"), [(3, 0.4), (3, 0.5), (8, 0.5)])
+@pytest.mark.parametrize("wrong", [[], [1]])
+def test_rings_that_face_each_other_stay_so(apart, n, lost, wrong):
+    """How their ends attract each other tells nothing of two rings; that φ has slope one between them does."""
+    mesh = tube()
+    given = [piece.reversed() if k in wrong else piece for k, piece in enumerate(rings(mesh, apart, n, lost))]
+    phi = sh.curve_distance(mesh, given)
+    exact = np.abs(mesh.vertices[:, 2]) - apart / 2
+    assert (np.sign(phi.values) != np.sign(exact)).mean() < 0.03
+    assert taken(phi) == (wrong, [])

@@ -16,7 +16,7 @@ from ..domains.kinds import SurfaceDomain
 from ..errors import UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.curve_segments import interpolation_at
-from ..geometry.synchronization import synchronize_signs
+from ..geometry.synchronization import nested_groups, synchronize_signs
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..reprs import ShortRepr
 
@@ -159,6 +159,11 @@ class Votes:
         signs = _signs(pairs, self.lengths[chosen])
         agreed = np.asarray(pairs.multiply(signs[:, None]).multiply(signs[None]).sum(axis=1)).ravel()
         return signs, np.clip(agreed / np.maximum(self.own[chosen], 1e-300), 0.0, 1.0)
+
+    def groups(self, among: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+        """Groups of some of the pieces that tell most about each other, each (j,) group of every piece, large first."""
+        tails, heads, weights = sparse.find(self.pairs[among][:, among])
+        return nested_groups(tails, heads, weights, len(among))
 
 
 def _charges(

@@ -20,6 +20,7 @@ from ..fields.vertex_field import VertexField
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .curve_orientation import Votes, with_turned
+from .piece_directions import directed
 
 STRANGE = 0.12
 """Agreement below which a piece may belong to none of the others. On five surfaces 1 % of those that did had less."""
@@ -85,14 +86,12 @@ def distance_to_pieces(
     if len(votes.pieces) < 2:
         return distance_unwarned(solver, listed, constraint), listed
     suspects = np.empty(0, dtype=np.int64) if every_piece else suspected(votes)
-    taken = without(listed, votes, suspects)
-    field = distance_unwarned(solver, list(taken.values()), constraint)
+    field, taken = without(solver, listed, votes, suspects, constraint)
     lengths = dict(zip(votes.pieces.tolist(), votes.lengths.tolist(), strict=True))
     near = {k: max(ASTRAY * lengths[k], NEAR * surface.spacing) for k in suspects.tolist()}
     astray = np.array([k for k in near if is_astray(field, listed[k], near[k])], dtype=np.int64)
     if len(astray) < len(suspects):
-        taken = without(listed, votes, astray)
-        field = distance_unwarned(solver, list(taken.values()), constraint)
+        field, taken = without(solver, listed, votes, astray, constraint)
     turned = np.array([k for k, curve in taken.items() if curve is not listed[k]], dtype=np.int64)
     note = CurvesTaken(turned, astray)
     if len(astray):
@@ -118,14 +117,31 @@ def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
     return made if isinstance(made, SurfaceDiscretization) else cast("SurfaceDiscretization", discretize(solver.domain))
 
 
-def without(curves: Sequence[CurveOrPoints], votes: Votes, out: NDArray[np.int64]) -> dict[int, CurveOrPoints]:
-    """The curves without some, by number; those that then disagree with the others are turned."""
+def without(
+    solver: SignedHeatSolver[Surface],
+    curves: Sequence[CurveOrPoints],
+    votes: Votes,
+    out: NDArray[np.int64],
+    constraint: Constraint | None,
+) -> tuple[VertexField[Surface], dict[int, CurveOrPoints]]:
+    """Distance to the curves without some, and these by number; those that then disagree with the others are turned."""
     among = np.flatnonzero(~np.isin(votes.pieces, out))
-    turned = np.zeros(len(curves), dtype=bool)
-    if len(among) > 1:
-        turned[votes.pieces[among]] = votes.counted(among)[0] < 0
-    made = with_turned(curves, turned)
-    return {k: made[k] for k in range(len(curves)) if k not in set(out.tolist())}
+    left = [k for k in range(len(curves)) if k not in set(out.tolist())]
+
+    def turned(signs: NDArray[np.float64]) -> dict[int, CurveOrPoints]:
+        turn = np.zeros(len(curves), dtype=bool)
+        turn[votes.pieces[among]] = signs < 0
+        made = with_turned(curves, turn)
+        return {k: made[k] for k in left}
+
+    def distance(signs: NDArray[np.float64]) -> VertexField[Surface]:
+        return distance_unwarned(solver, list(turned(signs).values()), constraint)
+
+    if len(among) < 2:
+        as_given = np.ones(len(among))
+        return distance(as_given), turned(as_given)
+    found = directed(votes, among, len(left) == len(among), surface_of(solver).spacing, distance)
+    return found.field, turned(found.signs)
 
 
 def suspected(votes: Votes) -> NDArray[np.int64]:

@@ -39,7 +39,34 @@ def synchronize_signs(
     >>> synchronize_signs(np.array([0, 1, 0]), np.array([1, 2, 2]), np.array([-3.0, 2.0, 1.0]), 3)
     array([ 1., -1., -1.])
     """
-    graph = _merged(tails, heads, weights, n_nodes)
+    levels = _contractions(_merged(tails, heads, weights, n_nodes))
+    result = np.ones(int(levels[-1][1].max()) + 1 if levels else n_nodes)
+    for graph, groups, signs in reversed(levels):
+        result = result[groups] * signs
+        turn_where_better(graph.starts, graph.neighbors, graph.weights, result, _ROUNDS)
+    return result
+
+
+def nested_groups(
+    tails: NDArray[np.int64], heads: NDArray[np.int64], weights: NDArray[np.float64], n_nodes: int
+) -> list[NDArray[np.int64]]:
+    """The groups that `synchronize_signs` merges, each (n,) group of every node: the few large ones first.
+
+    Examples
+    --------
+    >>> levels = nested_groups(np.array([0, 2, 1]), np.array([1, 3, 2]), np.array([5.0, -4.0, 0.1]), 4)
+    >>> [level.tolist() for level in levels]
+    [[0, 0, 0, 0], [0, 0, 1, 1]]
+    """
+    levels, found = [], np.arange(n_nodes)
+    for _, groups, _ in _contractions(_merged(tails, heads, weights, n_nodes)):
+        found = groups[found]
+        levels.append(found)
+    return levels[::-1]
+
+
+def _contractions(graph: _Graph) -> list[tuple[_Graph, NDArray[np.int64], NDArray[np.float64]]]:
+    """Each graph, the group of each of its nodes and the sign in it, until nothing is left to tell."""
     levels = []
     while len(graph.neighbors):
         groups, signs = _contraction(graph)
@@ -49,11 +76,7 @@ def synchronize_signs(
         tails, heads = rows[once], graph.neighbors[once]
         weights = graph.weights[once] * signs[tails] * signs[heads]
         graph = _merged(groups[tails], groups[heads], weights, int(groups.max()) + 1)
-    result = np.ones(graph.n_nodes)
-    for graph, groups, signs in reversed(levels):
-        result = result[groups] * signs
-        turn_where_better(graph.starts, graph.neighbors, graph.weights, result, _ROUNDS)
-    return result
+    return levels
 
 
 def _merged(tails: NDArray[np.int64], heads: NDArray[np.int64], weights: NDArray[np.float64], n_nodes: int) -> _Graph:
