@@ -19,8 +19,9 @@ from ..errors import InexactWarning, warn_user
 from ..fields.vertex_field import VertexField
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..solver import SignedHeatSolver, as_list, distance_unwarned
-from .curve_orientation import Votes, with_turned
+from .curve_votes import Votes
 from .piece_directions import directed
+from .turned_curves import with_turned
 
 STRANGE = 0.12
 """Agreement below which a piece may belong to none of the others. On five surfaces 1 % of those that did had less."""

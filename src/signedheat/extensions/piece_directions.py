@@ -14,7 +14,7 @@ from ..errors import SignedHeatError
 from ..fields.vertex_field import VertexField
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..operators.linear_elements import LinearElements
-from .curve_orientation import Votes
+from .curve_votes import Votes
 from .vertex_sharpening import at_triangles
 
 GOOD = 0.1
@@ -27,6 +27,8 @@ RESOLVED = 2.0
 """Mean length of pieces, relative to h, from which slopes tell anything of them."""
 EVIDENCE = 0.5
 """Area without slope that turning a piece must save, relative to its length squared."""
+HARDLY = 0.2
+"""What ends may tell about others, relative to their own energy, to tell hardly anything."""
 
 Field = TypeVar("Field", bound=VertexField)
 
@@ -81,8 +83,9 @@ def directed(
 
     Ends of pieces tell how the pieces of one curve follow each other, and nearly nothing of how two curves face. If
     curves disagree, no function has slope one between them. So if the ends tell to turn some, directions are tried in
-    which the pieces are as given, altogether or for the most part in each group of pieces that follow each other. These
-    are taken but where what the ends tell is clearly better; and if φ is still uneven, single groups are turned.
+    which the pieces are as given, altogether or for the most part in each group of pieces that follow each other, or
+    with single groups turned back. They are taken where they are clearly more even or, of groups whose ends tell hardly
+    anything about each other, where they are not clearly less so.
 
     Parameters
     ----------
@@ -100,14 +103,14 @@ def directed(
     by_ends, _ = votes.counted(among)
     lengths = votes.lengths[among]
     best = Directed.of(by_ends, distance(by_ends))
-    if (by_ends > 0).all() or lengths.mean() < RESOLVED * spacing:
+    if undisputed(by_ends, lengths, spacing):
         return best
     groups = votes.groups(among)
     tried = {by_ends.tobytes()}
     most = FEW if best.slope_error < BAD else MANY
 
-    def better(best: Directed[Field], signs: NDArray[np.float64], first: bool) -> Directed[Field]:
-        """The better ones; if neither is clearly better, those that come first."""
+    def better(best: Directed[Field], signs: NDArray[np.float64]) -> Directed[Field]:
+        """The better ones; if neither is clearly better, those of whose ends others tell more."""
         if alone and lengths @ signs < 0:
             signs = -signs
         if len(tried) > most or signs.tobytes() in tried:
@@ -117,18 +120,24 @@ def directed(
             other = Directed.of(signs, distance(signs))
         except SignedHeatError:  # no directions at all
             return best
-        if first:
+        if votes.told(among, best.signs, signs) < HARDLY:
             return best if other.gives_way(best, lengths) else other
         return other if best.gives_way(other, lengths) else best
 
     for signs in reversed(list(as_given_mostly(by_ends, groups, lengths))):
-        best = better(best, signs, first=True)
+        best = better(best, signs)
     if best.slope_error <= GOOD:
         return best
     for level in groups:
         for group in range(int(level.max()) + 1):
-            best = better(best, np.where(level == group, -best.signs, best.signs), first=False)
+            if lengths[level == group] @ best.signs[level == group] < 0:  # towards how they were given
+                best = better(best, np.where(level == group, -best.signs, best.signs))
     return best
+
+
+def undisputed(by_ends: NDArray[np.float64], lengths: NDArray[np.float64], spacing: float) -> bool:
+    """Whether what the ends of pieces tell is taken as it is: nothing is turned, or too small for slopes to tell."""
+    return bool((by_ends > 0).all() or lengths.mean() < RESOLVED * spacing)
 
 
 def as_given_mostly(
