@@ -18,6 +18,7 @@ from inspect import iscode
 from types import BuiltinFunctionType
 from typing import Any
 
+from . import kernel_calls as calls
 from .kernel_lowering import Lower
 from .kernel_steps import REPLACED, Constraints, Sequence, makes_references
 
@@ -79,7 +80,9 @@ class Typing:
         key = function, arguments, tuple(keywords.items()), self._flags
         found = _KNOWN.get(key)
         if found is None:
-            found = _KNOWN[key] = self._context.resolve_function_type(function, arguments, keywords)
+            found = calls.returned(function, arguments, keywords)
+            found = found or self._context.resolve_function_type(function, arguments, keywords)
+            _KNOWN[key] = found
         return found
 
 

@@ -10,6 +10,9 @@ import operator
 from importlib import import_module
 from typing import Any
 
+from . import kernel_calls as calls
+from .kernel_entry import Entry, is_short
+
 arrays: Any = import_module("numba.np.arrayobj")
 callwrapper: Any = import_module("numba.core.callwrapper")
 cgutils: Any = import_module("numba.core.cgutils")
@@ -58,10 +61,13 @@ class Lower(lowering.Lower):  # type: ignore[misc]
         module = self.context.create_module("wrapper")
         kind = self.context.call_conv.get_function_type(self.fndesc.restype, self.fndesc.argtypes)
         called = llvm.Function(module, kind, self.fndesc.llvm_func_name)
-        wrapper = callwrapper.PyCallWrapper(
-            self.context, module, called, self.fndesc, self.env, call_helper=self.call_helper, release_gil=release_gil
-        )
-        entry, _ = wrapper.build()
+        if is_short(self.fndesc):
+            entry = Entry(self.context, module, called, self.fndesc, self.env).build(release_gil)
+        else:
+            wrapper = callwrapper.PyCallWrapper(
+                self.context, module, called, self.fndesc, self.env, call_helper=self.call_helper, release_gil=release_gil
+            )
+            entry, _ = wrapper.build()
         for attribute in ("noinline", "optnone"):
             entry.attributes.add(attribute)
         self.library.add_ir_module(module)
@@ -115,6 +121,9 @@ class Lower(lowering.Lower):  # type: ignore[misc]
 
     def lower_call(self, kind: Any, expression: Any) -> Any:
         """The value of a call."""
+        short = calls.lowered(self, kind, expression)
+        if short is not None:
+            return short
         value = super().lower_call(kind, expression)
         function = self.typeof(expression.func.name)
         is_range = isinstance(kind, types.RangeType) and getattr(function, "typing_key", None) is range

@@ -1,0 +1,143 @@
+"""Calls in kernels with short ways: ``np.empty``, ``np.zeros``, ``np.full``, ``np.ones``, ``min`` and ``max`` of numbers.
+
+Numba compiles a function of its own for each of them and for all types of their arguments. Importing this imports
+Numba.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+arrays: Any = import_module("numba.np.arrayobj")
+cgutils: Any = import_module("numba.core.cgutils")
+llvm: Any = import_module("llvmlite.ir")
+types: Any = import_module("numba.core.types")
+signature: Any = import_module("numba.core.typing").signature
+
+SHAPED = {np.empty: ("shape", "dtype"), np.zeros: ("shape", "dtype"), np.ones: ("shape", "dtype"),
+          np.full: ("shape", "fill_value", "dtype")}  # fmt: skip
+"""What makes arrays, and the names of its arguments."""
+LEAST, GREATEST = {min: "<", max: ">"}, 3
+"""How `min` and `max` compare, and of how many numbers at most."""
+NUMBERS = types.int64, types.float64
+
+
+def returned(function: Any, arguments: Any, keywords: Any) -> Any:
+    """The signature of a call with a short way, or None."""
+    key = getattr(function, "typing_key", None)
+    try:
+        names = SHAPED.get(key)
+    except TypeError:
+        return None
+    if names is not None:
+        kind = _array(dict(zip(names, arguments, strict=False)) | keywords, key is np.full)
+        return None if kind is None else signature(kind, *arguments, *keywords.values())
+    if key in LEAST and not keywords and 1 < len(arguments) <= GREATEST:
+        kinds = {types.unliteral(one) for one in arguments}
+        if len(kinds) == 1 and kinds <= set(NUMBERS):
+            return signature(*kinds, *arguments)
+    return None
+
+
+def _array(given: dict[str, Any], is_filled: bool) -> Any:
+    shape, element = given.get("shape"), given.get("dtype")
+    sizes = shape if isinstance(shape, types.BaseTuple) else (shape,)
+    if not len(sizes) or not all(isinstance(one, types.Integer) and one.bitwidth <= 64 for one in sizes):
+        return None
+    if element is None:
+        kind = types.unliteral(given["fill_value"]) if is_filled and "fill_value" in given else types.float64
+    elif isinstance(element, types.DTypeSpec):
+        kind = element.dtype
+    else:
+        kind = {bool: types.boolean, int: types.int64, float: types.float64}.get(getattr(element, "typing_key", None))
+    if not isinstance(kind, types.Integer | types.Float | types.Boolean):
+        return None
+    if is_filled and not isinstance(given.get("fill_value"), types.Integer | types.Float | types.Boolean):
+        return None
+    return types.Array(kind, len(sizes), "C")
+
+
+def lowered(lower: Any, kind: Any, expression: Any) -> Any:
+    """The value of such a call, or None."""
+    key = getattr(lower.typeof(expression.func.name), "typing_key", None)
+    made = lower.fndesc.calltypes[expression]
+    if expression.vararg is not None or returned(lower.typeof(expression.func.name), *_given(lower, expression)) is None:
+        return None
+    if key in LEAST:
+        values = [lower._cast_var(one, made.return_type) for one in expression.args]
+        return lower.context.cast(lower.builder, _extreme(lower.builder, LEAST[key], values), made.return_type, kind)
+    named = dict(zip(SHAPED[key], expression.args, strict=False)) | dict(expression.kws)
+    array = _allocated(lower, made.return_type, _sizes(lower, named["shape"]))
+    if key is np.zeros:
+        size = lower.builder.mul(array.itemsize, array.nitems)
+        cgutils.memset(lower.builder, array.data, size, 0)
+    elif key is not np.empty:
+        element = made.return_type.dtype
+        if key is np.full:
+            value = lower._cast_var(named["fill_value"], element)
+        else:
+            value = lower.context.get_constant_generic(lower.builder, element, 1)
+        with cgutils.for_range(lower.builder, array.nitems) as loop:
+            place = lower.builder.gep(array.data, [loop.index])
+            arrays.store_item(lower.context, lower.builder, made.return_type, value, place)
+    return array._getvalue()
+
+
+def _given(lower: Any, expression: Any) -> tuple[Any, Any]:
+    arguments = tuple(lower.typeof(one.name) for one in expression.args)
+    return arguments, {name: lower.typeof(one.name) for name, one in expression.kws}
+
+
+def _extreme(builder: Any, sign: str, values: list[Any]) -> Any:
+    """As Python does, whose result depends on the order if one is NaN."""
+    best = values[0]
+    for value in values[1:]:
+        is_int = isinstance(value.type, llvm.IntType)
+        compare = builder.icmp_signed if is_int else builder.fcmp_ordered
+        best = builder.select(compare(sign, value, best), value, best)
+    return best
+
+
+def _sizes(lower: Any, shape: Any) -> list[Any]:
+    kind, value = lower.typeof(shape.name), lower.loadvar(shape.name)
+    if not isinstance(kind, types.BaseTuple):
+        return [lower.context.cast(lower.builder, value, kind, types.intp)]
+    return [
+        lower.context.cast(lower.builder, lower.builder.extract_value(value, axis), one, types.intp)
+        for axis, one in enumerate(kind)
+    ]
+
+
+def _allocated(lower: Any, kind: Any, sizes: list[Any]) -> Any:
+    """An array whose elements have no values yet."""
+    context, builder = lower.context, lower.builder
+    item = context.get_constant(types.intp, arrays.get_itemsize(context, kind))
+    zero = llvm.Constant(item.type, 0)
+    strides, number = [item], sizes[-1]
+    is_wrong = builder.icmp_signed("<", sizes[-1], zero)
+    for size in reversed(sizes[:-1]):
+        strides.insert(0, builder.mul(item, number))
+        product = builder.smul_with_overflow(number, size)
+        number = builder.extract_value(product, 0)
+        is_wrong = builder.or_(is_wrong, builder.icmp_signed("<", size, zero))
+        is_wrong = builder.or_(is_wrong, builder.extract_value(product, 1))
+    product = builder.smul_with_overflow(number, item)
+    is_wrong = builder.or_(is_wrong, builder.extract_value(product, 1))
+    with cgutils.if_unlikely(builder, is_wrong):
+        context.call_conv.return_user_exc(builder, ValueError, ("the size of an array is negative or too large",))
+    align = context.get_preferred_array_alignment(kind.dtype)
+    held = context.nrt.meminfo_alloc_aligned(builder, builder.extract_value(product, 0), align)
+    array = arrays.make_array(kind)(context, builder)
+    data = context.nrt.meminfo_data(builder, held)
+    arrays.populate_array(
+        array,
+        data=builder.bitcast(data, context.get_data_type(kind.dtype).as_pointer()),
+        shape=cgutils.pack_array(builder, sizes, item.type),
+        strides=cgutils.pack_array(builder, strides, item.type),
+        itemsize=item,
+        meminfo=held,
+    )
+    return array
