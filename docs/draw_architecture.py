@@ -20,8 +20,8 @@ FLOORS = [
     ("operators   linear", "sparse matrices, matrix-free stencils, factorisations, Krylov", "#c9dcee"),
     ("geometry", "arrays in, arrays out: intrinsic meshes, geodesics, flips, clipping", "#bccfe8"),
     (
-        "cache compiled diagnostics errors frozen kernel_cache kernel_compiler kernel_lowering kernel_steps "
-        "memory packages parallel progress reprs slots",
+        "cache compiled diagnostics errors frozen kernel_cache kernel_calls kernel_compiler kernel_entry "
+        "kernel_lowering kernel_steps memory packages parallel progress reprs slots",
         "used by all",
         "#d9d9e3",
     ),

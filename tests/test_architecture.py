@@ -23,6 +23,8 @@ FLOORS = [
         "kernel_cache",
         "kernel_compiler",
         "kernel_lowering",
+        "kernel_calls",
+        "kernel_entry",
         "kernel_steps",
         "memory",
     }

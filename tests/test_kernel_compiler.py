@@ -196,3 +196,82 @@ def test_loops_are_those_of_plain_python(n, kind):
 @pytest.mark.parametrize("m, n", [(7, -3), (-7, 3), (4, 4)])
 def test_arithmetic_is_that_of_plain_python(x, y, m, n):
     np.testing.assert_array_equal(arithmetic(x, y, m, n), arithmetic.function(x, y, m, n))
+
+
+@compiled
+def arrays_of(n, m, x):
+    a = np.empty(n)
+    a[:] = x
+    b = np.zeros((n, m), dtype=np.int32)
+    c = np.full((n, m), -1)
+    d = np.ones((2, n, m), dtype=bool)
+    e = np.full(shape=n, fill_value=x, dtype=np.float32)
+    return a, b, c, d, e, np.zeros(n, np.uint8)
+
+
+@pytest.mark.parametrize("n, m", [(3, 4), (1, 0), (0, 2)])
+def test_arrays_are_made_as_numpy_makes_them(n, m):
+    for ours, theirs in zip(arrays_of(n, m, 0.5), arrays_of.function(n, m, 0.5), strict=True):
+        assert (ours.dtype, ours.shape, ours.flags.c_contiguous) == (theirs.dtype, theirs.shape, True)
+        assert ours.strides == theirs.strides or not ours.size
+        np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize("n, m", [(-1, 4), (3, -1), (1 << 31, 1 << 32)])
+def test_sizes_that_are_none_are_refused(n, m):
+    @compiled
+    def made(n, m):
+        return np.empty((n, m))
+
+    with pytest.raises((ValueError, MemoryError)):
+        made(n, m)
+
+
+@compiled
+def extremes(a, b, c, n):
+    return min(a, b), max(a, b), min(a, b, c), max(a, b, c), min(max(n, 0), 7), max(n, a)
+
+
+@pytest.mark.parametrize("n", [-3, 5, 11])
+def test_extremes_are_those_of_python(n):
+    nan = float("nan")
+    for a, b, c in [(1.0, 2.0, 0.5), (nan, 1.0, 2.0), (1.0, nan, 2.0), (1.0, 2.0, nan), (-0.0, 0.0, -0.0)]:
+        ours, theirs = extremes(a, b, c, n), extremes.function(a, b, c, n)
+        assert [repr(float(one)) for one in ours[:5]] == [repr(float(one)) for one in theirs[:5]]
+    assert extremes(1.0, 2.0, 3.0, n)[5] == max(n, 1.0)
+
+
+@compiled(nogil=True)
+def taken(a, n, x, is_wanted):
+    """What a kernel takes and returns: arrays in any order, numbers, its own arguments."""
+    if n < 0:
+        raise ValueError("negative")
+    return (a.sum() + n) * x if is_wanted else x, n, is_wanted, a, np.zeros(n), a[1:]
+
+
+def test_arguments_and_results():
+    whole = np.arange(24.0).reshape(2, 3, 4)
+    for a in (whole[:, 0], whole[:, :, 1], whole[0].T):
+        for is_wanted in (True, np.bool_(False)):
+            value, n, told, same, made, part = taken(a, np.int64(2), 0.5, is_wanted)
+            assert (value, n, told) == ((a.sum() + 2) * 0.5 if is_wanted else 0.5, 2, bool(is_wanted))
+            assert same is a and made.tolist() == [0.0, 0.0] and np.shares_memory(part, a)
+            assert made.flags.writeable and made.flags.owndata is False and part.tolist() == a[1:].tolist()
+    fixed = whole[0].copy()
+    fixed.setflags(write=False)
+    assert not taken(fixed, 0, 1.0, True)[5].flags.writeable
+    with pytest.raises(ValueError, match="negative"):
+        taken(whole[0], -1, 1.0, True)
+    with pytest.raises(TypeError):
+        taken(whole[0], 1, 1.0)
+
+
+def test_neither_arguments_nor_results_nor_errors_are_kept():
+    a, counts = np.ones((3, 4)), []
+    for _ in range(2):
+        for _ in range(1000):
+            taken(a, 3, 1.0, True)
+            with pytest.raises(ValueError):
+                taken(a, -1, 1.0, True)
+        counts.append([sys.getrefcount(one) for one in (a, a.dtype, np.dtype(float), ValueError)])
+    assert all(later <= first + 10 for first, later in zip(*counts, strict=True))

@@ -1,4 +1,4 @@
-"""Calls in kernels with short ways: ``np.empty``, ``np.zeros``, ``np.full``, ``np.ones``, ``min`` and ``max`` of numbers.
+"""Calls in kernels with short ways: ``np.empty``, ``np.zeros``, ``np.full``, ``np.ones``, ``min`` and ``max``.
 
 Numba compiles a function of its own for each of them and for all types of their arguments. Importing this imports
 Numba.
@@ -17,8 +17,10 @@ llvm: Any = import_module("llvmlite.ir")
 types: Any = import_module("numba.core.types")
 signature: Any = import_module("numba.core.typing").signature
 
-SHAPED = {np.empty: ("shape", "dtype"), np.zeros: ("shape", "dtype"), np.ones: ("shape", "dtype"),
-          np.full: ("shape", "fill_value", "dtype")}  # fmt: skip
+SHAPED: dict[Any, tuple[str, ...]] = {
+    **dict.fromkeys((np.empty, np.zeros, np.ones), ("shape", "dtype")),
+    np.full: ("shape", "fill_value", "dtype"),
+}
 """What makes arrays, and the names of its arguments."""
 LEAST, GREATEST = {min: "<", max: ">"}, 3
 """How `min` and `max` compare, and of how many numbers at most."""
@@ -27,7 +29,7 @@ NUMBERS = types.int64, types.float64
 
 def returned(function: Any, arguments: Any, keywords: Any) -> Any:
     """The signature of a call with a short way, or None."""
-    key = getattr(function, "typing_key", None)
+    key: Any = getattr(function, "typing_key", None)
     try:
         names = SHAPED.get(key)
     except TypeError:
@@ -52,7 +54,8 @@ def _array(given: dict[str, Any], is_filled: bool) -> Any:
     elif isinstance(element, types.DTypeSpec):
         kind = element.dtype
     else:
-        kind = {bool: types.boolean, int: types.int64, float: types.float64}.get(getattr(element, "typing_key", None))
+        key: Any = getattr(element, "typing_key", None)
+        kind = {bool: types.boolean, int: types.int64, float: types.float64}.get(key)
     if not isinstance(kind, types.Integer | types.Float | types.Boolean):
         return None
     if is_filled and not isinstance(given.get("fill_value"), types.Integer | types.Float | types.Boolean):
@@ -62,10 +65,11 @@ def _array(given: dict[str, Any], is_filled: bool) -> Any:
 
 def lowered(lower: Any, kind: Any, expression: Any) -> Any:
     """The value of such a call, or None."""
-    key = getattr(lower.typeof(expression.func.name), "typing_key", None)
-    made = lower.fndesc.calltypes[expression]
-    if expression.vararg is not None or returned(lower.typeof(expression.func.name), *_given(lower, expression)) is None:
+    function = lower.typeof(expression.func.name)
+    key: Any = getattr(function, "typing_key", None)
+    if expression.vararg is not None or returned(function, *_given(lower, expression)) is None:
         return None
+    made = lower.fndesc.calltypes[expression]
     if key in LEAST:
         values = [lower._cast_var(one, made.return_type) for one in expression.args]
         return lower.context.cast(lower.builder, _extreme(lower.builder, LEAST[key], values), made.return_type, kind)

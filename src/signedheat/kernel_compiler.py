@@ -20,15 +20,17 @@ from typing import Any
 
 from . import kernel_calls as calls
 from .kernel_lowering import Lower
-from .kernel_steps import REPLACED, Constraints, Sequence, makes_references
+from .kernel_steps import REPLACED, Constraints, Sequence, listed, makes_references, rewritten
 
 codegen: Any = import_module("numba.core.codegen")  # as far as type checkers are concerned, all of it is untyped
 compiler: Any = import_module("numba.core.compiler")
 config: Any = import_module("numba.core.config")
 environments: Any = import_module("numba.core.environment")
+ir: Any = import_module("numba.core.ir")
 llvm: Any = import_module("llvmlite.binding")
 machinery: Any = import_module("numba.core.compiler_machinery")
 make_function: Any = import_module("numba._dynfunc").make_function
+ssa: Any = import_module("numba.core.ssa")
 typeinfer: Any = import_module("numba.core.typeinfer")
 typed_passes: Any = import_module("numba.core.typed_passes")
 untyped_passes: Any = import_module("numba.core.untyped_passes")
@@ -185,21 +187,27 @@ def our_steps() -> Iterator[None]:
     """While one of our kernels is compiled: what it calls of Numba's own is only linked, and nobody times LLVM."""
     lock = getattr(getattr(llvm.ffi.lib, "_lock", None), "_cblist", [])
     decorator = templates._OverloadFunctionTemplate._get_jit_decorator
-    network = typeinfer.ConstraintNetwork
 
     def linked(self: Any) -> Any:
         jit = decorator(self)
         return lambda **options: jit(**{**options, **LINKED, "pipeline_class": Pipeline})
 
+    ours: dict[tuple[Any, str], Any] = {
+        (templates._OverloadFunctionTemplate, "_get_jit_decorator"): linked,
+        (typeinfer, "ConstraintNetwork"): Constraints,
+        (ssa, "_run_block_rewrite"): rewritten,
+        (ir.Inst, "_rec_list_vars"): listed,
+    }
     with compiler_lock:
         told, lock[:] = list(lock), []
-        templates._OverloadFunctionTemplate._get_jit_decorator = linked
-        typeinfer.ConstraintNetwork = Constraints
+        theirs = {(owner, name): getattr(owner, name) for owner, name in ours}
+        for (owner, name), value in ours.items():
+            setattr(owner, name, value)
         try:
             yield
         finally:
-            templates._OverloadFunctionTemplate._get_jit_decorator = decorator
-            typeinfer.ConstraintNetwork = network
+            for (owner, name), value in theirs.items():
+                setattr(owner, name, value)
             lock[:] = told
 
 

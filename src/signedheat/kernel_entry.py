@@ -100,7 +100,8 @@ class Entry:
         for kind in kinds:
             is_array = isinstance(kind, types.Array)
             wanted += "O" if is_array else FORMATS[kind]
-            held = api.pyobj if is_array else llvm.IntType(32) if kind == types.boolean else context.get_value_type(kind)
+            number = llvm.IntType(32) if kind == types.boolean else context.get_value_type(kind)
+            held = api.pyobj if is_array else number
             places.append(builder.alloca(held))
         text = context.insert_const_string(self.module, wanted)
         shape = llvm.FunctionType(llvm.IntType(32), [api.pyobj, api.cstring], var_arg=True)

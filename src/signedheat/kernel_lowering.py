@@ -64,10 +64,8 @@ class Lower(lowering.Lower):  # type: ignore[misc]
         if is_short(self.fndesc):
             entry = Entry(self.context, module, called, self.fndesc, self.env).build(release_gil)
         else:
-            wrapper = callwrapper.PyCallWrapper(
-                self.context, module, called, self.fndesc, self.env, call_helper=self.call_helper, release_gil=release_gil
-            )
-            entry, _ = wrapper.build()
+            parts = self.context, module, called, self.fndesc, self.env, self.call_helper, release_gil
+            entry, _ = callwrapper.PyCallWrapper(*parts).build()
         for attribute in ("noinline", "optnone"):
             entry.attributes.add(attribute)
         self.library.add_ir_module(module)

@@ -26,6 +26,8 @@ utils: Any = import_module("numba.core.utils")
 VIEWS = {"getitem", "static_getitem", "getattr", "build_tuple", "cast", "phi", "getiter", "iternext", "exhaust_iter"}
 VIEWS |= {"pair_first", "pair_second"}
 """Expressions whose value, if it is an array, is one that was there before, or a part of it."""
+PLAIN = {ir.Loc, str, int, float, bool, type(None)}
+"""Parts of statements that hold no variables."""
 UFUNCS = np.ufunc, import_module("numba.np.ufunc.dufunc").DUFunc
 """What calls of arrays become a loop."""
 
@@ -139,6 +141,49 @@ class Ends(typed_passes.IRLegalization):  # type: ignore[misc]
             return bool(super().run_pass(state))
         state.func_ir.blocks = transforms.canonicalize_cfg(state.func_ir.blocks)
         return True
+
+
+def rewritten(blocks: Any, states: Any, handler: Any) -> Any:
+    """Blocks in which one variable is given other names: Numba's, which rewrites those without the variable, too."""
+    name, found = states["varname"], {}
+    for label, block in blocks.items():
+        if name not in _names(block):
+            found[label] = block
+            continue
+        states["label"], states["block"] = label, block
+        new = found[label] = ir.Block(scope=block.scope, loc=block.loc)
+        for statement in block.body:
+            is_assigned = isinstance(statement, ir.Assign)
+            new.body.append((handler.on_assign if is_assigned else handler.on_other)(states, statement))
+        new.names = block.names
+    return found
+
+
+def listed(_: Any, value: Any) -> list[Any]:
+    """The variables in a statement or a part of one, in order: what Numba asks for most often."""
+    found: list[Any] = []
+    _list(value, found)
+    return found
+
+
+def _list(value: Any, found: list[Any]) -> None:
+    kind = type(value)
+    if kind is ir.Var:
+        found.append(value)
+    elif isinstance(value, dict | list | tuple):
+        for part in value.values() if isinstance(value, dict) else value:
+            if type(part) not in PLAIN:
+                _list(part, found)
+    elif isinstance(value, ir.Inst):
+        found += value.list_vars()
+
+
+def _names(block: Any) -> Any:
+    """Of all variables in a block, as they were at first: later ones are never searched for."""
+    names = getattr(block, "names", None)
+    if names is None:
+        names = block.names = {one.name for statement in block.body for one in statement.list_vars()}
+    return names
 
 
 class Sequence(machinery.PassManager):  # type: ignore[misc]
