@@ -83,15 +83,25 @@ class Entry:
                     self._release(one)
         with builder.if_then(status.is_error, likely=False):
             with builder.if_then(status.is_user_exc):
-                name = self.context.insert_const_string(self.module, __name__)
-                self._raise(api.import_module(name), status.excinfoptr)
+                self._raise(status.excinfoptr)
             builder.ret(api.get_null_object())
         builder.ret(self._packed(self.description.restype, value))
         return self.entry
 
-    def _raise(self, module: Any, error: Any) -> None:
-        address = self.api.long_from_ulonglong(self.builder.ptrtoint(error, llvm.IntType(64)))
-        self.api.call_method(module, "raise_error", (address,))
+    def _raise(self, error: Any) -> None:
+        """Call `raise_error`."""
+        api, builder = self.api, self.builder
+        name, method, wanted = (self._text(one) for one in (__name__, raise_error.__name__, "K"))
+        load = llvm.FunctionType(api.pyobj, [api.cstring])
+        module = builder.call(cgutils.get_or_insert_function(self.module, load, "PyImport_ImportModule"), [name])
+        call = llvm.FunctionType(api.pyobj, [api.pyobj, api.cstring, api.cstring], var_arg=True)
+        address = builder.ptrtoint(error, llvm.IntType(64))
+        called = cgutils.get_or_insert_function(self.module, call, "PyObject_CallMethod")
+        builder.call(called, [module, method, wanted, address])
+        api.decref(module)
+
+    def _text(self, text: str) -> Any:
+        return self.context.insert_const_string(self.module, text)
 
     def _unpacked(self) -> list[Any]:
         """The arguments as compiled code takes them."""
@@ -103,7 +113,7 @@ class Entry:
             number = llvm.IntType(32) if kind == types.boolean else context.get_value_type(kind)
             held = api.pyobj if is_array else number
             places.append(builder.alloca(held))
-        text = context.insert_const_string(self.module, wanted)
+        text = self._text(wanted)
         shape = llvm.FunctionType(llvm.IntType(32), [api.pyobj, api.cstring], var_arg=True)
         parse = cgutils.get_or_insert_function(self.module, shape, "PyArg_ParseTuple")
         is_parsed = builder.call(parse, [self.entry.args[1], text, *places])
@@ -122,8 +132,7 @@ class Entry:
             else:
                 values.append(value)
         with cgutils.if_unlikely(builder, cgutils.is_not_null(builder, failed)):
-            text = context.insert_const_string(self.module, "what this takes is of another type")
-            api.err_set_string("PyExc_TypeError", text)
+            api.err_set_string("PyExc_TypeError", self._text("what this takes is of another type"))
             builder.ret(api.get_null_object())
         return [builder.load(v) if isinstance(k, types.Array) else v for k, v in zip(kinds, values, strict=True)]
 
