@@ -54,3 +54,22 @@ def test_a_rod_far_thinner_than_a_face_is_found_in_its_middle(radius):
     upper = (np.abs(found.shape.vertices[found.shape.faces][:, :, 2]) < 1e-9).all(axis=1)
     disc = 16 * radius**2 * np.sin(2 * np.pi / 32)
     assert found.shape.face_areas[upper].sum() == pytest.approx(4 - disc, abs=0.005 * 2 * np.pi * radius)
+
+
+def test_large_faces_end_where_they_enter_other_bodies():
+    """Where some faces are left out, the others end on a face of the other body, far nearer than a piece is large."""
+    angle = 0.4
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    bar, rod = box((-2, -0.5, -0.5), (2, 0.5, 0.5)), box((-0.41, -1.9, -0.37), (0.41, 2.1, 0.43))
+    rod = sh.TriangleMesh(rod.vertices @ turn.T, rod.faces)
+    finest = 0.05
+    left = left_of(samples.union(bar, rod), 0.1, finest).shape
+    edges = np.sort(left.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, counts = np.unique(edges, axis=0, return_counts=True)
+    rim = left.vertices[np.unique(edges[counts == 1])]
+    on_bar = np.abs(np.abs(rim) - [2, 0.5, 0.5]).min(axis=1)
+    own = rim @ turn
+    on_rod = np.minimum(np.abs(own - [-0.41, -1.9, -0.37]), np.abs(own - [0.41, 2.1, 0.43])).min(axis=1)
+    assert len(rim) > 100
+    assert np.percentile(np.maximum(on_bar, on_rod), 95) < 0.05 * finest
+    assert np.maximum(on_bar, on_rod).max() < 0.5 * finest  # beside corners

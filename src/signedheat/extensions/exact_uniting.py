@@ -21,6 +21,12 @@ FINEST = 64
 """Parts along the sides of the largest faces at whose centres is looked."""
 ROUNDS = 40
 """How often faces are halved at most."""
+HALVINGS = 6
+"""How often the part of an edge in which it enters another body is halved."""
+MARGIN = 0.02
+"""Share of an edge that a cut keeps from its ends."""
+INWARDS = 0.02
+"""Share of the way from an edge to the centre of a piece, on which other faces do not meet it."""
 MANY = 2_000_000
 """Faces beyond which none are cut further."""
 
@@ -75,11 +81,12 @@ class Overlaps:
             weights = np.stack([1 - i - j, i, j], axis=1)
             places = np.einsum("pc,fcd->fpd", weights, pieces[chosen]).reshape(-1, 3)
             share[chosen] = (
-                self._at(np.repeat(faces[chosen], len(weights)), places).reshape(len(chosen), -1).mean(axis=1)
+                self.at(np.repeat(faces[chosen], len(weights)), places).reshape(len(chosen), -1).mean(axis=1)
             )
         return share
 
-    def _at(self, faces: NDArray[np.int64], places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def at(self, faces: NDArray[np.int64], places: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) whether places in faces, and not on their rims, lie inside other bodies."""
         behind = self.tree.behind(faces, places)
         result: NDArray[np.bool_] = np.where(self.walls[faces], behind > BURIED, behind - 0.5 > COVERED)
         return result
@@ -119,7 +126,42 @@ def _cut(
         at = np.flatnonzero(partly)
         share[at] = overlaps.covered(origins[at], vertices[faces[at]])
         partly &= _partly(faces, share, len(vertices))
-    return vertices, faces, origins, share > 0.5
+    return _cut_at_crossings(overlaps, vertices, faces, origins, share > 0.5, partly)
+
+
+def _cut_at_crossings(
+    overlaps: Overlaps,
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    origins: NDArray[np.int64],
+    covered: NDArray[np.bool_],
+    partly: NDArray[np.bool_],
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """The same, where faces that are partly covered are cut where their edges enter and leave other bodies."""
+    table = edge_table(faces)
+    owners = np.full(len(table.vertices), -1, dtype=np.int64)
+    owners[table.face_edges[partly]] = np.flatnonzero(partly)[:, None]
+    edges = np.flatnonzero(owners >= 0)
+    owner, ends = owners[edges], vertices[table.vertices[edges]]
+    ends += INWARDS * (vertices[faces[owner]].mean(axis=1)[:, None] - ends)
+    owner, (start, stop) = origins[owner], ends.transpose(1, 0, 2)
+    first = overlaps.at(owner, start)
+    crossed = first != overlaps.at(owner, stop)
+    edges, owner, start, stop, first = (each[crossed] for each in (edges, owner, start, stop, first))
+    low, high = np.zeros(len(edges)), np.ones(len(edges))
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        before = overlaps.at(owner, start + middle[:, None] * (stop - start)) == first
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    shares = np.full(len(owners), 0.5)
+    shares[edges] = np.clip(0.5 * (low + high), MARGIN, 1 - MARGIN)
+    cut = np.zeros(len(owners), dtype=bool)
+    cut[edges] = True
+    vertices, faces, parents = split_at_edges(vertices, faces, cut, shares)
+    origins, covered = origins[parents], covered[parents]
+    pieces = np.flatnonzero(np.bincount(parents)[parents] > 1)
+    covered[pieces] = overlaps.at(origins[pieces], vertices[faces[pieces]].mean(axis=1))
+    return vertices, faces, origins, covered
 
 
 def _partly(faces: NDArray[np.int64], share: NDArray[np.float64], n_vertices: int) -> NDArray[np.bool_]:

@@ -16,8 +16,8 @@ from ..parallel import in_chunks
 from .box_tree import LEAF, BoxTree
 from .winding_moments import moments_of
 
-DEPTH, INWARDS = 1e-5, 0.02
-"""Size of a face by which what is behind it lies behind it; share of the way to its centre by which it is inside."""
+DEPTH = 1e-5
+"""Size of a face by which what is behind it lies behind it."""
 OPENING = 1.25
 """Distance over radius from which on moments stand for what is below a node."""
 
@@ -62,16 +62,15 @@ class WindingTree:
         return numbers
 
     def behind(self, faces: NDArray[np.integer], places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) winding numbers just behind places (n, 3) on faces (n,): 1 more than in front, where no other face lies.
+        """(n,) winding numbers just behind places (n, 3) in faces (n,): 1 more than in front, where no other face lies.
 
-        Places at the rims of their faces are moved inwards a little, where other faces do not meet them.
+        They must not be on the rims of these, where other faces meet them.
         """
         corners = self.triangles[faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         areas = np.linalg.norm(normals, axis=1)
         depth = DEPTH * np.sqrt(areas) / np.where(areas > 0, areas, 1.0)
-        inner = places + INWARDS * (corners.mean(axis=1) - places)
-        return self.numbers(inner - depth[:, None] * normals)
+        return self.numbers(places - depth[:, None] * normals)
 
     @cached_property
     def _moments(self) -> NDArray[np.float64]:
