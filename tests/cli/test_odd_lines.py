@@ -107,6 +107,17 @@ def test_names_for_several_distances_that_are_none(folder, capsys, monkeypatch, 
     assert sorted(folder.iterdir()) == before
 
 
+def test_distances_that_nearly_agree_get_files_of_their_own(folder, monkeypatch):
+    """One would be written over the other, without a word."""
+    monkeypatch.chdir(folder)
+    distances = ["0.1234567", "0.1234568", "0.2"]
+    assert main(["offset", "ball.stl", *distances, "--resolution", "8", "--quiet", "-o", "near.stl"]) == 0
+    written = sorted(folder.glob("near*"))
+    assert [path.name for path in written] == [f"near_+{distance}.stl" for distance in distances]
+    for path in written:
+        path.unlink()
+
+
 @pytest.mark.parametrize("odd", ["", "fish", "--", "bash zsh", "٣", "\0", "bash\n"])
 def test_odd_shells(folder, capsys, odd):
     assert ended(folder, capsys, "completion", {}, odd) == 2

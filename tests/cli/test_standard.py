@@ -65,4 +65,6 @@ def test_what_goes_wrong_names_standard_input(tmp_path):
     assert done.returncode == 1 and b"standard input" in done.stderr
     samples.sphere(1).save(tmp_path / "ball.ply")
     done = run("offset", str(tmp_path / "ball.ply"), "0.1", "0.2", "-o", "-", "--resolution", "16")
-    assert done.returncode == 1 and b"several files" in done.stderr and done.stdout == b""
+    assert done.returncode == 2 and b"one surface" in done.stderr and done.stdout == b""
+    done = run("offset", str(tmp_path / "ball.ply"), "0.1", "-o", "-", "--format", "txt")
+    assert done.returncode == 1 and done.stderr.startswith(b"signedheat: standard output: ") and done.stdout == b""

@@ -17,6 +17,7 @@ from ..extensions.solid_distance import solid_distance
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..io.bands import BAND_FORMATS
+from ..io.files import told_apart
 from ..io.shapes import read, save
 from ..lowering.area_elements import bounds_around
 from ..solver import as_list
@@ -157,9 +158,9 @@ class BatchJob:
         if self.volume is not None:
             phi.save(f"{stem}{self.volume}")
         surfaces = []
-        for distance in self.offsets:
+        for distance, name in zip(self.offsets, told_apart(self.offsets), strict=True):
             surface = cast("GridField[Literal[3]] | BandField", phi).offset(distance)
-            save(surface, f"{stem}_{distance:+g}{self.surfaces}")
+            save(surface, f"{stem}_{name}{self.surfaces}")
             surfaces.append({"distance": distance, "vertices": surface.n_vertices, "faces": surface.n_faces})
         if surfaces:
             figures["surfaces"] = surfaces

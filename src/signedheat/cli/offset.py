@@ -10,7 +10,7 @@ from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..io import POLYLINE_FORMATS, SHAPE_FORMATS, ensure_writable, save, write_polylines
 from ..io.fields import CONFIDENCE
-from ..io.files import extension
+from ..io.files import extension, told_apart
 from ..io.labels import LabelImage
 from ..io.surface_fields import VALUE_FORMATS, save_with_values
 from ..visualization import ensure_picture_writable, save_slices
@@ -82,4 +82,4 @@ def output_names(output: str, distances: list[float]) -> list[str]:
     path = Path(output)
     if len(distances) == 1 or not path.name:  # a name that is none is refused as it is
         return [output]
-    return [str(path.with_name(f"{path.stem}_{distance:+g}{path.suffix}")) for distance in distances]
+    return [str(path.with_name(f"{path.stem}_{number}{path.suffix}")) for number in told_apart(distances)]

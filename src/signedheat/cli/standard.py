@@ -76,7 +76,7 @@ def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
                 setattr(arguments, name, str(path))
         target = Path(folder) / f"output.{arguments.format}" if output else None
         if target is not None:
-            arguments.output = str(target)
+            arguments.output, names[str(target)] = str(target), "standard output"
         try:
             yield StandardFiles(output, names)
         except SignedHeatError as error:

@@ -11,7 +11,7 @@ import os
 import secrets
 import stat
 import warnings
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, suppress
 from io import StringIO
 from pathlib import Path
@@ -35,6 +35,21 @@ READERS = f"{__package__}.", f"{PACKAGE}parallel", f"{PACKAGE}packages"
 def extension(path: PathLike) -> str:
     """The extension of a file name in lower case, with the dot: ``".stl"``."""
     return Path(path).suffix.lower()
+
+
+def told_apart(numbers: Sequence[float]) -> list[str]:
+    """Numbers with their signs, for names of files: in six digits, or in as many as tell them apart.
+
+    Examples
+    --------
+    >>> told_apart([0.1, -2.0]), told_apart([0.12345678, 0.12345679])
+    (['+0.1', '-2'], ['+0.12345678', '+0.12345679'])
+    """
+    for digits in range(6, 18):
+        names = [f"{number:+.{digits}g}" for number in numbers]
+        if len(set(names)) >= len(set(numbers)):
+            break
+    return names
 
 
 def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> FileFormatError:

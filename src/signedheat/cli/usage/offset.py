@@ -51,6 +51,8 @@ def add_to(commands: Any) -> None:
 def check_offset_options(arguments: Namespace) -> None:
     """Reject options that contradict each other, and distances beyond a band."""
     check_grid_options(arguments)
+    if arguments.output == "-" and len(arguments.distances) > 1:
+        arguments.parser.error("standard output takes one surface: name a file, or give one distance")
     reach = max(abs(distance) for distance in arguments.distances)
     if arguments.band is not None and reach > arguments.band:
         arguments.parser.error(f"the band reaches to {arguments.band:g}, and the distances to {reach:g}")
