@@ -27,6 +27,10 @@ UNLOADED, IMPORTED, LOADED = 130_000_000, 65_000_000, 20_000_000
 Numba, which takes as much again when it is first used; and after the first use of a kernel."""
 
 
+MAPPED = {"VmSize": 600_000_000, "VmData": 80_000_000}
+"""Bytes that libraries still map besides, and hardly touch: they count where a process's own limits do."""
+
+
 def libraries() -> int:
     """What libraries still take: most of it is the compiler, which the first kernel loads."""
     if "signedheat.kernel_compiler" in sys.modules:
@@ -143,7 +147,12 @@ def _own_limits() -> list[int]:
     held = _fields("/proc/self/status")
     kinds = {"VmSize": resource.RLIMIT_AS, "VmData": resource.RLIMIT_DATA}
     limits = {name: resource.getrlimit(kind)[0] for name, kind in kinds.items() if name in held}
-    return [limit - 1024 * held[name] for name, limit in limits.items() if limit != resource.RLIM_INFINITY]
+    share = libraries() / UNLOADED
+    return [
+        limit - 1024 * held[name] - int(share * MAPPED[name])
+        for name, limit in limits.items()
+        if limit != resource.RLIM_INFINITY
+    ]
 
 
 def _text(path: Path | str) -> str:

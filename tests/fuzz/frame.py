@@ -62,7 +62,7 @@ from signedheat import SignedHeatError
 
 LIMIT = 30.0
 """Seconds that a case may take, of a processor; beside other work it may take longer."""
-PATIENCE = 4
+PATIENCE = 20
 """Times the limit that a case may take on the clock: a case that waits for ever uses no processor."""
 MEMORY = 1 << 30
 """Bytes by which a case may let its worker grow, unless the family says otherwise."""

@@ -21,7 +21,7 @@ EXPECTED = {
 
 @pytest.fixture(scope="module")
 def tally():
-    return run([f"frame {name}" for name in EXPECTED], cases=2, limit=0.5)
+    return run([f"frame {name}" for name in EXPECTED], cases=2, limit=0.2)
 
 
 @pytest.mark.parametrize("name", EXPECTED)

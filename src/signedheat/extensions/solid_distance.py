@@ -231,7 +231,8 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
-    refuse_beyond_memory(grid, bytes_per_node(shape, steps, closed=True), bytes_of_faces(shape))
+    least, most = (bytes_per_node(shape, steps, closed) for closed in (True, False))
+    refuse_beyond_memory(grid, least, bytes_of_faces(shape), at_most=most)
     with stopwatch("orient"):
         merged, closed = _oriented(shape, steps, notes) if steps.orient else (merge_duplicates(shape), False)
     overlaps = overlaps_of(merged, grid, steps.finest) if steps.unite else None

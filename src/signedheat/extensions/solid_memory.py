@@ -10,7 +10,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from .joining import Shape
 from .steps import Steps
 
-BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 54, 42, 29
+BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 54, 45, 29
 """Measured peak memory: of shapes with holes or overlaps; of φ alone; of shapes whose parts are closed."""
 BYTES_IF_SCATTERED, BYTES_IF_POINTS = 62, 46
 """The same of noisy soups, whose faces lie in layers, and of points."""

@@ -31,6 +31,8 @@ MOST_PER_NODE = 22
 """What surface adds for each node where it is everywhere."""
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
+ROOM = 1.08
+"""By how much the spacing that is told to fit is larger than it must be: what is free changes from run to run."""
 
 
 def memory_estimate(grid: Grid, per_node: float | None = None, beside: float = 0.0) -> int:
@@ -62,16 +64,23 @@ def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> 
     return min(round(BYTES_PER_AREA * cells, 1), MOST_PER_NODE * n_nodes)
 
 
-def refuse_beyond_memory(grid: Grid, per_node: float | None = None, beside: float = 0.0, area: float = 0.0) -> None:
+def refuse_beyond_memory(
+    grid: Grid,
+    per_node: float | None = None,
+    beside: float = 0.0,
+    area: float = 0.0,
+    at_most: float | None = None,
+) -> None:
     """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing.
 
-    Of φ alone, more is known when the area of the surface is.
+    Of φ alone, more is known when the area of the surface is. The spacing that is told has room for `at_most` bytes for
+    each node, where it may turn out that so many are needed.
     """
     available, needed = available_memory(), memory_estimate(grid, per_node, beside)
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    fitting = fitting_spacing(grid, available, per_node, beside, area)
+    fitting = ROOM * fitting_spacing(grid, available, at_most or per_node, beside, area)
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     raise MemoryLimitError(
         f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
