@@ -231,8 +231,8 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
-    least, most = (bytes_per_node(shape, steps, closed) for closed in (True, False))
-    refuse_beyond_memory(grid, least, bytes_of_faces(shape), at_most=most)
+    rates = [bytes_per_node(shape, steps, closed) for closed in (True, False)]
+    refuse_beyond_memory(grid, rates[0], bytes_of_faces(shape), at_most=rates[1])
     with stopwatch("orient"):
         merged, closed = _oriented(shape, steps, notes) if steps.orient else (merge_duplicates(shape), False)
     overlaps = overlaps_of(merged, grid, steps.finest) if steps.unite else None
@@ -396,6 +396,5 @@ def _united(
     united = without_covered(merged, winding, grid) if overlaps is None else exactly_without_covered(overlaps)
     if united.left_out.merged_faces or united.left_out.covered_faces:
         notes.append(united.left_out)
-    if united.shape is merged.shape:
-        return merged, samples, winding
-    return merged.without(united), *wound(united.shape, grid)
+    is_same = united.shape is merged.shape
+    return (merged, samples, winding) if is_same else (merged.without(united), *wound(united.shape, grid))
