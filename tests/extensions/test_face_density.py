@@ -58,10 +58,22 @@ def cover(thickness, hole):
 
 
 @pytest.mark.parametrize(("thickness", "hole"), [(0.015, 0.9), (0.03, 0.8)])
-def test_walls_thinner_than_cells_lack_nothing_and_enclose_nothing(thickness, hole):
+def test_walls_thinner_than_cells_enclose_nothing(thickness, hole):
     """Winding numbers rise across them as little as if most of the faces were gone."""
     shape = cover(thickness, hole)
     assert density(shape) == 1.0
     field = sh.solid_distance(shape, resolution=48)
     deep = np.linalg.norm(field.grid.points, axis=-1) < 0.85
     assert (field.values[deep] < 0).mean() < 0.002
+
+
+def test_walls_of_most_of_a_cell_are_found():
+    """Those of a hollow ball that is not closed for want of one face."""
+    ball = samples.sphere(4)
+    inside = sh.TriangleMesh(0.94 * ball.vertices, ball.faces[1:, ::-1])
+    field = sh.solid_distance(samples.union(ball, inside), resolution=40)
+    radius = np.linalg.norm(field.grid.points, axis=-1)
+    within = np.abs(radius - 0.97) < 0.01
+    assert within.any()
+    assert (field.values[within] < 0).mean() > 0.95
+    assert (field.values[radius < 0.9] > 0).all()

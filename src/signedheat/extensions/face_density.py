@@ -22,8 +22,11 @@ SPARSE, WHOLE = 0.5, 0.8
 THIN = 0.65
 """What winding numbers rise by at the least of `REACHES` across whole walls that are gone at the most of them."""
 OPPOSED = (0.12, 0.25)
-"""Shares of the area with as much that faces the other way beside it, up to which densities are believed, and from
-which on they are not: across walls thinner than cells winding numbers rise as little as where faces are missing."""
+"""Shares of the area with as much that faces the other way beside it, up to which any density is believed, and from
+which on those of `WALLS` are."""
+WALLS = (0.25, 0.35)
+"""Winding numbers rise across walls thinner than cells as little as where faces are missing. Divided by the upper of
+these densities they find walls of most of a cell; by less than the lower they would fill what thinner walls enclose."""
 BLOCK = 2.0
 """Cells along the blocks that are searched for it."""
 LEAST = 0.05
@@ -71,8 +74,10 @@ def face_density(winding: NDArray[np.float64], positions: NDArray[np.float64], v
     close, far = (_quantile(rises[k], areas, 0.5) for k in (0, -1))
     thick = min(max(far / close, 0.0), 1.0) if close > 0 else 0.0
     share = _quantile(rise, areas, 0.5) / (THIN + (1.0 - THIN) * thick)
-    disbelief = max(_ramp(share, SPARSE, WHOLE), _ramp(opposed_share(positions, vectors), *OPPOSED))
-    return min(max(share + (1.0 - share) * disbelief, LEAST), 1.0)
+    believed = share + (1.0 - share) * _ramp(share, SPARSE, WHOLE)
+    opposed = _ramp(opposed_share(positions, vectors), *OPPOSED)
+    believed += (1.0 - believed) * opposed * (1.0 - _ramp(share, *WALLS))
+    return min(max(believed, LEAST), 1.0)
 
 
 def opposed_share(positions: NDArray[np.float64], vectors: NDArray[np.float64]) -> float:
