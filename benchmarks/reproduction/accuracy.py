@@ -167,7 +167,8 @@ def convergence(page: Page) -> None:
     longer t smooths the source, an error of the size √t. The default, `Extrapolated`, combines three t so that both
     cancel, on fine meshes longer ones, without which ε ceases to fall at about 40,000 vertices. "default" is
     `SignedHeatSolver(mesh).distance(curves)`, "one time" `SignedHeatSolver(mesh, 1.0)`, which is the paper's; "falls":
-    on how many ε falls at every level.
+    on how many ε falls at every level. The default's exception is one surface whose coarsest mesh of 160 vertices it
+    refines, as 2 % of the area has large angles, and the next not: 1.255 and 1.262, against 1.535 and 1.262 unrefined.
     """
     ways: dict[str, Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]] = {
         "default": lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),

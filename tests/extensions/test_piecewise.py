@@ -404,3 +404,23 @@ def test_a_cut_spread_over_many_edges_is_no_continuity(n_around):
     mesh = torus(n_around=n_around, n_across=24)
     phi = sh.piecewise_distance(mesh, mesh.path(range(24), closed=True))
     assert len(phi.cut) == 1 and phi.diagnostics.note(Jumps).gap < 0.01
+
+
+def test_triangles_on_which_slopes_mean_nothing_are_told():
+    """A cylinder as programs for construction make it: two triangles from end to end for every side, fans as caps."""
+    n, height = 96, 6.0
+    angle = 2 * np.pi * np.arange(n) / n
+    points = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    i, caps = np.arange(n), np.stack([np.zeros(n - 2, int), np.arange(1, n - 1), np.arange(2, n)], axis=1)
+    j = np.roll(i, -1)
+    sides = [np.stack([i, j, n + j], axis=1), np.stack([i, n + j, n + i], axis=1)]
+    mesh = sh.TriangleMesh(
+        np.concatenate([points, points + np.array([0, 0, height])]), np.concatenate([*sides, caps[:, ::-1], caps + n])
+    )
+    section = mesh.level_set(mesh.vertices @ [0.3, 0, 1], 0.45 * height)
+    with pytest.warns(sh.InexactWarning):
+        rough = sh.piecewise_distance(mesh, section)
+    fine = sh.piecewise_distance(sh.intrinsic_delaunay(mesh, refine=True), section)
+    errors = [phi.diagnostics.note(Jumps).integration_error for phi in (rough, fine)]
+    assert errors[0] > 1 and errors[1] < 0.1
+    assert fine.diagnostics.note(Jumps).continuous

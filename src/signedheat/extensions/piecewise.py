@@ -22,7 +22,7 @@ from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
-from ..errors import SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
+from ..errors import InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..fields.piecewise_field import FAR, PiecewiseField, typical_size
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.face_pairs import FacePairs, face_pairs
@@ -39,6 +39,9 @@ from ..progress import Progress, Stopwatch
 from ..solver import as_list
 from .intrinsic_piecewise import IntrinsicPiecewiseField
 from .jump_solvers import JumpProblem, JumpSolution, minimize_exactly, minimize_fast
+
+ROUGH = 1.0
+"""Integration error, as large as slopes themselves, from which there is a warning."""
 
 SOURCE_WEIGHT = 100.0
 """Factor by which a cut along or across the source is more expensive than elsewhere."""
@@ -88,7 +91,8 @@ def piecewise_distance(
     -------
     PiecewiseField
         Its median over the source is zero. ``diagnostics.note(Jumps)`` has the objective with a lower bound of it, and
-        the size of the jumps: see `diagnostics.Jumps`.
+        the size of the jumps: see `diagnostics.Jumps`. If the triangles are so large or thin that φ has hardly the
+        slope that it should, there is an `InexactWarning`.
 
     Raises
     ------
@@ -159,6 +163,12 @@ def piecewise_distance(
     unreached = np.flatnonzero(np.isnan(phi.values[:, 0]))
     if len(unreached):
         warn_user(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning)
+    if error > ROUGH:
+        warn_user(
+            f"slopes of φ are off by {error:.3g} on average: on triangles so large or thin neither they nor cuts mean "
+            "anything. Pass intrinsic_delaunay(mesh, refine=True) as the domain",
+            InexactWarning,
+        )
     notes = (jumps_of(phi, solution, error), *discretization.notes)
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
