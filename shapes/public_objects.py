@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -72,6 +73,13 @@ def curve_on(surface: sh.PolygonMesh | sh.PointCloud | sh.DigitalSurface) -> sh.
     return surface.path([0, 1])
 
 
+def banded() -> sh.BandField:
+    """A band after use: its trees are there."""
+    band = sh.solid_distance(samples.without_patches(samples.sphere(2), 2, 0.2), resolution=24, band=0.3)
+    assert band.offset(0.1).n_faces and band.closest_points([[1.2, 0.0, 0.0]]).distances.shape == (1,)
+    return band
+
+
 SOLVERS: dict[str, Callable[[], sh.SignedHeatSolver]] = {
     "triangles": lambda: used(triangles(), RING),
     "intrinsic": lambda: used(triangles(), RING, intrinsic=True),
@@ -117,6 +125,15 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "solid": lambda: sh.solid_distance(BALL, resolution=16),
     "piecewise field": lambda: sh.piecewise_distance(BALL, BALL.path([0, 5])),
     "orientation": lambda: sh.orientation(BALL),
+    "band": lambda: banded(),
+    "samples": lambda: sh.sample(sh.solid_distance(BALL, resolution=16), 20),
+    "curve orientation": lambda: sh.curve_orientation(RING, BALL),
+    "labels": lambda: sh.LabelImage(np.arange(8).reshape(2, 2, 2), np.eye(3), np.zeros(3)),
+    "sampling": lambda: sh.Sampling(n=10),
+    "batch job": lambda: sh.BatchJob(offsets=(0.1,), constraint=sh.Soft(2.0)),
+    "outcome": lambda: sh.Outcome("a", "a.stl", "done", 1.0, outputs=("a.npz",), figures={"faces": 3}),
+    "batch": lambda: sh.Batch((sh.Outcome("a", "a.stl", "failed", 1.0),), Path("manifest.jsonl")),
+    "extrapolated": sh.Extrapolated,
     "free": sh.Free,
     "zero set": lambda: sh.ZeroSet(hard=True),
     "each component": sh.EachComponent,

@@ -42,6 +42,12 @@ def arrays(thing, path="", seen=None):
     return found
 
 
+def test_no_public_class_is_left_out():
+    public = {getattr(sh, name) for name in sh.__all__}
+    classes = {thing for thing in public if isinstance(thing, type) and not issubclass(thing, BaseException)}
+    assert classes == {type(make()) for make in [*OBJECTS.values(), *SOLVERS.values()]} & public
+
+
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", OBJECTS)
 def test_copies_hold_the_same_and_stay_frozen(name, way):
@@ -63,6 +69,27 @@ def test_shapes_cannot_be_written_after_unpickling(name):
     for array in frozen:
         with pytest.raises(ValueError, match="read-only"):
             array.flat[0] = 0
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_public_objects_are_frozen(name):
+    thing = OBJECTS[name]()
+    for entry in dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ():
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(thing, entry.name, getattr(thing, entry.name))
+    with pytest.raises(AttributeError):
+        thing.of_no_meaning = 1
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_copies_of_used_fields_answer_the_same(way):
+    band, field = OBJECTS["band"](), OBJECTS["solid"]()
+    places = [[1.2, 0.1, 0.0], [0.0, 0.5, 0.6]]
+    for thing in (band, field):
+        twin = WAYS[way](thing)
+        np.testing.assert_array_equal(twin(places), thing(places))
+        np.testing.assert_array_equal(twin.offset(0.1).vertices, thing.offset(0.1).vertices)
+        np.testing.assert_array_equal(twin.closest_points(places).points, thing.closest_points(places).points)
 
 
 @pytest.mark.parametrize("way", WAYS)
