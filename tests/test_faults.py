@@ -164,6 +164,22 @@ sys.exit(main(["info", "ball.stl"]))
     assert {p.name for p in (tmp_path / "run").iterdir()} == {"ball.stl", "phi.npz"}
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_python_runs_text(tmp_path, number):
+    """As where classes are made and kernels compiled: the status is that of the signal all the same."""
+    code = f"""
+import os, sys
+from signedheat.cli import main, info
+def halfway(path):
+    exec("os.kill(os.getpid(), {int(number)})\\nimport time; time.sleep(5)", globals())
+info.read = halfway
+sys.exit(main(["info", "ball.stl"]))
+"""
+    (ready(tmp_path / "run") / "own.py").write_text(code)
+    done = subprocess.run([sys.executable, "-m", "own"], cwd=tmp_path / "run", capture_output=True, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (128 + number, 1), done.stderr
+
+
 @pytest.mark.parametrize(
     "variables",
     [

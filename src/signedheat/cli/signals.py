@@ -13,8 +13,12 @@ APART = 1.0
 """Seconds within which a further signal is taken for the same one."""
 
 
+class Stopped(KeyboardInterrupt):
+    """What signals raise: where Python runs text, it notes `KeyboardInterrupt` itself, and ends by SIGINT later."""
+
+
 class Signals:
-    """While this is entered, signals raise `KeyboardInterrupt`, and `caught` is the number of the last one.
+    """While this is entered, signals raise `Stopped`, and `caught` is the number of the last one.
 
     Signals that are ignored, as under ``nohup``, or that somebody else handles, are left alone; so are all where this
     is not entered by the main thread.
@@ -41,4 +45,4 @@ class Signals:
         if self.caught is not None and now - self._last < APART:
             return
         self.caught, self._last = number, now
-        raise KeyboardInterrupt
+        raise Stopped
