@@ -34,7 +34,7 @@ FAR = 1.5
 """Cells from any face beyond which a zero set stands in for missing surface."""
 RATIO = 4
 """Spacing of the coarse grid over that of the band, where nothing speaks against it."""
-STEEPEST = 8
+STEEPEST = 16
 """The same from which on another band is computed between them: near the ends of the surface fine nodes within some
 coarse cells are solved for, whose number grows with its square."""
 FEWEST, MOST = 64, 257
