@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from io import BytesIO
 from pathlib import Path
+from textwrap import wrap
 
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
@@ -45,9 +46,11 @@ def draw(path: Path) -> None:
     level = [len(FLOORS) - 1 - k for k in range(len(FLOORS))]
     for (names, what, color), y in zip(FLOORS, level, strict=True):
         axes.add_patch(_box(0.75, y + 0.06, 7.1, 0.86, color))
-        size = min(11.5, 750 / len(names))  # that it fits into the box
-        axes.text(0.95, y + 0.62, names, family="monospace", size=size, weight="bold", va="center")
-        axes.text(0.95, y + 0.28, what, size=9.5, va="center", color="#333333")
+        lines = wrap(names, 95, replace_whitespace=False) if len(names) > 95 else [names]
+        size = min(11.5, 750 / max(len(line) for line in lines))  # that it fits into the box
+        text = {"family": "monospace", "size": size, "weight": "bold", "va": "center"}
+        axes.text(0.95, y + 0.62, "\n".join(lines), linespacing=1.1, **text)
+        axes.text(0.95, y + 0.28 - 0.09 * (len(lines) - 1), what, size=9.5, va="center", color="#333333")
     axes.annotate("", (0.4, 0.1), (0.4, len(FLOORS) - 0.1), arrowprops={"arrowstyle": "-|>", "lw": 1.8})
     axes.text(0.16, len(FLOORS) / 2, "imports point down", rotation=90, va="center", ha="center", size=10)
     axes.text(9.4, len(FLOORS) + 0.2, "the way of the data", ha="center", size=10)
