@@ -37,7 +37,6 @@ USES = {
 FILES = {
     "ball.glb": "trimesh",
     "ball.gltf": "trimesh",
-    "ball.msh": "meshio",
     "ball.mesh": "meshio",
     "ball.vtk": "meshio",
 }

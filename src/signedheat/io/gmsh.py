@@ -231,9 +231,10 @@ def _values(
         name = lists[0][0].strip().strip(b'"').decode("utf-8", errors="replace")
         if name in names and width == 1:  # others are vectors
             at, values = _numbers(rest, order).rows(count, ["i4", "f8"])
-            found = np.full(len(tags), np.nan)
-            found[_rows_of(at, tags)] = values
-            if np.isnan(found).any():
+            points = _rows_of(at, tags)
+            if len(np.unique(points)) < len(tags):
                 raise ValueError(f"{count} of {len(tags)} points have values")
+            found = np.empty(len(tags))
+            found[points] = values
             yield name, found
         start = data.find(b"$NodeData", start + 1)
