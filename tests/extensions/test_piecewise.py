@@ -55,7 +55,10 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_fast_is_as_good_as_exact(case):
     mesh, curve = CASES[case]()
-    fast, exact = (sh.piecewise_distance(mesh, curve, exact=e).diagnostics.note(Jumps) for e in (False, True))
+    fast, exact = (
+        sh.piecewise_distance(mesh, curve, exact=e, slack=0, intrinsic=False).diagnostics.note(Jumps)
+        for e in (False, True)
+    )
     assert exact.gap < 1e-6
     assert exact.objective * (1 - 1e-6) <= fast.objective <= 1.005 * exact.objective
     assert fast.bound <= exact.objective * (1 + 1e-6)
@@ -419,8 +422,111 @@ def test_triangles_on_which_slopes_mean_nothing_are_told():
     )
     section = mesh.level_set(mesh.vertices @ [0.3, 0, 1], 0.45 * height)
     with pytest.warns(sh.InexactWarning):
-        rough = sh.piecewise_distance(mesh, section)
-    fine = sh.piecewise_distance(sh.intrinsic_delaunay(mesh, refine=True), section)
+        rough = sh.piecewise_distance(mesh, section, intrinsic=False)
+    fine = sh.piecewise_distance(mesh, section)
     errors = [phi.diagnostics.note(Jumps).integration_error for phi in (rough, fine)]
     assert errors[0] > 1 and errors[1] < 0.1
     assert fine.diagnostics.note(Jumps).continuous
+
+
+def cylinder(n: int = 64, m: int = 32, height: float = 2.0) -> sh.TriangleMesh:
+    """An open cylinder of radius one round the z axis; vertex (i, j) is number i m + j."""
+    angle, z = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(0, height, m), indexing="ij")
+    points = np.stack([np.cos(angle), np.sin(angle), z], axis=-1).reshape(-1, 3)
+    ids = np.arange(n * m).reshape(n, m)
+    following = np.roll(ids, -1, axis=0)
+    a, b, c, d = ids[:, :-1], following[:, :-1], following[:, 1:], ids[:, 1:]
+    return sh.TriangleMesh(
+        points, np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
+    )
+
+
+def test_line_along_a_cylinder_is_distance_on_the_strip_cut_open():
+    """φ is the way round, with one straight cut from rim to rim, at which it falls by all of the way round."""
+    mesh = cylinder()
+    phi = sh.piecewise_distance(mesh, mesh.path(range(32)))
+    (cut,) = phi.cut
+    around = 64 * 2 * np.sin(np.pi / 64)
+    assert cut.length == pytest.approx(2.0)
+    assert np.allclose(cut.jumps, around, rtol=0.01)
+    assert np.ptp(phi.values, axis=None) == pytest.approx(around, rel=0.01)
+    assert phi.diagnostics.note(Jumps).integration_error < 0.002  # .017 where jumps stay spread
+
+
+def bumpy_halves() -> tuple[sh.TriangleMesh, list[sh.Curve]]:
+    rng = np.random.default_rng(5)
+    ball = shaken(sphere(4), 0.004)
+    waves = np.cos(ball.vertices @ rng.normal(scale=2.0, size=(3, 5)) + rng.uniform(0, 6, 5)).sum(axis=1)
+    mesh = sh.TriangleMesh(ball.vertices * (1 + 0.08 * waves[:, None]), ball.faces)
+    whole = max(mesh.level_set(mesh.vertices @ rng.normal(size=3), 0.0), key=lambda curve: curve.n_points)
+    half = whole.n_points // 2
+    parts = [sh.Curve(whole.faces[s], whole.barycentric[s]) for s in (slice(half), slice(half, None))]
+    return mesh, [parts[0], parts[1].reversed()]
+
+
+def figure_eight_bottle(n: int = 60, m: int = 32) -> tuple[sh.TriangleMesh, sh.Curve]:
+    """A Klein bottle: a figure of eight, turned by half while it goes round; the source goes once round the eight."""
+    u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, 2 * np.pi * np.arange(m) / m, indexing="ij")
+    out, up = np.sin(v), np.sin(2 * v)
+    ring, z = 3 + np.cos(u / 2) * out - np.sin(u / 2) * up, np.sin(u / 2) * out + np.cos(u / 2) * up
+    points = np.stack([ring * np.cos(u), ring * np.sin(u), z], axis=-1).reshape(-1, 3)
+    ids = np.arange(n * m).reshape(n, m)
+    following = np.vstack([ids[1:], ids[:1, -np.arange(m) % m]])
+    a, b, c, d = ids, following, np.roll(following, -1, axis=1), np.roll(ids, -1, axis=1)
+    faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
+    mesh = sh.TriangleMesh(points, faces)
+    return mesh, mesh.path(ids[0], closed=True)
+
+
+GATHERED = {
+    "halves": (bumpy_halves, 0.8),
+    "open arc": (CASES["open arc"], 0.85),
+    "Klein bottle": (figure_eight_bottle, 0.8),
+}
+
+
+@pytest.mark.parametrize("case", GATHERED)
+def test_gathered_jumps_leave_less_error_of_slopes(case):
+    build, share = GATHERED[case]
+    mesh, curves = build()
+    spread, gathered = (
+        sh.piecewise_distance(mesh, curves, intrinsic=False, slack=s).diagnostics.note(Jumps) for s in (0, 0.1)
+    )
+    assert spread.objective == spread.least == gathered.least
+    assert gathered.least < gathered.objective <= 1.1 * gathered.least
+    assert gathered.integration_error < share * spread.integration_error
+
+
+def test_slack_is_never_exceeded():
+    mesh, curve = figure_eight_bottle()
+    notes = [sh.piecewise_distance(mesh, curve, slack=s).diagnostics.note(Jumps) for s in (0.01, 0.1)]
+    assert notes[0].objective <= 1.01 * notes[0].least
+    assert notes[1].objective > 1.01 * notes[1].least
+
+
+def sheared(mesh: sh.TriangleMesh) -> sh.TriangleMesh:
+    """The same torus, its vertices moved along it, further on the inside than on the outside: triangles lean."""
+    x, y, z = mesh.vertices.T
+    ring = np.hypot(x, y)
+    angle = np.arctan2(y, x) + 0.25 * np.sin(np.arctan2(z, ring - 1) + 0.5)
+    points = np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1)
+    return sh.TriangleMesh(points, mesh.faces)
+
+
+def test_bad_triangles_are_retriangulated():
+    mesh = sheared(torus(n_around=48, n_across=16))
+    loop = mesh.level_set(mesh.vertices[:, 0] + 0.1 * mesh.vertices[:, 2], 0.1)[0]  # one of the two
+    phi, rough = (sh.piecewise_distance(mesh, loop, intrinsic=i) for i in ("auto", False))
+    assert isinstance(phi.domain, sh.IntrinsicTriangulation)
+    assert not isinstance(rough.domain, sh.IntrinsicTriangulation)
+    errors = [field.diagnostics.note(Jumps).integration_error for field in (phi, rough)]
+    assert errors[0] < 0.7 * errors[1]
+    assert len(phi.cut) == 1
+    assert phi.cut[0].length == pytest.approx(2 * np.pi * 0.4, rel=0.1)
+
+
+@pytest.mark.parametrize("slack", [-0.1, np.nan, "much"])
+def test_bad_slack(slack):
+    mesh = sphere(1)
+    with refused(sh.SignedHeatError, "slack"):
+        sh.piecewise_distance(mesh, mesh.path([0, mesh.faces[0, 1]]), slack=slack)

@@ -174,8 +174,12 @@ class Jumps(Note):
 
     Attributes
     ----------
-    objective, bound, gap : float
-        The objective of Eq. 16, a lower bound of it, and the relative difference of the two.
+    objective : float
+        The objective of Eq. 16.
+    least : float
+        The least that was found, before jumps were concentrated: `objective` itself where they were not.
+    bound, gap : float
+        A lower bound of the objective, and the relative difference of `least` and it.
     rounds : int
         Number of iterations.
     continuous : bool
@@ -187,6 +191,7 @@ class Jumps(Note):
     """
 
     objective: float
+    least: float
     bound: float
     gap: float
     rounds: int
@@ -197,4 +202,5 @@ class Jumps(Note):
 
     def __str__(self) -> str:
         cut = "continuous" if self.continuous else f"cuts of length {self.cut_length:.3g}"
-        return f"{cut}; within {self.gap:.2%} of the least objective"
+        given = f"{self.objective / self.least - 1:.2%} above it" if self.objective > self.least > 0 else "reached"
+        return f"{cut}; least objective found within {self.gap:.2%}, {given}"

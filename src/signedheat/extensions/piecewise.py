@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..diagnostics import Diagnostics, Jumps
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
@@ -21,24 +21,24 @@ from ..domains.foreign import ForeignShape, converted
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import positive_number
-from ..errors import InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
-from ..fields.piecewise_field import FAR, PiecewiseField, typical_size
+from ..domains.validation import finite_number, positive_number
+from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
+from ..fields.piecewise_field import PiecewiseField, typical_size
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in
-from ..linear import factorize
 from ..lowering.surface.discretization import SurfaceDiscretization, lowered_mesh
-from ..lowering.surface.intrinsic import lowered
+from ..lowering.surface.intrinsic import ANGLE, COARSEST, is_spoiled, lowered
 from ..lowering.surface.polygons import lowered_polygons
 from ..memory import refuse_beyond_memory
 from ..method import diffuse, normalize
-from ..operators.cotan import cotan_matrix
 from ..progress import Progress, Stopwatch
 from ..solver import as_list
 from .intrinsic_piecewise import IntrinsicPiecewiseField
+from .jump_concentration import concentrated, fewest_lines
 from .jump_solvers import JumpProblem, JumpSolution, minimize_exactly, minimize_fast
+from .piecewise_slopes import integration_error, is_continuous, smoothed
 
 ROUGH = 1.0
 """Integration error, as large as slopes themselves, from which there is a warning."""
@@ -55,6 +55,8 @@ def piecewise_distance(
     *,
     diffusion: float = 1.0,
     exact: bool = False,
+    slack: float = 0.1,
+    intrinsic: bool | Literal["auto"] = "auto",
     smoothing: float | None = None,
     progress: Progress | None = None,
 ) -> PiecewiseField:
@@ -63,10 +65,11 @@ def piecewise_distance(
     Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
     triangle is the diffused, normalised source normal Y; κ_e is the difference between the components of Y along e in
     the two faces at e (Eq. 15, Eq. 16). Edges at the source have 100 times the weight, so that the cut avoids the
-    source wherever possible. For curves that bound a region the field has no cut, and differs from that of
-    `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean square, λ the least positive
-    eigenvalue of the Laplacian. Surfaces may have any topology, orientable or not; curves whose parts have opposite
-    orientations get a cut that joins the points at which the orientation changes.
+    source wherever possible. Then jumps that are spread over an area are gathered on few lines, which raises the
+    objective by some per cent, if this lowers ``integration_error``. For curves that bound a region the field has no
+    cut, and differs from that of `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean
+    square, λ the least positive eigenvalue of the Laplacian. Surfaces may have any topology, orientable or not; curves
+    whose parts have opposite orientations get a cut that joins the points at which the orientation changes.
 
     Parameters
     ----------
@@ -80,7 +83,12 @@ def piecewise_distance(
     exact : bool
         Solve the linear program exactly, in roughly quadratic time (20 thousand faces: seconds); otherwise stop when
         the objective is certified to be within 0.2 % of the optimum (300 thousand faces: minutes), or within 15 % if φ
-        has no cut: what is left are jumps smaller than the triangles.
+        has no cut: what is left are jumps smaller than the triangles. Jumps of the exact solution are not gathered.
+    slack : float
+        Rise of the objective, relative to the least, that is allowed for gathering jumps; 0 leaves them as Eq. 16 does.
+    intrinsic : "auto", True or False
+        As for `SignedHeatSolver`: "auto" refines a triangle mesh intrinsically where large angles or needles would
+        spoil directions. The domain of the field is then the refinement.
     smoothing : float, optional
         Smooth jumps that are not part of the cut by heat flow of this width, in mean edge lengths (Fig. 12). The
         gradient is then only approximately Y.
@@ -90,9 +98,9 @@ def piecewise_distance(
     Returns
     -------
     PiecewiseField
-        Its median over the source is zero. ``diagnostics.note(Jumps)`` has the objective with a lower bound of it, and
-        the size of the jumps: see `diagnostics.Jumps`. If the triangles are so large or thin that φ has hardly the
-        slope that it should, there is an `InexactWarning`.
+        Its median over the source is zero. ``diagnostics.note(Jumps)`` has the objective, the least one with a lower
+        bound of it, and the size of the jumps: see `diagnostics.Jumps`. If the triangles are so large or thin that φ
+        has hardly the slope that it should, there is an `InexactWarning`.
 
     Raises
     ------
@@ -103,7 +111,7 @@ def piecewise_distance(
     MemoryLimitError
         If the field does not fit into memory; nothing has been allocated then.
     ValueError
-        If `diffusion` or `smoothing` is not positive and finite.
+        If `diffusion` or `smoothing` is not positive and finite, or `slack` negative.
 
     Examples
     --------
@@ -127,14 +135,10 @@ def piecewise_distance(
         smoothing = positive_number(smoothing, "smoothing")
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(sources)
     stopwatch = Stopwatch(progress, steps=4)
+    slack = finite_number(slack, "slack", least=0)
     with stopwatch("prepare"):
         diffusion = positive_number(diffusion, "diffusion")
-        discretization = _lowered(domain, exact)
-        if not conforms(discretization, listed):
-            assert not isinstance(domain, IntrinsicTriangulation)  # which `conforms` refuses
-            domain = intrinsic_delaunay(domain.triangulation, keep=listed)
-            discretization = _lowered(domain, exact)
-            conforms(discretization, listed)  # or it is refused: curves on faces so flat that rounding moves them
+        domain, discretization = _retriangulated(domain, listed, intrinsic, exact)
     with stopwatch("diffuse"):
         discretization, groups = discretization.adapt(listed)
         triangles = discretization.triangles
@@ -146,17 +150,21 @@ def piecewise_distance(
         slopes = corner_slopes(triangles, directions)
         problem = jump_problem(triangles, pairs, slopes, guarded_edges(triangles, parts))
         inner = None if progress is None else lambda share: progress(0.5 + 0.25 * share, "integrate")
+
+        field_of = partial(_field, domain, triangles, slopes, parts)
         if exact:
             solution = minimize_exactly(problem)
+            constants = solution.constants
         else:
             continuous = partial(is_continuous, triangles, pairs, slopes, directions)
             solution = minimize_fast(problem, progress=inner, enough=continuous)
-        values = centered(triangles, slopes + solution.constants[:, None], parts)
+            constants = solution.constants
+            if not continuous(constants):
+                tried = concentrated(problem, constants, typical_size(triangles))
+                affordable = [c for c in tried if problem.objective(c) <= (1.0 + slack) * solution.objective]
+                constants = fewest_lines([constants, *affordable], lambda c: integration_error(field_of(c), directions))
+        phi = field_of(constants)
     with stopwatch("finish"):
-        if isinstance(domain, IntrinsicTriangulation):
-            phi: PiecewiseField = IntrinsicPiecewiseField(domain, domain, values, triangles)
-        else:
-            phi = PiecewiseField(domain, domain.triangulation, values, triangles)
         if smoothing is not None:
             phi = replace(phi, values=smoothed(phi, smoothing * 2 * discretization.spacing))
         error = integration_error(phi, directions)
@@ -166,17 +174,18 @@ def piecewise_distance(
     if error > ROUGH:
         warn_user(
             f"slopes of φ are off by {error:.3g} on average: on triangles so large or thin neither they nor cuts mean "
-            "anything. Pass intrinsic_delaunay(mesh, refine=True) as the domain",
+            "anything. Pass intrinsic=True",
             InexactWarning,
         )
-    notes = (jumps_of(phi, solution, error), *discretization.notes)
+    notes = (jumps_of(phi, solution, problem.objective(constants), error), *discretization.notes)
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
 
-def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps:
+def jumps_of(phi: PiecewiseField, solution: JumpSolution, objective: float, error: float) -> Jumps:
     """The note on the jumps of a field, and on the objective that it minimises."""
     return Jumps(
-        objective=solution.objective,
+        objective=objective,
+        least=min(objective, solution.objective),
         bound=solution.bound,
         gap=solution.gap,
         rounds=solution.rounds,
@@ -196,6 +205,48 @@ def memory_estimate(n_triangles: int, exact: bool) -> float:
     2600000000.0
     """
     return EXACT_BASE + BYTES_IF_EXACT * float(n_triangles) if exact else BYTES_PER_TRIANGLE * float(n_triangles)
+
+
+def _retriangulated(
+    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation,
+    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]],
+    intrinsic: bool | Literal["auto"],
+    exact: bool,
+) -> tuple[TriangleMesh | PolygonMesh | IntrinsicTriangulation, SurfaceDiscretization]:
+    """The domain, or the intrinsic triangulation of it that bad triangles or unoriented curves ask for."""
+    discretization = _lowered(domain, exact)
+    fits = conforms(discretization, sources)
+    if isinstance(domain, IntrinsicTriangulation):
+        return domain, discretization
+    keep = () if fits and intrinsic is not True else sources
+    if isinstance(domain, TriangleMesh) and (intrinsic is True or (intrinsic == "auto" and is_spoiled(domain))):
+        angle, coarsest = (28.0, np.inf) if intrinsic is True else (ANGLE, COARSEST)
+        try:
+            refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=coarsest)
+            return refined, _lowered(refined, exact)
+        except GeometryError:  # faces too thin
+            if intrinsic is True:
+                raise
+    if fits:
+        return domain, discretization
+    domain = intrinsic_delaunay(domain.triangulation, keep=sources)
+    discretization = _lowered(domain, exact)
+    conforms(discretization, sources)  # or it is refused: curves on faces so flat that rounding moves them
+    return domain, discretization
+
+
+def _field(
+    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation,
+    triangles: IntrinsicMesh,
+    slopes: NDArray[np.float64],
+    parts: Sequence[CurveSegments],
+    constants: NDArray[np.float64],
+) -> PiecewiseField:
+    """The field of given constants of the faces, zero at the source."""
+    values = centered(triangles, slopes + constants[:, None], parts)
+    if isinstance(domain, IntrinsicTriangulation):
+        return IntrinsicPiecewiseField(domain, domain, values, triangles)
+    return PiecewiseField(domain, domain.triangulation, values, triangles)
 
 
 def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation, exact: bool) -> SurfaceDiscretization:
@@ -254,36 +305,6 @@ def jump_problem(
     )
 
 
-def is_continuous(
-    triangles: IntrinsicMesh,
-    pairs: FacePairs,
-    slopes: NDArray[np.float64],
-    directions: NDArray[np.complex128],
-    constants: NDArray[np.float64],
-) -> bool:
-    """Whether the constants of the faces leave no cut, neither as a line nor spread over many small jumps.
-
-    Spread out, it makes ∇φ̄, of the means φ̄ of φ at the vertices, differ from Y by more than a half in all faces around
-    the corners of some face. Where Y turns back, at equal distance from two parts of the source, few faces in a row do.
-    """
-    values = slopes + constants[:, None]
-    if np.abs(pairs.ends(values)).max(initial=0.0) > FAR * typical_size(triangles):
-        return False
-    corners, n = triangles.corner_vertices, triangles.n_vertices
-    mean = np.bincount(corners.ravel(), values.ravel(), n) / np.maximum(np.bincount(corners.ravel(), minlength=n), 1)
-    rough = np.abs(gradients(triangles, mean[corners]) - directions) > 0.5
-    around = np.ones(n, dtype=bool)
-    around[corners[~rough]] = False
-    return not around[corners].all(axis=1).any()
-
-
-def gradients(triangles: IntrinsicMesh, at_corners: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """(m,) gradients of functions that are linear in every face, in its layout."""
-    opposite = 1j * np.roll(triangles.edge_vectors, -1, axis=1)
-    result: NDArray[np.complex128] = (at_corners * opposite).sum(axis=1) / (2.0 * triangles.areas_as_divisors)
-    return result
-
-
 def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.bool_]:
     """(e,) edges with an end on the source, and edges of faces that it crosses."""
     touched = np.zeros(triangles.n_vertices, dtype=bool)
@@ -322,28 +343,3 @@ def centered(
         shift[label[face[here[0]]]] = height[here[np.searchsorted(total, 0.5 * total[-1])]]
     result: NDArray[np.float64] = values - shift[label][:, None]
     return result
-
-
-def smoothed(phi: PiecewiseField, width: float) -> NDArray[np.float64]:
-    """(m, 3) corner values after heat flow on the surface split along the cut: ``(M + ½ width² C) φ = M φ₀``."""
-    opened, first, mass = split_triangles(phi)
-    matrix = sparse.csr_matrix(0.5 * width**2 * cotan_matrix(opened) + sparse.diags_array(mass))
-    start = np.nan_to_num(first)
-    return np.where(np.isnan(phi.values), np.nan, factorize(matrix).solve(mass * start)[opened.corner_vertices])
-
-
-def integration_error(phi: PiecewiseField, directions: NDArray[np.complex128]) -> float:
-    """Root mean square of ∇φ̄ − Y, where φ̄ averages φ over the corners at each vertex of the split surface."""
-    opened, mean, _ = split_triangles(phi)
-    known = ~np.isnan(phi.values[:, 0])
-    error = np.abs(gradients(phi.triangles, mean[opened.corner_vertices]) - directions)
-    return float(np.sqrt(np.average(error[known] ** 2, weights=phi.triangles.face_areas[known])))
-
-
-def split_triangles(phi: PiecewiseField) -> tuple[IntrinsicMesh, NDArray[np.float64], NDArray[np.float64]]:
-    """The triangles with vertices doubled along the cut, and the mean value and lumped mass at each vertex."""
-    owner, vertices = phi.split_vertices
-    opened = replace(phi.triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=len(vertices))
-    mean = np.bincount(owner, phi.values.ravel()) / np.bincount(owner)
-    masses = np.asarray(np.bincount(owner, np.repeat(phi.triangles.face_areas / 3.0, 3)), dtype=np.float64)
-    return opened, mean, masses
