@@ -1,0 +1,134 @@
+"""Curves that bound nothing: lines and forks of the cut, its length, error of slopes, objective and time.
+
+Two rows a shape: jumps as Eq. 16 leaves them, in the triangles of the mesh, and the default, which gathers jumps and
+refines bad triangles intrinsically. Run with ``python -m benchmarks.cuts``.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+import signedheat as sh
+from benchmarks.reproduction.shapes import organic, subdivided
+from signedheat.diagnostics import Jumps
+from signedheat.samples import sphere, torus
+
+Case = tuple[sh.TriangleMesh, list[sh.Curve]]
+
+
+def grid(points: np.ndarray, turned: bool = False, closed_across: bool = True) -> sh.TriangleMesh:
+    """Triangles on an (n, m, 3) grid of points that closes along its first axis, turned over if asked, and across."""
+    n, m = points.shape[:2]
+    ids = np.arange(n * m).reshape(n, m)
+    back = -np.arange(m) % m if closed_across else np.arange(m)[::-1]
+    following = np.vstack([ids[1:], ids[:1, back if turned else np.arange(m)]])
+    rolled = [np.roll(a, -1, axis=1) for a in (following, ids)]
+    a, b, c, d = (each if closed_across else each[:, :-1] for each in (ids, following, *rolled))
+    faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
+    return sh.TriangleMesh(points.reshape(-1, 3), faces)
+
+
+def angles(n: int, m: int) -> list[np.ndarray]:
+    return np.meshgrid(2 * np.pi * np.arange(n) / n, 2 * np.pi * np.arange(m) / m, indexing="ij")
+
+
+def klein_bottle(n: int = 96, m: int = 48) -> sh.TriangleMesh:
+    u, v = angles(n, m)
+    out, up = np.sin(v), np.sin(2 * v)
+    ring, z = 3 + np.cos(u / 2) * out - np.sin(u / 2) * up, np.sin(u / 2) * out + np.cos(u / 2) * up
+    return grid(np.stack([ring * np.cos(u), ring * np.sin(u), z], axis=-1), turned=True)
+
+
+def moebius(n: int = 120, m: int = 12) -> sh.TriangleMesh:
+    u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(-0.3, 0.3, m + 1), indexing="ij")
+    ring = 1 + v * np.cos(u / 2)
+    points = np.stack([ring * np.cos(u), ring * np.sin(u), v * np.sin(u / 2)], axis=-1)
+    return grid(points, turned=True, closed_across=False)
+
+
+def cylinder(n: int = 96, m: int = 48) -> sh.TriangleMesh:
+    u, v = np.meshgrid(2 * np.pi * np.arange(n) / n, np.linspace(0, 2, m), indexing="ij")
+    return grid(np.stack([np.cos(u), np.sin(u), v], axis=-1), closed_across=False)
+
+
+def sheared_torus() -> sh.TriangleMesh:
+    """Triangles with large angles."""
+    u, v = angles(96, 32)
+    u = u + 0.25 * np.sin(v + 0.5)
+    ring = 1 + 0.4 * np.cos(v)
+    return grid(np.stack([ring * np.cos(u), ring * np.sin(u), 0.4 * np.sin(v)], axis=-1))
+
+
+def bumpy_sphere(seed: int, level: int = 5) -> sh.TriangleMesh:
+    rng = np.random.default_rng(seed)
+    ball = sphere(level)
+    points = ball.vertices + rng.normal(scale=0.05 / 2**level, size=ball.vertices.shape)
+    waves = np.cos(points @ rng.normal(scale=2.0, size=(3, 5)) + rng.uniform(0, 6, 5)).sum(axis=1)
+    return sh.TriangleMesh(points * (1 + 0.08 * waves[:, None]), ball.faces)
+
+
+def section(mesh: sh.TriangleMesh, normal: list[float], offset: float = 0.0) -> sh.Curve:
+    return max(mesh.level_set(mesh.vertices @ normal, offset), key=lambda curve: curve.n_points)
+
+
+def part(curve: sh.Curve, start: float, end: float) -> sh.Curve:
+    kept = slice(int(start * curve.n_points), int(end * curve.n_points))
+    return sh.Curve(curve.faces[kept], curve.barycentric[kept])
+
+
+def halves(mesh: sh.TriangleMesh) -> Case:
+    whole = section(mesh, [0.3, 0.2, 1.0])
+    return mesh, [part(whole, 0, 0.5), part(whole, 0.5, 1).reversed()]
+
+
+def cases() -> Iterator[tuple[str, Callable[[], Case]]]:
+    yield "torus, loop", lambda: ((m := torus(n_around=96, n_across=40)), [m.path(np.arange(40), closed=True)])
+    yield "torus in thin triangles, loop", lambda: ((m := sheared_torus()), [section(m, [1, 0, 0.1], 0.1)])
+    yield "organic torus, loop", lambda: ((m := subdivided(organic(3, 300, 1), 2)), [section(m, [1, 0.2, 0.1])])
+    yield "organic torus, coarse, loop", lambda: ((m := organic(5, 600, 1)), [section(m, [0.3, 1, 0.1])])
+    yield (
+        "organic torus, arc",
+        lambda: (
+            (m := subdivided(organic(7, 300, 1), 2)),
+            [part(section(m, [0.2, 0.1, 1]), 0, 0.4)],
+        ),
+    )
+    yield "bumpy sphere, halves", lambda: halves(bumpy_sphere(1))
+    yield "bumpy sphere, arc", lambda: ((m := bumpy_sphere(2)), [part(section(m, [0.3, 0.2, 1.0]), 0, 0.4)])
+    yield "decimated sphere, halves", lambda: halves(subdivided(organic(2, 300), 1))
+    yield "Klein bottle, loop", lambda: ((m := klein_bottle()), [m.path(np.arange(48) + 480, closed=True)])
+    yield "Klein bottle, path", lambda: ((m := klein_bottle()), [m.path(np.arange(60) * 48 + 12)])
+    yield "Moebius strip, core", lambda: ((m := moebius()), [m.path(np.arange(120) * 13 + 6, closed=True)])
+    yield "cylinder, line", lambda: ((m := cylinder()), [m.path(np.arange(48))])
+
+
+def row(mesh: sh.TriangleMesh, curves: list[sh.Curve], **options: object) -> str:
+    start = time.process_time()
+    phi = sh.piecewise_distance(mesh, curves, **options)
+    seconds = time.process_time() - start
+    note = phi.diagnostics.note(Jumps)
+    ends = Counter(int(end) for line in phi.cut for end in line.vertices[[0, -1]])
+    forks = sum(count > 2 for count in ends.values())
+    return (
+        f"{phi.triangles.n_faces:6d} | {len(phi.cut)} | {forks} | {note.cut_length:.2f} | "
+        f"{note.integration_error:.4f} | {note.objective:.3f} | {note.objective / note.least - 1:.1%} | {seconds:.1f}"
+    )
+
+
+def main() -> None:
+    print(
+        "| shape and curve | jumps | faces | lines | forks | length | slope error | objective | above least | CPU s |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for name, build in cases():
+        mesh, curves = build()
+        print(f"| {name} | Eq. 16 | {row(mesh, curves, slack=0, intrinsic=False)} |", flush=True)
+        print(f"| | default | {row(mesh, curves)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
