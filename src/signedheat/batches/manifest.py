@@ -109,7 +109,9 @@ def source_of(path: Path) -> tuple[int, int]:
 
 
 def _line(outcome: Outcome) -> str:
-    return json.dumps(asdict(outcome), ensure_ascii=False) + "\n"
+    """One line for whoever reads it; names of files may hold bytes that are no text, and separators of lines."""
+    line = json.dumps(asdict(outcome), ensure_ascii=False)
+    return (line if line.isprintable() else json.dumps(asdict(outcome))) + "\n"
 
 
 def _read(path: Path) -> dict[str, Outcome]:
