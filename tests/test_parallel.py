@@ -1,12 +1,17 @@
 """Long work on another thread: reports while it runs, and an end when the reports raise."""
 
+import socket
+import threading
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from shapes.grid_cases import box, sphere
+from signedheat import parallel
 from signedheat.parallel import run_cancellable
 
 
@@ -59,3 +64,23 @@ def test_sharpening_stops_when_asked_to(monkeypatch):
     with pytest.raises(Stop):
         sh.sharpen(sh.signed_distance(sphere(400), box(12)), progress=progress)
     assert time.perf_counter() - begin < 10
+
+
+@pytest.mark.parametrize("greeting", [b"", b"HTTP/1.1 400 no"])
+def test_what_listens_and_is_no_scheduler_is_told(greeting, monkeypatch):
+    """Dask itself waits for ever, or takes what it hears for the size of a message."""
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(parallel, "PATIENCE", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer():
+            connection, _ = server.accept()
+            with connection, suppress(ConnectionError):
+                connection.send(greeting)
+                connection.recv(1)  # until the other side has gone
+
+        answering = threading.Thread(target=answer)
+        answering.start()
+        with refused(sh.SignedHeatError, element="scheduler"):
+            parallel.connected(f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        answering.join()

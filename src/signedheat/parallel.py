@@ -1,9 +1,10 @@
-"""Threads: their number, and jobs on threads of their own so that they can be cancelled or limited in time."""
+"""Threads: their number, and jobs on threads of their own that can be cancelled or limited in time. Dask clusters."""
 
 from __future__ import annotations
 
 import ctypes
 import os
+import socket
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import TimeoutError as FutureTimeout  # the builtin one only since Python 3.11
@@ -13,6 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import SignedHeatError
+from .packages import lazy_module
+
+distributed = lazy_module("distributed", "Dask clusters")
+
 INTERVAL = 0.1
 """Seconds between two progress reports."""
 CHUNK = 1 << 13
@@ -20,6 +26,11 @@ CHUNK = 1 << 13
 
 SLAB_SIZE = 1 << 16
 """Numbers that a thread works on at a time."""
+
+PATIENCE = 30.0
+"""Seconds within which a cluster must answer."""
+GREETING = 1 << 20
+"""Bytes that the first message of a Dask scheduler has at the most."""
 
 
 def n_threads() -> int:
@@ -147,3 +158,45 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
     finally:
         if not future.done() and thread.ident is not None:
             ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit))
+
+
+def connected(address: str) -> Any:
+    """A client of a running Dask cluster.
+
+    Raises
+    ------
+    SignedHeatError
+        If none answers at the address within a minute; whatever else may listen there.
+    MissingPackageError
+        If Dask is not installed.
+
+    Examples
+    --------
+    >>> connected("nobody")
+    Traceback (most recent call last):
+        ...
+    signedheat.errors.SignedHeatError: no Dask scheduler answers at 'nobody' (missing port number in address 'nobody'): start one with `dask scheduler`, and name its address
+    """  # noqa: E501
+    comm = distributed.comm  # a package that is missing is told as it is
+    try:
+        if comm.parse_address(address)[0] == "tcp":
+            _hear_greeting(*comm.get_address_host_port(address))
+        return run_limited(lambda: distributed.Client(address, timeout=PATIENCE), 2 * PATIENCE)
+    except Exception as error:  # Dask's own, and those of what it takes for messages
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise SignedHeatError(
+            f"no Dask scheduler answers at {address!r} ({reason:.200})",
+            remedy="start one with `dask scheduler`, and name its address",
+            element="scheduler",
+        ) from error
+
+
+def _hear_greeting(host: str, port: int) -> None:
+    """Make sure that who listens speaks first, and of few bytes: Dask waits for ever, or makes room for any number."""
+    with socket.create_connection((host, port), PATIENCE) as connection:
+        try:
+            heard = connection.recv(8, socket.MSG_WAITALL)
+        except TimeoutError:
+            heard = b""
+    if len(heard) < 8 or int.from_bytes(heard, "little") > GREETING:
+        raise ConnectionError("what listens there is no scheduler")

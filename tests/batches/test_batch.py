@@ -14,7 +14,9 @@ import signedheat as sh
 from batch_jobs import measure
 from refusals import refused
 from signedheat import samples
+from signedheat.batches import supervision
 from signedheat.batches.inputs import expand
+from signedheat.batches.manifest import Manifest
 
 
 @pytest.fixture
@@ -249,3 +251,127 @@ def test_odd_time_limits(tmp_path, odd):
     with refused(sh.SignedHeatError, "time limit"):
         sh.batch("shape.stl", tmp_path / "made", sh.BatchJob(info=True), time_limit=odd)
     assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize("name", ["new\nline", "separator\u2028", "next\x85", "quote\"'", "-dash", "\udcff"])
+def test_odd_names_are_one_line_of_the_manifest(tmp_path, files, name):
+    try:
+        folder = files(f"{name}.ply")
+    except (OSError, UnicodeError):
+        pytest.skip("this system has no such names")
+    assert [each.name for each in sh.batch(folder, tmp_path / "out", measure, workers=1).outcomes] == [name]
+    assert [line["name"] for line in lines(tmp_path / "out")] == [name]
+    assert sh.batch(folder, tmp_path / "out", measure, workers=1).skipped == 1
+
+
+def test_results_stay_in_their_folder(tmp_path, files, monkeypatch):
+    """Whatever the names of files, and however patterns lead out of the folder that they begin in."""
+    files("..ply", "...ply", "a.ply", "deep/a.ply")
+    (tmp_path / "in" / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "in" / "deep")
+    given = ["../..ply", "../...ply", "a.ply", "../a.ply"]
+    named = [each.name for each in expand(given, tmp_path / "out")]
+    assert named == ["..ply", "...ply", "deep/a", "a"] or named == ["..ply", "...ply", "deep/a.ply", "a.ply"]
+    monkeypatch.chdir(tmp_path)
+    inner = expand(["in/*/../../in/deep/*.ply"], tmp_path / "out")
+    assert [each.name for each in inner] == ["a"]
+
+
+def test_links_that_run_in_circles_give_every_file_once(tmp_path, files):
+    """With two links, patterns would be followed 2⁴⁰ times."""
+    folder = files("a.ply", "b/c.ply")
+    for name in ("again", "b/up", "once more"):
+        (folder / name).symlink_to(folder)
+    (folder / "itself.ply").symlink_to("itself.ply")
+    for given in (folder, f"{folder}/**/*.ply", f"{folder}/**"):
+        found = {os.path.realpath(each.path) for each in expand([given], tmp_path / "out")}
+        assert {f"{folder}/a.ply", f"{folder}/b/c.ply"} <= found and len(found) == 3
+        assert len(expand([given], tmp_path / "out")) == 3
+
+
+def test_results_among_the_shapes_are_refused(tmp_path, files):
+    folder = files("a.ply")
+    for target in (folder, tmp_path):
+        with refused(sh.FileFormatError):
+            sh.batch(folder, target, measure, workers=1)
+    with refused(sh.FileFormatError):
+        sh.batch(folder, folder / "a.ply", measure, workers=1)
+    assert sh.batch(folder, folder / "out", measure, workers=1).outcomes[0].is_done
+
+
+def test_a_folder_is_written_by_one_batch_at_a_time(tmp_path, files):
+    folder, out = files("a.ply", "b.ply"), tmp_path / "out"
+
+    def second(outcome):
+        with refused(sh.SignedHeatError):
+            sh.batch(folder, out, measure, workers=1)
+
+    assert not sh.batch(folder, out, measure, workers=1, report=second).failures
+    assert len(lines(out)) == 2
+
+
+def test_shapes_whose_results_would_have_one_name_are_refused(tmp_path, files):
+    folder = files("a.ply", "a_samples.stl")
+    job = sh.BatchJob(volume=".npz", samples=sh.Sampling(n=10), resolution=16)
+    with refused(sh.FileFormatError):
+        sh.batch(folder, tmp_path / "out", job, workers=1)
+
+
+@pytest.mark.parametrize("odd", ["folder", "pipe"])
+def test_what_has_the_name_of_the_manifest_is_refused(tmp_path, files, odd):
+    (tmp_path / "out").mkdir()
+    place = tmp_path / "out" / "manifest.jsonl"
+    place.mkdir() if odd == "folder" else os.mkfifo(place)
+    with refused(sh.FileFormatError):
+        sh.batch(files("a.ply"), tmp_path / "out", measure, workers=1)
+
+
+def test_damaged_manifests_are_begun_anew(tmp_path, files):
+    folder, out = files("a.ply"), tmp_path / "out"
+    sh.batch(folder, out, measure, workers=1)
+    good = lines(out)[0]
+    odd = [{**good, "outputs": [1]}, {**good, "name": ["a"]}, {**good, "state": 3}, {**good, "later": 1}, [1], None]
+    texts = [*map(json.dumps, odd), "[" * 100_000, json.dumps({**good, "outputs": ["a\0"]}), "\x00\xff"]
+    for text in texts:
+        (out / "manifest.jsonl").write_text(text)
+        assert Manifest(out).still_holds("a", folder / "a.ply", good["job"].rpartition(" by ")[0]) is None
+    (out / "manifest.jsonl").write_text("\n".join([*texts, json.dumps(good)]))
+    assert sh.batch(folder, out, measure, workers=1).skipped == 1
+
+
+@pytest.mark.parametrize("odd", ["folder", "device"])
+def test_results_replace_nothing_but_files(tmp_path, files, odd):
+    folder, out = files("a.ply"), tmp_path / "out"
+    out.mkdir()
+    (out / "a.txt").mkdir() if odd == "folder" else (out / "a.txt").symlink_to("/dev/null")
+    (outcome,) = sh.batch(folder, out, measure, workers=1).outcomes
+    assert outcome.state == "failed" and odd in outcome.message
+    assert {path.name for path in out.iterdir()} == {"a.txt", "manifest.jsonl"}
+
+
+def test_results_go_where_links_lead_with_the_permissions_there(tmp_path, files):
+    folder, out = files("a.ply"), tmp_path / "out"
+    out.mkdir()
+    (tmp_path / "elsewhere").write_text("old")
+    (tmp_path / "elsewhere").chmod(0o640)
+    (out / "a.txt").symlink_to(tmp_path / "elsewhere")
+    assert sh.batch(folder, out, measure, workers=1).outcomes[0].is_done
+    assert (out / "a.txt").is_symlink() and (tmp_path / "elsewhere").read_text() == "this is a.ply"
+    assert (tmp_path / "elsewhere").stat().st_mode & 0o777 == 0o640
+
+
+def test_a_process_that_is_killed_while_it_begins_is_started_again(tmp_path, files, monkeypatch):
+    """As the system does where memory ends."""
+    started = []
+    spawn = supervision.Worker._spawn
+
+    def killed_at_first(worker):
+        process = spawn(worker)
+        started.append(process)
+        if len(started) < 3:
+            process.kill()
+        return process
+
+    monkeypatch.setattr(supervision.Worker, "_spawn", killed_at_first)
+    assert not sh.batch(files("a.ply"), tmp_path / "out", measure, workers=1).failures
+    assert len(started) == 3

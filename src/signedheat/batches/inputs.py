@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import os
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,18 +38,18 @@ def expand(inputs: Iterable[str | os.PathLike[str]], without: Path) -> list[Inpu
     FileFormatError
         If a name cannot be one, if there is no such file or folder, or none that matches a pattern, or no shape at all.
     """
-    found: dict[Path, Path] = {}  # and what its name is relative to
+    found: dict[str, tuple[Path, Path]] = {}  # by where each is: itself, and what its name is relative to
     for each in inputs:
         try:
             for path, root in _files(named_path(each), without):
-                found.setdefault(path, root)
+                found.setdefault(_place(path), (path, root))
         except OSError as error:
             raise FileFormatError(
-                f"cannot be looked for ({error.strerror})", remedy="check the name", path=each
+                f"cannot be looked for ({error.strerror})", remedy="check the name", path=error.filename or each
             ) from error
     if not found:
         raise FileFormatError("there is no shape among the inputs", remedy="name files, folders or patterns")
-    return [Input(path, name) for path, name in zip(found, _names(found), strict=True)]
+    return [Input(path, name) for (path, _), name in zip(found.values(), _names(found), strict=True)]
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
@@ -68,19 +68,73 @@ def named_path(name: str | os.PathLike[str]) -> Path:
 
 def _files(path: Path, without: Path) -> list[tuple[Path, Path]]:
     """Files, and the folder that the names of each are relative to."""
-    text = str(path)
     if path.is_dir():
-        inner = sorted(file for file in path.rglob("*") if extension(file) in READERS and _is_meant_for_a_file(file))
-        avoided = without.resolve()
-        return [(file, path) for file in inner if not file.resolve().is_relative_to(avoided)]
-    if path.exists() or not MAGIC & set(text):
+        avoided, own = os.path.realpath(without), os.path.realpath(path)
+        if _is_in(own, avoided):
+            raise FileFormatError(
+                "results would lie among the shapes, and be taken for some the next time",
+                remedy="name another folder for them, such as one in this one",
+                path=path,
+            )
+        inner = [Path(folder, name) for folder, names in _walk(path, links=False) for name in names]
+        shapes = sorted(file for file in inner if extension(file) in READERS and _is_meant_for_a_file(file))
+        return [(file, path) for file in shapes if not _is_in(os.path.realpath(file), avoided)]
+    if path.exists() or not MAGIC & set(str(path)):
         return [(path, path.parent)]  # whether it can be read is for its worker to say
-    root = Path(*[part for part in _before_magic(path)])
-    matches = sorted(Path(match) for match in glob.glob(text, recursive=True))
+    root = Path(*_before_magic(path))
+    matches = sorted(_matching(root, path.parts[len(_before_magic(path)) :]))
     files = [(match, root) for match in matches if _is_meant_for_a_file(match)]
     if not files:
         raise FileFormatError("no file matches the pattern", remedy="check the pattern", path=path)
     return files
+
+
+def _walk(folder: Path, links: bool) -> Iterator[tuple[str, list[str]]]:
+    """Folders below one, itself included, and the names of the files in each; every folder once, however links run.
+
+    Raises
+    ------
+    OSError
+        If one of them cannot be read: what is in it must not be missed.
+    """
+
+    def fail(error: OSError) -> None:
+        raise error
+
+    known: set[str] = set()
+    for place, inner, names in os.walk(folder, followlinks=links, onerror=fail):
+        real = os.path.realpath(place)
+        if real in known:
+            inner.clear()
+            continue
+        known.add(real)
+        inner.sort()
+        yield place, names
+
+
+def _matching(root: Path, parts: Sequence[str]) -> set[Path]:
+    """What matches a pattern below a folder, part by part."""
+    found = {root}
+    for part in [*parts, "*"] if parts[-1] == "**" else parts:
+        if part == "**":
+            below = {Path(place) for each in found if each.is_dir() for place, _ in _walk(each, links=True)}
+            found = {place for place in below if not _is_hidden(place.parts[len(root.parts) :])}
+        else:
+            found = {Path(match) for each in found for match in glob.glob(os.path.join(glob.escape(str(each)), part))}
+    return found
+
+
+def _is_hidden(parts: Sequence[str]) -> bool:
+    return any(name.startswith(".") and name != ".." for name in parts)
+
+
+def _place(path: Path) -> str:
+    """Where a file is, by whichever way it was named; links to it are files of their own."""
+    return os.path.join(os.path.realpath(path.parent), path.name)
+
+
+def _is_in(path: str, folder: str) -> bool:
+    return Path(path).is_relative_to(folder)
 
 
 def _is_meant_for_a_file(path: Path) -> bool:
@@ -97,20 +151,39 @@ def _before_magic(path: Path) -> list[str]:
     return parts
 
 
-def _names(found: dict[Path, Path]) -> list[str]:
+def _names(found: Mapping[str, tuple[Path, Path]]) -> list[str]:
     """A name for each file that no other has: without extension, with it, or with folders from further up."""
-    names = [str(path.relative_to(root).with_suffix("")) for path, root in found.items()]
-    for longer in (
-        [str(path.relative_to(root)) for path, root in found.items()],
-        [_from_above(path, list(found)) for path in found],
-    ):
+    whole = [_below(path, root) for path, root in found.values()]
+    names = [_without_extension(name) for name in whole]
+    for longer in (whole, [_from_above(place, list(found)) for place in found]):
         count = Counter(name.lower() for name in names)  # file systems may not tell cases apart
         names = [name if count[name.lower()] == 1 else other for name, other in zip(names, longer, strict=True)]
+    twice = next((name for name, times in Counter(names).items() if times > 1), None)
+    if twice is not None:
+        raise FileFormatError("the results of two shapes would have this name", remedy="rename one", path=twice)
     return names
 
 
-def _from_above(path: Path, paths: list[Path]) -> str:
+def _below(path: Path, root: Path) -> str:
+    """A file relative to a folder; its name alone where a pattern has led out of that."""
+    relative = path.relative_to(root)
+    return path.name if ".." in relative.parts else str(relative)
+
+
+def _without_extension(name: str) -> str:
+    """A name without its extension, unless a folder would be left, as of ``..stl``.
+
+    Examples
+    --------
+    >>> _without_extension("parts/a.stl"), _without_extension("..stl")
+    ('parts/a', '..stl')
+    """
+    short = name.removesuffix(Path(name).suffix)
+    return name if os.path.basename(short) in ("", ".", "..") else short
+
+
+def _from_above(place: str, places: list[str]) -> str:
     """A file below what it has in common with all files of its name, its folders included."""
-    alike = [other.absolute() for other in paths if other.name.lower() == path.name.lower()]
-    common = Path(os.path.commonpath(alike))
-    return str(path.absolute().relative_to(common if common != path.absolute() else common.parent))
+    name = Path(place).name.lower()
+    common = Path(os.path.commonpath([other for other in places if Path(other).name.lower() == name]))
+    return str(Path(place).relative_to(common if common != Path(place) else common.parent))

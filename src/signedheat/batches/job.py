@@ -126,6 +126,17 @@ class BatchJob:
     def _measures(self) -> bool:
         return self.volume is not None or bool(self.offsets) or self.samples is not None
 
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """How the names of its results end, after that of the shape."""
+        volume = () if self.volume is None else (self.volume,)
+        surfaces = (f"_{name}{self.surfaces}" for name in told_apart(self.offsets))
+        return (*volume, *surfaces, *(() if self.samples is None else (self._of_samples,)))
+
+    @property
+    def _of_samples(self) -> str:
+        return "_samples.npz" if self.volume == ".npz" else ".npz"
+
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Make it of one shape: files that begin with `stem`. Returns figures, with what to know under "told"."""
         shape = read(path)
@@ -167,7 +178,6 @@ class BatchJob:
         if self.samples is not None:
             wanted = self.samples
             taken = sample(phi, wanted.n, near=wanted.near, widths=wanted.widths, seed=wanted.seed)
-            ending = "_samples" if self.volume == ".npz" else ""
-            (taken.normalized() if wanted.normalize else taken).save(f"{stem}{ending}.npz", wanted.layout)
+            (taken.normalized() if wanted.normalize else taken).save(f"{stem}{self._of_samples}", wanted.layout)
             figures["samples"] = taken.figures
         return figures

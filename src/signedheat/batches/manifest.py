@@ -9,9 +9,9 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from ..io.files import replacing
+from ..io.files import contents, replacing, writing
 
 NAME = "manifest.jsonl"
 
@@ -83,7 +83,7 @@ class Manifest:
 
     def add(self, outcome: Outcome) -> None:
         """Append a line, at once: whatever happens next, it stays."""
-        with self.path.open("a", encoding="utf-8") as file:
+        with writing(self.path), self.path.open("a", encoding="utf-8") as file:
             file.write(_line(outcome))
             file.flush()
             os.fsync(file.fileno())
@@ -115,16 +115,28 @@ def _line(outcome: Outcome) -> str:
 
 
 def _read(path: Path) -> dict[str, Outcome]:
-    """Outcomes by name, the last of each; a line that was cut off by the end of a run is left out."""
+    """Outcomes by name, the last of each; a line that was cut off by the end of a run is left out.
+
+    Raises
+    ------
+    FileFormatError
+        If something else has its name: a folder, a pipe.
+    """
     known: dict[str, Outcome] = {}
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except FileNotFoundError:
+    if not os.path.lexists(path) or (path.is_file() and not path.stat().st_size):
         return known
-    for line in lines:
-        with suppress(ValueError, TypeError, KeyError):
-            entries = json.loads(line)
-            entries["outputs"], entries["source"] = tuple(entries["outputs"]), tuple(entries["source"])
-            outcome = Outcome(**entries)
+    for line in contents(path).decode("utf-8", errors="replace").split("\n"):
+        with suppress(ValueError, TypeError, KeyError, RecursionError):
+            outcome = _outcome(json.loads(line))
             known[outcome.name] = outcome
     return known
+
+
+def _outcome(entries: dict[str, Any]) -> Outcome:
+    """An outcome as it was written; ValueError, TypeError or KeyError if these are other things."""
+    entries["outputs"], entries["source"] = tuple(entries["outputs"]), tuple(entries["source"])
+    outcome = Outcome(**entries)
+    texts = (outcome.name, outcome.input, outcome.state, outcome.message, outcome.job, *outcome.outputs)
+    if not all(isinstance(text, str) and "\0" not in text for text in texts):
+        raise TypeError("these are no outcomes")
+    return outcome

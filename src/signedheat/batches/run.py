@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import os
 import queue
-import shutil
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
 from typing import Any
 
 from ..compiled import MOST_THREADS
 from ..domains.validation import positive_number, whole_number
-from ..errors import SignedHeatError
+from ..errors import FileFormatError, SignedHeatError
 from ..packages import lazy_module, require
-from ..parallel import n_threads
+from ..parallel import connected, n_threads
 from ..progress import Progress, logger
+from .folder import held, make, refuse_file, scratch
 from .inputs import Input, expand, named_path
+from .job import BatchJob
 from .manifest import Manifest, Outcome, State, job_text, source_of
 from .supervision import Worker
 from .task import Answer, Job, Task
 
 CLUSTER = ("distributed", "clusters")
 distributed = lazy_module(*CLUSTER)
-
-SCRATCH = ".unfinished-"
-"""Begin of the name of the folder in which results are made; the number of the process that runs the batch follows."""
 
 
 @dataclass(frozen=True)
@@ -109,9 +107,10 @@ def batch(
     Raises
     ------
     FileFormatError
-        If there is no input, or the folder cannot be made.
+        If there is no input, the folder cannot be made, or two shapes would have results of one name.
     SignedHeatError
-        If the job cannot be sent to workers, or none can be started; if numbers make no sense.
+        If the job cannot be sent to workers, or none can be started; if numbers make no sense, or another batch is
+        writing into the folder.
     MissingPackageError
         If a scheduler is given and Dask is not installed.
 
@@ -129,18 +128,21 @@ def batch(
         require(*CLUSTER)
     _refuse_odd(workers, threads, time_limit)
     target = named_path(folder)
+    refuse_file(target)
     every = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
-    _make(target)
+    if isinstance(job, BatchJob):
+        _refuse_shared(every, job)
+    make(target)
     named = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
-    manifest = Manifest(target)
-    found = {each.name: manifest.still_holds(each.name, each.path, named) for each in every}
-    kept = {name: outcome for name, outcome in found.items() if outcome is not None}
-    manifest.begin(kept.values())
-    todo = [each for each in every if each.name not in kept]
-    count = _Count(len(every), len(kept), progress)
-    with _scratch(target) as scratch:
+    with held(target), scratch(target) as place:
+        manifest = Manifest(target)
+        found = {each.name: manifest.still_holds(each.name, each.path, named) for each in every}
+        kept = {name: outcome for name, outcome in found.items() if outcome is not None}
+        manifest.begin(kept.values())
+        todo = [each for each in every if each.name not in kept]
+        count = _Count(len(every), len(kept), progress)
         tasks = [
-            Task(job, each.path.absolute(), target.absolute() / each.name, scratch / str(k))
+            Task(job, each.path.absolute(), target.absolute() / each.name, place / str(k))
             for k, each in enumerate(todo)
         ]
         if scheduler is not None:
@@ -156,9 +158,23 @@ def batch(
             if report is not None:
                 report(outcome)
             count.add(outcome)
-    outcomes = tuple(kept[each.name] for each in every)
-    manifest.write(outcomes)
+        outcomes = tuple(kept[each.name] for each in every)
+        manifest.write(outcomes)
     return Batch(outcomes, manifest.path, len(every) - len(todo))
+
+
+def _refuse_shared(every: Sequence[Input], job: BatchJob) -> None:
+    """Refuse shapes of which one has a result by the name of one of another's: one would replace the other."""
+    owners: dict[str, Input] = {}
+    for each in every:
+        for ending in job.endings:
+            other = owners.setdefault(f"{each.name}{ending}".lower(), each)
+            if other is not each:
+                raise FileFormatError(
+                    f"a result of {other.path.name} would have the name of one of this shape, {each.name}{ending}",
+                    remedy="rename one of the two",
+                    path=each.path,
+                )
 
 
 def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
@@ -234,14 +250,7 @@ def _next(ready: queue.SimpleQueue[Any]) -> Any:
 
 def _on_cluster(address: str, tasks: Sequence[Task], threads: int, time_limit: float | None) -> Iterator[Result]:
     """Results as they come from a Dask cluster, each task in a process beside the Dask worker that got it."""
-    try:
-        client = distributed.Client(address, timeout=30)
-    except (OSError, ValueError) as error:
-        raise SignedHeatError(
-            f"there is no scheduler at {address} ({error})",
-            remedy="start one with `dask scheduler`, and name its address",
-        ) from error
-    with client:
+    with connected(address) as client:
         futures = {
             client.submit(apart, task, threads, time_limit, pure=False, key=f"shape-{os.getpid()}-{k}"): k
             for k, task in enumerate(tasks)
@@ -321,36 +330,3 @@ def duration(seconds: float) -> str:
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SignedHeatError(
-            f"the folder cannot be made ({error.strerror})", remedy="choose another one", path=folder
-        ) from error
-
-
-@contextmanager
-def _scratch(folder: Path) -> Iterator[Path]:
-    """A folder for what is not finished, removed at the end; those of batches that were killed are removed first."""
-    for old in folder.glob(f"{SCRATCH}*"):
-        number = old.name.removeprefix(SCRATCH)
-        if not number.isdigit() or not _is_running(int(number)):
-            shutil.rmtree(old, ignore_errors=True)
-    scratch = folder.absolute() / f"{SCRATCH}{os.getpid()}"
-    try:
-        yield scratch
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
-
-
-def _is_running(number: int) -> bool:
-    try:
-        os.kill(number, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return number != os.getpid()

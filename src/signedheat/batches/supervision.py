@@ -19,6 +19,8 @@ from .task import Answer, Task
 
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Variables that say how many threads a process takes."""
+STARTS = 3
+"""How often a process is started that is killed before it is ready."""
 
 
 class Worker:
@@ -94,9 +96,21 @@ class Worker:
         return self._process
 
     def _start(self) -> None:
-        """Start a process, and wait until it is ready."""
-        if self._closed:
-            raise SignedHeatError("the batch has ended", remedy="start it again")
+        """Start a process, and wait until it is ready; again where one is killed meanwhile, as memory may end then."""
+        for _ in range(STARTS):
+            if self._closed:
+                raise SignedHeatError("the batch has ended", remedy="start it again")
+            process = self._spawn()
+            try:
+                pickle.load(_pipe(process.stdout))
+                return
+            except (EOFError, pickle.UnpicklingError):
+                how = self._end()
+            if process.returncode >= 0:  # it ended by itself, and will do so again
+                break
+        raise SignedHeatError(f"no worker can be started ({how})", remedy="try the job on one shape, without workers")
+
+    def _spawn(self) -> subprocess.Popen[bytes]:
         environment = {**os.environ, **dict.fromkeys(THREADS, str(self.threads))}
         environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
         self._says = tempfile.TemporaryFile()
@@ -108,12 +122,7 @@ class Worker:
             stderr=self._says,
             env=environment,
         )
-        try:
-            pickle.load(_pipe(self._process.stdout))
-        except EOFError:
-            raise SignedHeatError(
-                f"no worker can be started ({self._end()})", remedy="try the job on one shape, without workers"
-            ) from None
+        return self._process
 
     def _end(self) -> str:
         """Clear up after a process, and tell how it ended."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import time
 import warnings
@@ -11,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..errors import MemoryLimitError, SignedHeatError
+from ..io.files import moved, replaceable, writing
 
 Job = Callable[[Path, Path], Mapping[str, object]]
 """Called with a file and the beginning of the names of what it writes; returns figures, ready for JSON."""
@@ -92,9 +92,13 @@ def attempt(task: Task) -> Answer:
 
 
 def _moved(scratch: Path, folder: Path) -> tuple[str, ...]:
-    """Give what was made its place, and return the names."""
+    """Give what was made its place, all or nothing of it unless the disk breaks, and return the names."""
     made = sorted(scratch.iterdir())
-    folder.mkdir(parents=True, exist_ok=True)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     for file in made:
-        os.replace(file, folder / file.name)
+        with writing(folder / file.name):
+            replaceable(folder / file.name)
+    for file in made:
+        moved(file, folder / file.name)
     return tuple(file.name for file in made)

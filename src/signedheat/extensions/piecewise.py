@@ -48,8 +48,8 @@ ROUGH = 1.0
 SOURCE_WEIGHT = 100.0
 """Factor by which a cut along or across the source is more expensive than elsewhere."""
 BYTES = {"pardiso": (2600, 0), "cholmod": (1150, 150), "superlu": (700, 242)}
-"""Peak for each triangle, and what every doubling of their number adds, by back end; measured, but for CHOLMOD, which is
-taken to need no more than distance does, with its three factors."""
+"""Peak for each triangle, and what every doubling of their number adds, by back end; measured, but for CHOLMOD, of
+which it is taken to need what distance does, with three factors."""
 BYTES_IF_EXACT, EXACT_BASE = 2800, 20_000_000
 """What the linear program adds for each triangle, and once."""
 

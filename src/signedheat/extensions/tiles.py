@@ -20,13 +20,13 @@ from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
 from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
-from ..errors import FileFormatError, SignedHeatError, SourceError
+from ..errors import FileFormatError, SignedHeatError
 from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..lowering.area_elements import area_elements, bounds_around
 from ..operators.grid.blocks import SIDE, Blocks
 from ..packages import lazy_module, require
-from ..parallel import n_threads
+from ..parallel import connected, n_threads
 from ..progress import Progress, within
 from ..solver import checked
 from .band_plan import BandPlan, coarse_grid, grid_between, plan_band, width_between
@@ -187,13 +187,7 @@ def _computed(folder: str, run: _Run, places: list[Place]) -> Iterator[tuple[int
     elif isinstance(scheduler, Executor):
         yield from _on_pool(folder, run.key, places, scheduler)
     elif isinstance(scheduler, str):
-        try:
-            client = distributed.Client(scheduler)
-        except (OSError, ValueError) as error:
-            raise SourceError(
-                f"no Dask cluster answers at {scheduler} ({error})", remedy="check the address", element="scheduler"
-            ) from error
-        with client:
+        with connected(scheduler) as client:
             yield from _on_cluster(folder, run.key, places, client)
     else:
         yield from _on_cluster(folder, run.key, places, scheduler)

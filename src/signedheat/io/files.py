@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import shutil
 import stat
 import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -259,7 +260,7 @@ def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> Non
     """
     if extension(path) not in known:
         raise unknown_extension(path, known, purpose)
-    with _writing(path):
+    with writing(path):
         os.unlink(_new_file(path))
 
 
@@ -274,7 +275,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
     FileFormatError
         If the file cannot be written, or is no regular file; what exists is then left unchanged.
     """
-    with _writing(path):
+    with writing(path):
         temporary = _new_file(path)
         try:
             yield temporary
@@ -284,27 +285,63 @@ def replacing(path: PathLike) -> Iterator[Path]:
                 temporary.unlink()
 
 
-def _new_file(path: PathLike) -> Path:
-    """An empty file of a name that is not used, beside what `path` leads to and with the same permissions."""
+def moved(source: Path, path: PathLike) -> None:
+    """Give a whole file its place: that of the file that `path` leads to, whose permissions stay, or a new one.
+
+    Raises
+    ------
+    FileFormatError
+        If it cannot be, or what is there is no regular file; what exists is then left unchanged.
+    """
+    with replacing(path) as temporary:
+        try:
+            _permit(source, os.stat(temporary))
+            os.replace(source, temporary)
+        except OSError as error:
+            if error.errno != errno.EXDEV:
+                raise
+            shutil.copyfile(source, temporary)  # the link leads to another disk
+
+
+def replaceable(path: PathLike) -> os.stat_result | None:
+    """What is known of the file that would be replaced; None if there is none.
+
+    Raises
+    ------
+    FileFormatError, PermissionError
+        If it is no regular file, or must not be written.
+    """
     real = Path(os.path.realpath(path))
     status = os.stat(real) if real.exists() else None
     if status is not None and not stat.S_ISREG(status.st_mode):
         raise _no_file(path, status.st_mode)
     if status is not None and not os.access(real, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    return status
+
+
+def _new_file(path: PathLike) -> Path:
+    """An empty file of a name that is not used, beside what `path` leads to and with the same permissions."""
+    status, real = replaceable(path), Path(os.path.realpath(path))
     new = real.with_name(f".signedheat-{secrets.token_hex(8)}{real.suffix}")
     # created for its owner alone, so that what is secret is so from the start
     os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600 if status is not None else 0o666))
     if status is not None:
-        with suppress(OSError):
-            os.chown(new, status.st_uid, status.st_gid)
-        with suppress(OSError):
-            os.chmod(new, stat.S_IMODE(status.st_mode))
+        _permit(new, status)
     return new
 
 
+def _permit(new: Path, status: os.stat_result) -> None:
+    """Give a file the owner and the permissions of another one, as far as may be."""
+    with suppress(OSError):
+        os.chown(new, status.st_uid, status.st_gid)
+    with suppress(OSError):
+        os.chmod(new, stat.S_IMODE(status.st_mode))
+
+
 @contextmanager
-def _writing(path: PathLike) -> Iterator[None]:
+def writing(path: PathLike) -> Iterator[None]:
+    """What the system refuses within becomes an error that names the file: full disks, permissions, names too long."""
     try:
         yield
     except OSError as error:
