@@ -25,7 +25,7 @@ from signedheat.extensions.joining import Shape
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
 from signedheat.extensions.sampling import BYTES_PER_SAMPLE
 from signedheat.extensions.solid_distance import coarse_distance
-from signedheat.extensions.solid_memory import BYTES_IF_OPEN, bytes_of_faces, bytes_per_node
+from signedheat.extensions.solid_memory import bytes_of_faces, bytes_per_node, most_memory
 from signedheat.extensions.steps import Steps
 from signedheat.geometry.surfels import count_surfels
 from signedheat.lowering.grid.discretization import bytes_of_area
@@ -140,8 +140,11 @@ def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable
     made = shape()
     steps = Steps(True, True, True, sh.ZeroSet(), 1.0)
     grid = sh.Grid.around(made.bounds, size)
-    beside = bytes_of_faces(made) + (0 if closed else BYTES_IF_OPEN)
-    estimate = grid_estimate(grid, bytes_per_node(made, steps, closed), beside) - libraries()
+    per_node, beside, area = bytes_per_node(made, steps, True), bytes_of_faces(made), 0.0
+    if not closed:
+        per_node, beside, area = most_memory(made, steps)
+    surface = bytes_of_area(area, grid.spacing, grid.n_nodes)
+    estimate = grid_estimate(grid, per_node, beside) + surface - libraries()
     return lambda: sh.solid_distance(made, grid), estimate
 
 

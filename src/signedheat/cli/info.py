@@ -13,7 +13,8 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError, SourceError
 from ..extensions.joining import joined_shape
 from ..extensions.orientation import Orientation, orientation
-from ..extensions.solid_memory import BYTES_IF_OPEN, BYTES_PER_NODE, bytes_of_faces
+from ..extensions.solid_memory import most_memory
+from ..extensions.steps import Steps
 from ..extensions.thickness import Thickness, thickness
 from ..io import read, read_curves, read_polylines
 from ..io.files import extension
@@ -21,7 +22,7 @@ from ..io.labels import LabelImage
 from ..io.obj import read_obj_lines
 from ..io.three_mf import unit_of
 from ..lowering.area_elements import bounds_around
-from ..lowering.grid.discretization import fitting_spacing, memory_estimate
+from ..lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
 from ..memory import available_memory
 from .computing import Summary, describe
 from .curve_report import as_text, curve_reports
@@ -161,18 +162,19 @@ def _least_spacing(shape: Any) -> float | None:
     available = available_memory()
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    return float(fitting_spacing(Grid.around(shape.bounds, 128), available, BYTES_PER_NODE, _beside(shape)).max())
+    return float(fitting_spacing(Grid.around(shape.bounds, 128), available, *_most(shape)).max())
 
 
 def _memory(shape: Any, resolution: int) -> int | None:
     """Estimate for a grid around the shape; nothing where the shape is a single place."""
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    return memory_estimate(Grid.around(shape.bounds, resolution), BYTES_PER_NODE, _beside(shape))
+    grid, (per_node, beside, area) = Grid.around(shape.bounds, resolution), _most(shape)
+    return memory_estimate(grid, per_node, beside) + int(bytes_of_area(area, grid.spacing, grid.n_nodes))
 
 
-def _beside(shape: Any) -> float:
-    return bytes_of_faces(joined_shape(shape)) + BYTES_IF_OPEN
+def _most(shape: Any) -> tuple[float, float, float]:
+    return most_memory(joined_shape(shape), Steps())
 
 
 def _table(summary: dict[str, Any]) -> str:

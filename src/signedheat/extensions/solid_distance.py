@@ -44,7 +44,7 @@ from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .shape_sides import sides_of_shape
 from .sharpening import sharpen
 from .sides import FAR
-from .solid_memory import BYTES_IF_OPEN, bytes_of_faces, bytes_per_node
+from .solid_memory import bytes_of_faces, bytes_per_node, most_memory
 from .steps import Steps
 from .thin_walls import telling_at, with_thin_walls
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, without_covered, wound
@@ -231,8 +231,8 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
-    rates = [bytes_per_node(shape, steps, closed) for closed in (True, False)]
-    refuse_beyond_memory(grid, rates[0], bytes_of_faces(shape), at_most=rates[1])
+    most = most_memory(shape, steps)
+    refuse_beyond_memory(grid, bytes_per_node(shape, steps, closed=True), bytes_of_faces(shape), at_most=most)
     with stopwatch("orient"):
         merged, closed = _oriented(shape, steps, notes) if steps.orient else (merge_duplicates(shape), False)
     overlaps = overlaps_of(merged, grid, steps.finest) if steps.unite else None
@@ -240,7 +240,8 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
         field = _bounded(merged, grid, steps, overlaps, notes, stopwatch)
         if field is not None:
             return field
-    refuse_beyond_memory(grid, bytes_per_node(merged.shape, steps, closed=False), BYTES_IF_OPEN)
+    per_node, beside, area = most_memory(merged.shape, steps)
+    refuse_beyond_memory(grid, per_node, beside - bytes_of_faces(merged.shape), area)
     discretization = discretize(grid)
     with stopwatch("unite"):
         merged, samples, winding = _united(merged, grid, steps, overlaps, notes)

@@ -7,17 +7,22 @@ import numpy as np
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
+from ..lowering.grid.discretization import BYTES_PER_AREA
 from .joining import Shape
 from .steps import Steps
 
-BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 54, 45, 29
+BYTES_PER_NODE, BYTES_IF_PLAIN, BYTES_IF_CLOSED = 42, 45, 29
 """Measured peak memory: of shapes with holes or overlaps; of φ alone; of shapes whose parts are closed."""
+BYTES_PER_CELL = 600
+"""What each square cell of their surface adds, of shapes with holes or overlaps."""
 BYTES_IF_SCATTERED, BYTES_IF_POINTS = 62, 46
 """The same of noisy soups, whose faces lie in layers, and of points."""
-BYTES_PER_FACE, BYTES_PER_SCATTERED_FACE = 400, 1200
-"""What each triangle of the shape adds, and each of a noisy soup, which share no edges."""
-BYTES_IF_OPEN, BYTES_OF_POINTS = 20_000_000, 210_000_000
+BYTES_PER_FACE, BYTES_PER_OPEN_FACE = 400, 1200
+"""What each triangle of the shape adds, and each of one that is not closed, as those of noisy soups."""
+BYTES_IF_OPEN, BYTES_OF_POINTS = 10_000_000, 210_000_000
 """Of libraries and kernels that only shapes which are not closed, and turning points, need."""
+BYTES_IF_SOUP = 20_000_000
+"""The same of noisy soups."""
 ONCE = 0.9
 """Share of the vertices with a coordinate of their own from which on a soup has noise, so that it is never joined."""
 
@@ -40,8 +45,18 @@ def bytes_of_faces(shape: Shape) -> float:
     if isinstance(shape, PolygonMesh):
         return float(BYTES_PER_FACE * len(shape.corners))
     if is_scattered(shape):
-        return float(BYTES_IF_OPEN + BYTES_PER_SCATTERED_FACE * shape.n_faces)
+        return float(BYTES_IF_SOUP + BYTES_PER_OPEN_FACE * shape.n_faces)
     return float(BYTES_PER_FACE * shape.n_faces)
+
+
+def most_memory(shape: Shape, steps: Steps) -> tuple[float, float, float]:
+    """Bytes for each node, bytes besides, and area as `bytes_of_area` counts it, of a shape that is not closed."""
+    per_node, beside = bytes_per_node(shape, steps, closed=False), bytes_of_faces(shape)
+    if isinstance(shape, PointCloud) or per_node != BYTES_PER_NODE:
+        return per_node, beside, 0.0
+    beside *= BYTES_PER_OPEN_FACE / BYTES_PER_FACE
+    area = float(shape.triangulation.face_areas.sum())
+    return per_node, beside + BYTES_IF_OPEN, area * BYTES_PER_CELL / BYTES_PER_AREA
 
 
 def is_scattered(mesh: TriangleMesh) -> bool:

@@ -69,18 +69,18 @@ def refuse_beyond_memory(
     per_node: float | None = None,
     beside: float = 0.0,
     area: float = 0.0,
-    at_most: float | None = None,
+    at_most: tuple[float, float, float] | None = None,
 ) -> None:
     """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing.
 
-    Of φ alone, more is known when the area of the surface is. The spacing that is told has room for `at_most` bytes for
-    each node, where it may turn out that so many are needed.
+    Of φ alone, more is known when the area of the surface is. The spacing that is told has room for `at_most`:
+    bytes for each node, bytes besides and area, where it may turn out that so much is needed.
     """
     available, needed = available_memory(), memory_estimate(grid, per_node, beside)
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    fitting = ROOM * fitting_spacing(grid, available, at_most or per_node, beside, area)
+    fitting = ROOM * fitting_spacing(grid, available, *(at_most or (per_node, beside, area)))
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     raise MemoryLimitError(
         f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
