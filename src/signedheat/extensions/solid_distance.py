@@ -24,7 +24,6 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import sampled
 from ..lowering.area_elements import AreaSamples, bounds_around, sample_on_grid
-from ..lowering.grid.discretization import refuse_beyond_memory
 from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
 from ..operators.grid.fitted_points import mean_gap
@@ -44,7 +43,7 @@ from .shape_sharpening import Assembled, Fit, assemble, triangles_of
 from .shape_sides import sides_of_shape
 from .sharpening import sharpen
 from .sides import FAR
-from .solid_memory import bytes_of_faces, bytes_per_node, most_memory
+from .solid_memory import refuse_even_if_closed, refuse_if_open
 from .steps import Steps
 from .thin_walls import telling_at, with_thin_walls
 from .uniting import SAMPLE_SIZE, Merged, merge_duplicates, union_of, without_covered, wound
@@ -231,8 +230,7 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
     """Each step, timed, on a grid in space."""
     notes: list[Note] = []
     stopwatch = Stopwatch(progress, STEPS)
-    most = most_memory(shape, steps)
-    refuse_beyond_memory(grid, bytes_per_node(shape, steps, closed=True), bytes_of_faces(shape), at_most=most)
+    refuse_even_if_closed(shape, grid, steps)
     with stopwatch("orient"):
         merged, closed = _oriented(shape, steps, notes) if steps.orient else (merge_duplicates(shape), False)
     overlaps = overlaps_of(merged, grid, steps.finest) if steps.unite else None
@@ -240,8 +238,7 @@ def _on_grid(shape: Shape, grid: Grid, steps: Steps, progress: Progress | None) 
         field = _bounded(merged, grid, steps, overlaps, notes, stopwatch)
         if field is not None:
             return field
-    per_node, beside, area = most_memory(merged.shape, steps)
-    refuse_beyond_memory(grid, per_node, beside - bytes_of_faces(merged.shape), area)
+    refuse_if_open(merged.shape, grid, steps)
     discretization = discretize(grid)
     with stopwatch("unite"):
         merged, samples, winding = _united(merged, grid, steps, overlaps, notes)

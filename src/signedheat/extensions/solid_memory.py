@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..lowering.grid.discretization import BYTES_PER_AREA
+from ..lowering.grid.discretization import BYTES_PER_AREA, refuse_beyond_memory
 from .joining import Shape
 from .steps import Steps
 
@@ -57,6 +58,23 @@ def most_memory(shape: Shape, steps: Steps) -> tuple[float, float, float]:
     beside *= BYTES_PER_OPEN_FACE / BYTES_PER_FACE
     area = float(shape.triangulation.face_areas.sum())
     return per_node, beside + BYTES_IF_OPEN, area * BYTES_PER_CELL / BYTES_PER_AREA
+
+
+def refuse_even_if_closed(shape: Shape, grid: Grid, steps: Steps) -> None:
+    """Raise `MemoryLimitError`, before anything is allocated, if even a closed shape would not fit."""
+    per_node, most = bytes_per_node(shape, steps, closed=True), most_memory(shape, steps)
+    refuse_beyond_memory(grid, per_node, bytes_of_faces(shape), at_most=most, scale=_scale(grid, steps))
+
+
+def refuse_if_open(shape: Shape, grid: Grid, steps: Steps) -> None:
+    """The same for a shape that turns out not to be closed, whose faces are there already."""
+    per_node, beside, area = most_memory(shape, steps)
+    refuse_beyond_memory(grid, per_node, beside - bytes_of_faces(shape), area, scale=_scale(grid, steps))
+
+
+def _scale(grid: Grid, steps: Steps) -> float:
+    """Spacing of the band that a grid is coarse for, over its own."""
+    return 1.0 if steps.finest is None else steps.finest / float(grid.spacing.min())
 
 
 def is_scattered(mesh: TriangleMesh) -> bool:

@@ -70,17 +70,19 @@ def refuse_beyond_memory(
     beside: float = 0.0,
     area: float = 0.0,
     at_most: tuple[float, float, float] | None = None,
+    scale: float = 1.0,
 ) -> None:
     """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing.
 
     Of φ alone, more is known when the area of the surface is. The spacing that is told has room for `at_most`:
-    bytes for each node, bytes besides and area, where it may turn out that so much is needed.
+    bytes for each node, bytes besides and area, where it may turn out that so much is needed. It is multiplied
+    by `scale`: a band is asked for by the spacing of its own nodes.
     """
     available, needed = available_memory(), memory_estimate(grid, per_node, beside)
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    fitting = ROOM * fitting_spacing(grid, available, *(at_most or (per_node, beside, area)))
+    fitting = scale * ROOM * fitting_spacing(grid, available, *(at_most or (per_node, beside, area)))
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     raise MemoryLimitError(
         f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
