@@ -1,13 +1,14 @@
 """Signs from pairs, planes from neighbours, points that stand for many."""
 
 import itertools
+from itertools import product
 
 import numpy as np
 import pytest
 
 from signedheat.geometry.plane_fit_kernels import least_eigenvector
 from signedheat.geometry.plane_fits import CLEAN_NEIGHBORS, fit_planes, noise_scale
-from signedheat.geometry.synchronization import synchronize_signs
+from signedheat.geometry.synchronization import best_signs, synchronize_signs
 from signedheat.geometry.thinning import spread_out
 
 
@@ -102,3 +103,16 @@ def test_points_that_stand_for_others_are_apart_and_leave_none_alone():
     assert (gaps <= radii[kept]).any(axis=1).all()
     earlier = np.tril(np.ones((len(kept), len(kept)), dtype=bool), -1).T
     assert (gaps[kept].T > radii[kept][:, None])[earlier].all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_best_signs_of_small_matrices_are_the_best(seed):
+    rng = np.random.default_rng(seed)
+    weights = rng.normal(size=(9, 9)) * (rng.random((9, 9)) < 0.6)
+    weights += weights.T
+    every = np.array(list(product([-1.0, 1.0], repeat=9)))
+    off = weights - np.diag(np.diag(weights))
+    best = np.einsum("ki,ij,kj->k", every, off, every).max()
+    found = best_signs(weights, np.ones(9))
+    assert found @ off @ found >= 0.97 * best
+    assert set(found) <= {-1.0, 1.0}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain
 from typing import Any, Literal
 
 from ..constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
@@ -15,11 +14,9 @@ from ..fields.vertex_field import VertexField
 from ..progress import Progress
 from ..solver import SignedHeatSolver, distance_unwarned
 from .close_curves import for_zero_set
-from .curve_pieces import distance_to_pieces, flattened, surface_of
+from .curve_pieces import distance_to_pieces
 from .sharpening import sharpen
-
-SHORT = 16.0
-"""Length of all curves together, in h, below which triangles are made for them."""
+from .small_curves import are_small
 
 
 def curve_distance(
@@ -107,11 +104,3 @@ def curve_distance(
         field, taken = measured(replace(solver, intrinsic=True))
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
     return sharpen(field, taken, progress=rest)
-
-
-def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
-    """Whether all oriented curves together are so short that triangles do not resolve how they go on between pieces."""
-    surface = surface_of(solver)
-    parts = chain.from_iterable(surface.segments(flattened(curves)))
-    lengths = [float(part.lengths.sum()) for part in parts if part.oriented]
-    return bool(lengths) and sum(lengths) < SHORT * surface.spacing

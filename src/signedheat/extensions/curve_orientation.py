@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..discretization import discretize
-from ..domains.curves import Curve, CurveOrPoints
+from ..domains.curves import CurveOrPoints
 from ..domains.foreign import ForeignShape, converted
 from ..domains.kinds import SurfaceDomain
-from ..errors import SignedHeatError, UnsupportedTypeError
-from ..fields.vertex_field import VertexField
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..reprs import ShortRepr
-from ..solver import SignedHeatSolver, distance_unwarned
+from ..solver import SignedHeatSolver
+from .close_curves import for_zero_set
 from .curve_votes import Votes
-from .piece_directions import directed, undisputed
+from .piece_directions import directions
+from .small_curves import are_small, surface_of, triangulated_once
 from .turned_curves import with_turned
 
 
@@ -61,9 +62,10 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
     unoriented curves and points stay as they are. Pieces of different curves that are far from each other have the
     direction that most of their length was given with.
 
-    Takes one factorisation, and one solve for each piece. What the ends of one curve tell about those of another is
-    little; so if pieces are to be turned, distance is measured to them with a few directions, and pieces are turned for
-    which it becomes clearly more even.
+    What the ends of one curve tell about those of another is little; how they face each other is told by their winding
+    numbers, whose sum is the same at all curves that bound one region. Complete curves count there, too.
+
+    Takes one factorisation, and two solves for each piece.
 
     Parameters
     ----------
@@ -96,28 +98,21 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
     listed = list(curves)
     votes = Votes.of(surface, listed)
     turned, agreement = np.zeros(len(listed), dtype=bool), np.ones(len(listed))
-    if len(votes.pieces) > 1:
-        signs = checked_by_distance(votes, listed, SignedHeatSolver(converted(domain)), surface.spacing)
+    if votes.are_several:
+        finer = surface_for(surface, listed)
+        seen = votes if finer is surface else Votes.of(finer, listed)
+        signs = directions(seen, np.arange(len(votes.pieces)))
         agreement[votes.pieces] = votes.agreement(signs, np.arange(len(votes.pieces)))
         turned[votes.pieces] = signs < 0
     return CurveOrientation(with_turned(listed, turned), turned, agreement)
 
 
-def checked_by_distance(
-    votes: Votes, curves: list[CurveOrPoints], solver: SignedHeatSolver[Any], spacing: float
-) -> NDArray[np.float64]:
-    """(k,) directions ±1 of all pieces: those that their ends tell, or of more even distance."""
-    signs, _ = votes.counted()
-    if undisputed(signs, votes.lengths, spacing):
-        return signs
-    turned = np.zeros(len(curves), dtype=bool)
-
-    def distance(signs: NDArray[np.float64]) -> VertexField[Any]:
-        turned[votes.pieces] = signs < 0
-        return distance_unwarned(solver, with_turned(curves, turned), None)
-
-    alone = sum(isinstance(curve, Curve) and curve.oriented for curve in curves) == len(votes.pieces)
+def surface_for(surface: SurfaceDiscretization, curves: list[CurveOrPoints]) -> SurfaceDiscretization:
+    """Triangles on which the curves are seen: those that there are, or smaller ones."""
+    mesh = surface.domain
+    if not isinstance(mesh, TriangleMesh) or not are_small(SignedHeatSolver(mesh), curves):
+        return surface
     try:
-        return directed(votes, np.arange(len(votes.pieces)), alone, spacing, distance).signs
-    except SignedHeatError:  # there is none, for instance where everything lies inside single faces
-        return signs
+        return surface_of(triangulated_once(for_zero_set(mesh, 1.0), curves))
+    except GeometryError:  # too thin to be triangulated anew
+        return surface

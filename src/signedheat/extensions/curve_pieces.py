@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
-from typing import TypeVar, cast
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..constraints import Constraint
 from ..diagnostics import Note
-from ..discretization import discretize
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.kinds import SurfaceDomain
 from ..errors import InexactWarning, warn_user
 from ..fields.vertex_field import VertexField
-from ..lowering.surface.discretization import SurfaceDiscretization
-from ..solver import SignedHeatSolver, as_list, distance_unwarned
+from ..solver import SignedHeatSolver, distance_unwarned
 from .curve_votes import Votes
-from .piece_directions import directed
+from .piece_directions import directions
+from .small_curves import flattened, surface_of, triangulated_once
 from .turned_curves import with_turned
 
 STRANGE = 0.12
@@ -84,9 +82,12 @@ def distance_to_pieces(
     listed = flattened(curves)
     surface = surface_of(solver)
     votes = Votes.of(surface, listed)
-    if len(votes.pieces) < 2:
+    if not votes.are_several:
         return distance_unwarned(solver, listed, constraint), listed
     suspects = np.empty(0, dtype=np.int64) if every_piece else suspected(votes)
+    once = triangulated_once(solver, listed)
+    if once is not solver:  # what pieces agree is measured on triangles of one size, how they run where they are seen
+        solver, votes = once, Votes.of(surface_of(once), listed)
     field, taken = without(solver, listed, votes, suspects, constraint)
     lengths = dict(zip(votes.pieces.tolist(), votes.lengths.tolist(), strict=True))
     near = {k: max(ASTRAY * lengths[k], NEAR * surface.spacing) for k in suspects.tolist()}
@@ -106,18 +107,6 @@ def distance_to_pieces(
     return field, list(taken.values())
 
 
-def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
-    """The curves and points, without the groups that they were given in."""
-    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
-    return list(chain.from_iterable(c if isinstance(c, Sequence) else [c] for c in listed))
-
-
-def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
-    """The discretisation that the solver uses for all sources, or else that of its domain."""
-    made = solver.discretization
-    return made if isinstance(made, SurfaceDiscretization) else cast("SurfaceDiscretization", discretize(solver.domain))
-
-
 def without(
     solver: SignedHeatSolver[Surface],
     curves: Sequence[CurveOrPoints],
@@ -127,22 +116,12 @@ def without(
 ) -> tuple[VertexField[Surface], dict[int, CurveOrPoints]]:
     """Distance to the curves without some, and these by number; those that then disagree with the others are turned."""
     among = np.flatnonzero(~np.isin(votes.pieces, out))
-    left = [k for k in range(len(curves)) if k not in set(out.tolist())]
-
-    def turned(signs: NDArray[np.float64]) -> dict[int, CurveOrPoints]:
-        turn = np.zeros(len(curves), dtype=bool)
-        turn[votes.pieces[among]] = signs < 0
-        made = with_turned(curves, turn)
-        return {k: made[k] for k in left}
-
-    def distance(signs: NDArray[np.float64]) -> VertexField[Surface]:
-        return distance_unwarned(solver, list(turned(signs).values()), constraint)
-
-    if len(among) < 2:
-        as_given = np.ones(len(among))
-        return distance(as_given), turned(as_given)
-    found = directed(votes, among, len(left) == len(among), surface_of(solver).spacing, distance)
-    return found.field, turned(found.signs)
+    turn = np.zeros(len(curves), dtype=bool)
+    if len(among):
+        turn[votes.pieces[among]] = directions(votes, among) < 0
+    made = with_turned(curves, turn)
+    taken = {k: curve for k, curve in enumerate(made) if k not in set(out.tolist())}
+    return distance_unwarned(solver, list(taken.values()), constraint), taken
 
 
 def suspected(votes: Votes) -> NDArray[np.int64]:

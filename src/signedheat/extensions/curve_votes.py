@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..domains.curves import Curve, CurveOrPoints
-from ..geometry.curve_segments import interpolation_at
-from ..geometry.synchronization import nested_groups, synchronize_signs
+from ..geometry.curve_segments import CurveSegments, interpolation_at
+from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.synchronization import synchronize_signs
 from ..lowering.surface.discretization import SurfaceDiscretization
+from .curve_windings import Windings
 
 AS_GIVEN = 0.02
 """Vote of a piece of mean length for its own direction. Pieces that follow each other at their length have about .1."""
@@ -38,6 +40,8 @@ class Votes:
         ``⟨q_i, C⁻¹ q_i⟩``.
     lengths : (k,) float
         Of the pieces.
+    windings : Windings
+        Of the pieces and, after them, of the other oriented curves, which are complete.
     """
 
     pieces: NDArray[np.int64]
@@ -45,18 +49,36 @@ class Votes:
     pairs: sparse.csr_matrix
     own: NDArray[np.float64]
     lengths: NDArray[np.float64]
+    windings: Windings
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Votes:
         """Ask all pieces: one solve with the factor of C for each."""
-        is_open = [k for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented and not c.closed]
-        none = np.empty(0)
-        if len(is_open) < 2:
-            return cls(none.astype(np.int64), none.astype(bool), sparse.csr_matrix((0, 0)), none, none)
-        charges, lengths, outer = _charges(surface, [curves[k] for k in is_open])
-        asked = np.flatnonzero(outer < 2)
-        pairs, own = _pairs(surface, sparse.csr_matrix(charges[asked]))
-        return cls(np.array(is_open)[asked], outer[asked] == 0, pairs, own, lengths[asked])
+        listed = {k: c for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented}
+        parts = {k: part for k, (part,) in zip(listed, surface.segments([[c] for c in listed.values()]), strict=True)}
+        charges = {k: charge(surface, curve, parts[k]) for k, curve in listed.items()}
+        outer = outer_ends(surface.triangles, list(parts.values()))
+        is_piece = np.array([charges[k].nnz > 0 for k in listed], dtype=bool) & (outer < 2)
+        numbers = np.array(list(listed), dtype=np.int64)
+        pieces = numbers[is_piece]
+        if not len(pieces):
+            return cls.none(surface)
+        pairs, own = _pairs(surface, sparse.csr_matrix(sparse.vstack([charges[k] for k in pieces.tolist()])))
+        ordered = [parts[k] for k in (*pieces.tolist(), *numbers[~is_piece].tolist())]
+        lengths = np.array([part.lengths.sum() for part in ordered[: len(pieces)]])
+        return cls(pieces, outer[is_piece] == 0, pairs, own, lengths, Windings.of(surface, ordered))
+
+    @classmethod
+    def none(cls, surface: SurfaceDiscretization) -> Votes:
+        """Of no pieces."""
+        nothing, empty, numbers = np.empty(0), sparse.csr_matrix((0, 0)), np.empty(0, dtype=np.int64)
+        windings = Windings(surface, empty, empty, numbers)
+        return cls(numbers, nothing.astype(bool), empty, nothing, nothing, windings)
+
+    @property
+    def are_several(self) -> bool:
+        """Whether there are pieces, and other oriented curves that tell about them, pieces or not."""
+        return len(self.pieces) > 0 and len(self.windings.parts) > 1
 
     def counted(self, among: NDArray[np.int64] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(j,) directions ±1 relative to those given, and (j,) agreement, of some of the pieces with each other."""
@@ -71,44 +93,29 @@ class Votes:
         agreed = np.asarray(pairs.multiply(signs[:, None]).multiply(signs[None]).sum(axis=1)).ravel()
         return np.clip(agreed / np.maximum(self.own[among], 1e-300), 0.0, 1.0)
 
-    def told(self, among: NDArray[np.int64], one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-        """How much better some of the pieces agree with the rest in one choice of directions than in another: from −1
-        to 1, of the energy of the fewer that were turned.
-        """
-        pairs = sparse.csr_matrix(self.pairs[among][:, among])
-        gain = 0.5 * float(one @ (pairs @ one) - other @ (pairs @ other))
-        own = self.own[among]
-        return gain / max(min(float(own[one != other].sum()), float(own[one == other].sum())), 1e-300)
 
-    def groups(self, among: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-        """Groups of some of the pieces that tell most about each other, each (j,) group of every piece, large first."""
-        tails, heads, weights = sparse.find(self.pairs[among][:, among])
-        return nested_groups(tails, heads, weights, len(among))
+def charge(surface: SurfaceDiscretization, curve: Curve, part: CurveSegments) -> sparse.csr_matrix:
+    """(1, n) q: +1 where an oriented curve ends, −1 where it begins, if left of it is positive; 0 if it is closed."""
+    if curve.closed or part.ends[0, 0] == part.ends[-1, 1]:
+        return sparse.csr_matrix((1, surface.triangles.n_vertices))
+    right = False
+    if curve.normals is not None:
+        ((plain,),) = surface.segments([[Curve(curve.faces, curve.barycentric)]])
+        right = (np.conj(plain.vectors) * part.vectors).real.sum() < 0
+    at = interpolation_at(surface.triangles, part.nodes[part.ends[[0, -1], [0, 1]]])
+    return sparse.csr_matrix(at[0] - at[1] if right else at[1] - at[0])
 
 
-def _charges(
-    surface: SurfaceDiscretization, pieces: Sequence[CurveOrPoints]
-) -> tuple[sparse.csr_matrix, NDArray[np.float64], NDArray[np.int64]]:
-    """(k, n) q: +1 where each piece ends, −1 where it begins, with its positive side to its left; (k,) lengths; and
-    (k,) how many of its ends lie on the boundary of the surface, or on nonmanifold edges.
-    """
-    rows, lengths, outer = [], [], []
-    at_boundary = np.zeros(surface.triangles.n_vertices, dtype=bool)
-    edges = surface.triangles.edges
+def outer_ends(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.int64]:
+    """(k,) how many ends of curves lie on the boundary of the surface, or on nonmanifold edges."""
+    at_boundary = np.zeros(triangles.n_vertices, dtype=bool)
+    edges = triangles.edges
     at_boundary[edges.vertices[edges.face_counts != 2]] = True  # across three faces no direction goes on to the others
-    for piece in pieces:
-        assert isinstance(piece, Curve)
-        ((part,),) = surface.segments([[piece]])
-        tips = part.nodes[np.array([part.ends[0, 0], part.ends[-1, 1]])]
-        at = interpolation_at(surface.triangles, tips)
-        right = False
-        if piece.normals is not None:
-            ((plain,),) = surface.segments([[Curve(piece.faces, piece.barycentric)]])
-            right = (np.conj(plain.vectors) * part.vectors).real.sum() < 0
-        rows.append(at[0] - at[1] if right else at[1] - at[0])
-        lengths.append(part.lengths.sum())
-        outer.append(sum(bool(at_boundary[at[k].indices].all()) for k in (0, 1)))
-    return sparse.csr_matrix(sparse.vstack(rows)), np.array(lengths), np.array(outer)
+    found = np.zeros(len(parts), dtype=np.int64)
+    for k, part in enumerate(parts):
+        at = interpolation_at(triangles, part.nodes[part.ends[[0, -1], [0, 1]]])
+        found[k] = sum(bool(at_boundary[at[end].indices].all()) for end in (0, 1))
+    return found
 
 
 def _pairs(surface: SurfaceDiscretization, charges: sparse.csr_matrix) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
@@ -138,9 +145,7 @@ def _signs(votes: sparse.csr_matrix, lengths: NDArray[np.float64]) -> NDArray[np
     """(k,) ±1, relative to the directions that the pieces were given with."""
     k = len(lengths)
     tails, heads, weights = sparse.find(votes)
-    stay = (
-        AS_GIVEN * lengths / max(float(lengths.mean()), 1e-300)
-    )  # votes of one more node, which stands for "as given"
+    stay = AS_GIVEN * lengths / max(float(lengths.mean()), 1e-300)  # of one more node, which stands for "as given"
     signs = synchronize_signs(
         np.concatenate([tails, np.arange(k)]),
         np.concatenate([heads, np.full(k, k)]),

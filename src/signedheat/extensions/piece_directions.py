@@ -1,150 +1,80 @@
-"""Directions of the pieces of broken curves, checked by the distance that they give."""
+"""Directions of the pieces of broken curves: told by their ends, and by how they wind round each other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Generic, TypeVar
-
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from ..discretization import discretize
-from ..errors import SignedHeatError
-from ..fields.vertex_field import VertexField
-from ..lowering.surface.discretization import SurfaceDiscretization
-from ..operators.linear_elements import LinearElements
-from .curve_votes import Votes
-from .vertex_sharpening import at_triangles
+from ..geometry.synchronization import best_signs, nested_groups
+from .curve_votes import AS_GIVEN, Votes
 
-GOOD = 0.1
-"""Slope error up to which no directions are tried but those that the ends of pieces and what was given suggest."""
-BAD = 0.25
-"""Slope error from which many others are tried."""
-FEW, MANY = 6, 16
-"""How many are tried."""
-RESOLVED = 2.0
-"""Mean length of pieces, relative to h, from which slopes tell anything of them."""
-EVIDENCE = 0.5
-"""Area without slope that turning a piece must save, relative to its length squared."""
-HARDLY = 0.2
-"""What ends may tell about others, relative to their own energy, to tell hardly anything."""
-
-Field = TypeVar("Field", bound=VertexField)
+FACING = (1.0, 4.0)
+"""Weights of a winding number that is wrong by one, beside the energy of ends: small ones first, as both agree more
+easily then."""
+MANY = 1000
+"""Pieces from which those that their ends tie most to each other are turned together."""
+MOST = 0.35
+"""Length that may be turned, of all, where the ends of pieces tell to turn none and no curve is complete."""
+CLEARLY = 0.5
+"""Scatter of winding numbers, relative to that as given, above which nothing is turned where ends tell to turn none."""
 
 
-@dataclass(frozen=True)
-class Directed(Generic[Field]):
-    """Directions ±1 of pieces, relative to those given; the distance that they give; and where it has no slope of one.
+def directions(votes: Votes, among: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k,) directions ±1 of some of the pieces, relative to those given.
 
-    Attributes
-    ----------
-    uneven : float
-        Integral of ``min((|∇φ| − 1)², 1)``, in units of area.
-    area : float
-        Of the surface where φ is known.
-    """
+    Ends of pieces tell how the pieces of one curve follow each other, and nearly nothing of how two curves face.
+    Winding numbers tell that (`Windings`): where all curves bound one region, their sum is the same at all of them.
+    Directions are sought that make the energy of ends and the scatter of winding numbers small together. Complete
+    curves are as given, and tell with the others.
 
-    signs: NDArray[np.float64]
-    field: Field
-    uneven: float
-    area: float
-
-    @classmethod
-    def of(cls, signs: NDArray[np.float64], field: Field) -> Directed[Field]:
-        """What the slopes of a field tell."""
-        surface = discretize(field.finest.domain)
-        assert isinstance(surface, SurfaceDiscretization)
-        elements = LinearElements.on_triangles(surface.triangles)
-        slopes = np.linalg.norm(elements.slopes(at_triangles(surface, field.finest)), axis=1)
-        known = np.isfinite(slopes)
-        sizes = elements.sizes[known]
-        return cls(signs, field, float(sizes @ np.minimum((slopes[known] - 1.0) ** 2, 1.0)), float(sizes.sum()))
-
-    @property
-    def slope_error(self) -> float:
-        """Root mean square."""
-        return float(np.sqrt(self.uneven / self.area)) if self.area > 0 else 0.0
-
-    def gives_way(self, other: Directed[Field], lengths: NDArray[np.float64]) -> bool:
-        """Whether others are so much better that pieces of these lengths are to be turned for it."""
-        turned = lengths[self.signs != other.signs]
-        return other.uneven < self.uneven - EVIDENCE * float((turned**2).sum())
-
-
-def directed(
-    votes: Votes,
-    among: NDArray[np.int64],
-    alone: bool,
-    spacing: float,
-    distance: Callable[[NDArray[np.float64]], Field],
-) -> Directed[Field]:
-    """The directions of pieces that give the most even distance.
-
-    Ends of pieces tell how the pieces of one curve follow each other, and nearly nothing of how two curves face. If
-    curves disagree, no function has slope one between them. So if the ends tell to turn some, directions are tried in
-    which the pieces are as given, altogether or for the most part in each group of pieces that follow each other, or
-    with single groups turned back. They are taken where they are clearly more even or, of groups whose ends tell hardly
-    anything about each other, where they are not clearly less so.
-
-    Parameters
-    ----------
-    votes : Votes
-        Of the pieces.
-    among : (k,) int
-        Which of them are to be directed.
-    alone : bool
-        Whether there is no other oriented curve, so that turning all of them tells nothing.
-    spacing : float
-        h.
-    distance : callable
-        The field of (k,) directions.
+    Where no piece disagrees with the next, curves are taken as they are, such as parallel lines that all look the same
+    way, unless few of them disagree with all others, or all with complete curves.
     """
     by_ends, _ = votes.counted(among)
+    unit = units(votes, among)
+    held = sparse.csr_matrix((by_ends, (unit, np.arange(len(among)))), shape=(int(unit.max()) + 1, len(among)))
+    pairs = sparse.csr_matrix(votes.pairs[among][:, among])
+    agreed = np.asarray((held @ (0.5 * (pairs + pairs.T)) @ held.T).todense())
     lengths = votes.lengths[among]
-    best = Directed.of(by_ends, distance(by_ends))
-    if undisputed(by_ends, lengths, spacing):
-        return best
-    groups = votes.groups(among)
-    tried = {by_ends.tobytes()}
-    most = FEW if best.slope_error < BAD else MANY
-
-    def better(best: Directed[Field], signs: NDArray[np.float64]) -> Directed[Field]:
-        """The better ones; if neither is clearly better, those of whose ends others tell more."""
-        if alone and lengths @ signs < 0:
-            signs = -signs
-        if len(tried) > most or signs.tobytes() in tried:
-            return best
-        tried.add(signs.tobytes())
-        try:
-            other = Directed.of(signs, distance(signs))
-        except SignedHeatError:  # no directions at all
-            return best
-        if votes.told(among, best.signs, signs) < HARDLY:
-            return best if other.gives_way(best, lengths) else other
-        return other if best.gives_way(other, lengths) else best
-
-    for signs in reversed(list(as_given_mostly(by_ends, groups, lengths))):
-        best = better(best, signs)
-    if best.slope_error <= GOOD:
-        return best
-    for level in groups:
-        for group in range(int(level.max()) + 1):
-            if lengths[level == group] @ best.signs[level == group] < 0:  # towards how they were given
-                best = better(best, np.where(level == group, -best.signs, best.signs))
-    return best
+    stay = AS_GIVEN * (held @ lengths) / max(float(lengths.mean()), 1e-300)
+    told = np.block([[agreed, stay[:, None]], [stay[None], np.zeros((1, 1))]])
+    scattered = scatter(votes, among, held)
+    found = np.ones(len(told))
+    for weight in FACING:
+        found = best_signs(told - 2 * weight * scattered, found)
+    signs: NDArray[np.float64] = held.T @ (found[:-1] * found[-1])
+    none_complete = len(votes.pieces) == len(votes.windings.parts)
+    many = none_complete and lengths[signs < 0].sum() > MOST * lengths.sum()
+    ones = np.ones(len(found))
+    still = found @ scattered @ found > CLEARLY * (ones @ scattered @ ones)
+    return by_ends if (by_ends > 0).all() and (many or still) else signs
 
 
-def undisputed(by_ends: NDArray[np.float64], lengths: NDArray[np.float64], spacing: float) -> bool:
-    """Whether what the ends of pieces tell is taken as it is: nothing is turned, or too small for slopes to tell."""
-    return bool((by_ends > 0).all() or lengths.mean() < RESOLVED * spacing)
+def scatter(votes: Votes, among: NDArray[np.int64], held: sparse.csr_matrix) -> NDArray[np.float64]:
+    """(j + 1, j + 1) Q: ``sᵀ Q s`` is the scatter of the winding numbers at curves, of units with the signs s.
+
+    The last unit is all complete curves. Numbers are compared within each part of the surface.
+    """
+    k, n = len(votes.pieces), len(votes.windings.parts)
+    rows = np.concatenate([among, np.arange(k, n)])
+    columns = sparse.csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), rows)), shape=(len(rows), n))
+    whole = sparse.csr_matrix(np.ones((1, n - k)))
+    sums = sparse.csr_matrix(sparse.block_diag([held, whole]) @ columns)
+    found = votes.windings.of_sums(sums)[rows]
+    parts = np.unique(votes.windings.parts[rows], return_inverse=True)[1].ravel()
+    member = sparse.csr_matrix((np.ones(len(rows)), (parts, np.arange(len(rows)))))
+    means = (member @ found) / np.bincount(parts)[:, None]
+    scattered = found - means[parts]
+    result: NDArray[np.float64] = scattered.T @ scattered
+    return result
 
 
-def as_given_mostly(
-    signs: NDArray[np.float64], groups: list[NDArray[np.int64]], lengths: NDArray[np.float64]
-) -> Iterator[NDArray[np.float64]]:
-    """Directions as given, and with each group turned as most of its length was given."""
-    yield np.ones(len(signs))
-    for level in groups:
-        as_given = np.bincount(level, lengths * signs)
-        yield np.where(as_given[level] < 0, -signs, signs)
+def units(votes: Votes, among: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k,) what some of the pieces are turned with: each alone or, if they are many, in groups told by their ends."""
+    if len(among) <= MANY:
+        return np.arange(len(among))
+    tails, heads, weights = sparse.find(votes.pairs[among][:, among])
+    levels = nested_groups(tails, heads, weights, len(among))
+    few = [level for level in levels if level.max() < MANY]
+    return few[-1] if few else np.arange(len(among))

@@ -37,7 +37,8 @@ def _(
     curves: CurvesAndPoints | None = None,
 ) -> VertexField:
     if field.finest is not field:
-        fine = sharpen_field(field.finest, method, progress, curves)
+        same = replace(field.finest, diagnostics=field.diagnostics)
+        fine = sharpen_field(same, method, progress, curves)
         assert isinstance(fine, VertexField)
         values = fine.values[: len(field.values)]
         return replace(field, values=values, diagnostics=fine.diagnostics, finer=cast("VertexField[Any]", fine))

@@ -7,20 +7,18 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...diagnostics import IntrinsicTriangles
 from ...discretization import discretize
 from ...domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ...domains.triangle_mesh import TriangleMesh
 from ...errors import GeometryError
-from ...geometry.curve_segments import CurveSegments
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from ...progress import Progress
+from .curve_groups import CurveGroups
 from .discretization import SurfaceDiscretization
 from .memory import refuse_too_many
-from .source import connected
 
 SPOILED = 0.0015
 """Fraction of the area in triangles with an angle above `LARGE`, from which a mesh is refined."""
@@ -75,22 +73,21 @@ class RetriangulatedForZeroSet(Retriangulated):
     """The same for those who want the zero set alone: h suits pieces of curves, not triangles far away.
 
     With the t of large triangles, pieces of a curve that is smaller than these are one blot of heat, which tells
-    nothing of how the curve goes on between them. Gaps are about as long as pieces are, or shorter.
+    nothing of how the curve goes on between them. Gaps are about as long as pieces are, or shorter. Of several curves
+    the smallest counts.
     """
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Make the refinement."""
         surface, groups = super().adapt(sources)
+        scales = CurveGroups.of(self.mesh, sources).scales
         parts = [part for group in groups for part in group if len(part.ends)]
-        if not parts:
+        if not parts or not len(scales):
             return surface, groups
-        piece = connected(parts)[first_nodes(parts)]
-        of_segments = np.concatenate([part.lengths for part in parts])
-        lengths = np.bincount(piece, of_segments)
-        scale = float((lengths**2).sum() / lengths.sum())
         areas = surface.triangles.face_areas[np.concatenate([part.faces for part in parts])]
-        beside = 0.5 * float(np.average(np.sqrt(4 / 3**0.5 * areas), weights=of_segments))
-        return replace(surface, spacing=min(surface.spacing, max(SHARE_OF_PIECE * scale, beside))), groups
+        lengths = np.concatenate([part.lengths for part in parts])
+        beside = 0.5 * float(np.average(np.sqrt(4 / 3**0.5 * areas), weights=lengths))
+        return replace(surface, spacing=min(surface.spacing, max(SHARE_OF_PIECE * scales.min(), beside))), groups
 
 
 def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
@@ -162,9 +159,3 @@ def spacing(triangles: IntrinsicMesh) -> float:
     ``√t`` would be too short for the others.
     """
     return 0.5 * float(triangles.face_areas @ triangles.edge_lengths.mean(axis=1) / triangles.face_areas.sum())
-
-
-def first_nodes(parts: Sequence[CurveSegments]) -> NDArray[np.int64]:
-    """The first node of every segment, among the nodes of all sources."""
-    offsets = np.cumsum([0, *(len(part.nodes) for part in parts)])
-    return np.concatenate([part.ends[:, 0] + offset for part, offset in zip(parts, offsets[:-1], strict=True)])

@@ -1,0 +1,56 @@
+"""Curves that triangles do not resolve, and the triangles that are made for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain
+from typing import Any, TypeVar, cast
+
+from ..discretization import discretize
+from ..domains.curves import CurveOrPoints, CurvesAndPoints
+from ..domains.kinds import SurfaceDomain
+from ..domains.triangle_mesh import TriangleMesh
+from ..lowering.surface.curve_groups import CurveGroups
+from ..lowering.surface.discretization import SurfaceDiscretization
+from ..lowering.surface.intrinsic import Retriangulated
+from ..solver import SignedHeatSolver, as_list
+
+SHORT = 16.0
+"""Length of a curve, or of all its pieces, in h, below which triangles are made for them."""
+
+Surface = TypeVar("Surface", bound=SurfaceDomain)
+
+
+def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
+    """Whether oriented curves, or the pieces of one of them, are so short that triangles do not resolve them."""
+    surface, listed = surface_of(solver), flattened(curves)
+    short = SHORT * surface.spacing
+    if isinstance(solver.domain, TriangleMesh) and (CurveGroups.of(solver.domain, listed).lengths < short).any():
+        return True
+    lengths = [float(part.lengths.sum()) for part in chain.from_iterable(surface.segments(listed)) if part.oriented]
+    return bool(lengths) and sum(lengths) < short
+
+
+def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveOrPoints]) -> SignedHeatSolver[Surface]:
+    """The solver, on the triangles made for the curves if it makes some, which then do for some of them, too, and
+    whichever way they run.
+    """
+    made = solver.discretization
+    if not isinstance(made, Retriangulated):
+        return solver
+    once = replace(solver)
+    once.__dict__["discretization"] = made.adapt(curves)[0]
+    return once
+
+
+def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
+    """The discretisation that the solver uses for all sources, or else that of its domain."""
+    made = solver.discretization
+    return made if isinstance(made, SurfaceDiscretization) else cast("SurfaceDiscretization", discretize(solver.domain))
+
+
+def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
+    """The curves and points, without the groups that they were given in."""
+    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
+    return list(chain.from_iterable(c if isinstance(c, Sequence) else [c] for c in listed))
