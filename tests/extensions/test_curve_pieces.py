@@ -144,3 +144,12 @@ def test_orienting_keeps_rings_that_face_each_other_too():
     given = [pieces[0], pieces[1].reversed(), *pieces[2:]]
     assert sh.curve_orientation(pieces, mesh).turned.tolist() == [False] * 6
     assert sh.curve_orientation(given, mesh).turned.tolist() == [False, True, False, False, False, False]
+
+
+@pytest.mark.parametrize("wrong", [[], [1], [0, 3]])
+def test_rings_nearer_than_their_gaps_are_long(wrong):
+    """Three pieces each, with gaps nearly three times as long as the rings are apart."""
+    mesh = tube()
+    given = [piece.reversed() if k in wrong else piece for k, piece in enumerate(rings(mesh, 0.3, 3, 0.4))]
+    found = np.flatnonzero(sh.curve_orientation(given, mesh).turned).tolist()
+    assert found in (wrong, [k for k in range(6) if k not in wrong])

@@ -18,8 +18,8 @@ STRAIGHT = 0.5
 """Distance between the ends of a single piece, relative to its length, from which it is no curve with a gap."""
 
 
-LARGEST = 0.15
-"""Largest piece of a curve, relative to all of its pieces, for which diffusion times are chosen."""
+ROUND = 0.15
+"""What counts as the scale of a single piece, relative to its length: about the radius of a circle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +31,7 @@ class CurveGroups:
     lengths : (g,) float
         Of all pieces of each.
     scales : (g,) float
-        Mean length of the pieces of each, by length, and at most `LARGEST` of all of it: a single piece may be bent
-        to nearly a circle.
+        Mean length of the pieces of each, by length; of a single piece, which is bent nearly to a circle, less.
     """
 
     lengths: NDArray[np.float64]
@@ -55,7 +54,7 @@ class CurveGroups:
         group, length = np.unique(group[used], return_inverse=True)[1].ravel(), length[used]
         total = np.bincount(group, length).astype(np.float64)
         mean = np.bincount(group, length**2) / np.maximum(total, 1e-300)
-        return cls(total, np.minimum(mean, LARGEST * total))
+        return cls(total, np.where(np.bincount(group) > 1, mean, ROUND * total))
 
 
 def nearest_others(ends: NDArray[np.float64]) -> NDArray[np.int64]:
