@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .kernel_arrays import NO_END, is_plain, size
+
 arrays: Any = import_module("numba.np.arrayobj")
 cgutils: Any = import_module("numba.core.cgutils")
 llvm: Any = import_module("llvmlite.ir")
@@ -67,6 +69,8 @@ def lowered(lower: Any, kind: Any, expression: Any) -> Any:
     """The value of such a call, or None."""
     function = lower.typeof(expression.func.name)
     key: Any = getattr(function, "typing_key", None)
+    if key in MADE and expression.vararg is None and not expression.kws:
+        return MADE[key](lower, kind, expression.args)
     if expression.vararg is not None or returned(function, *_given(lower, expression)) is None:
         return None
     made = lower.fndesc.calltypes[expression]
@@ -75,19 +79,54 @@ def lowered(lower: Any, kind: Any, expression: Any) -> Any:
         return lower.context.cast(lower.builder, _extreme(lower.builder, LEAST[key], values), made.return_type, kind)
     named = dict(zip(SHAPED[key], expression.args, strict=False)) | dict(expression.kws)
     array = _allocated(lower, made.return_type, _sizes(lower, named["shape"]))
+    data, number, item = (lower.field(array, made.return_type, name) for name in ("data", "nitems", "itemsize"))
     if key is np.zeros:
-        size = lower.builder.mul(array.itemsize, array.nitems)
-        cgutils.memset(lower.builder, array.data, size, 0)
+        cgutils.memset(lower.builder, data, lower.builder.mul(item, number), 0)
     elif key is not np.empty:
         element = made.return_type.dtype
         if key is np.full:
             value = lower._cast_var(named["fill_value"], element)
         else:
             value = lower.context.get_constant_generic(lower.builder, element, 1)
-        with cgutils.for_range(lower.builder, array.nitems) as loop:
-            place = lower.builder.gep(array.data, [loop.index])
+        with cgutils.for_range(lower.builder, number) as loop:
+            place = lower.builder.gep(data, [loop.index])
             arrays.store_item(lower.context, lower.builder, made.return_type, value, place)
-    return array._getvalue()
+    return array
+
+
+def _range(lower: Any, kind: Any, given: list[Any]) -> Any:
+    if not isinstance(kind, types.RangeType) or not kind.dtype.signed:
+        return None
+    bounds = [lower._cast_var(one, kind.dtype) for one in given]
+    zero, one = (llvm.Constant(bounds[0].type, number) for number in (0, 1))
+    start, stop, step = [[zero, *bounds, one], [*bounds, one], bounds][len(bounds) - 1]
+    return lower.struct(kind, start=start, stop=stop, step=step)
+
+
+def _slice(lower: Any, kind: Any, given: list[Any]) -> Any:
+    kinds = [lower.typeof(one.name) for one in given]
+    if not all(one == types.none or isinstance(one, types.Integer) for one in kinds) or kind.has_step:
+        return None
+    bounds = [
+        None if one == types.none else lower._cast_var(var, types.intp) for one, var in zip(kinds, given, strict=True)
+    ]
+    start, stop = [None, *bounds] if len(bounds) == 1 else bounds[:2]
+    first, last, one = (lower.context.get_constant(types.intp, number) for number in (0, NO_END, 1))
+    return lower.struct(kind, start=start or first, stop=stop or last, step=one)
+
+
+def _length(lower: Any, kind: Any, given: list[Any]) -> Any:
+    array = lower.typeof(given[0].name)
+    return size(lower, lower.loadvar(given[0].name), array, 0) if is_plain(array) and kind == types.intp else None
+
+
+def _truth(lower: Any, kind: Any, given: list[Any]) -> Any:
+    is_one = len(given) == 1 and lower.typeof(given[0].name) == kind == types.boolean
+    return lower.loadvar(given[0].name) if is_one else None
+
+
+MADE = {range: _range, slice: _slice, len: _length, bool: _truth}
+"""What is made of arguments at once."""
 
 
 def _given(lower: Any, expression: Any) -> tuple[Any, Any]:
@@ -122,11 +161,11 @@ def _allocated(lower: Any, kind: Any, sizes: list[Any]) -> Any:
     zero = llvm.Constant(item.type, 0)
     strides, number = [item], sizes[-1]
     is_wrong = builder.icmp_signed("<", sizes[-1], zero)
-    for size in reversed(sizes[:-1]):
+    for one in reversed(sizes[:-1]):
         strides.insert(0, builder.mul(item, number))
-        product = builder.smul_with_overflow(number, size)
+        product = builder.smul_with_overflow(number, one)
         number = builder.extract_value(product, 0)
-        is_wrong = builder.or_(is_wrong, builder.icmp_signed("<", size, zero))
+        is_wrong = builder.or_(is_wrong, builder.icmp_signed("<", one, zero))
         is_wrong = builder.or_(is_wrong, builder.extract_value(product, 1))
     product = builder.smul_with_overflow(number, item)
     is_wrong = builder.or_(is_wrong, builder.extract_value(product, 1))
@@ -134,14 +173,14 @@ def _allocated(lower: Any, kind: Any, sizes: list[Any]) -> Any:
         context.call_conv.return_user_exc(builder, ValueError, ("the size of an array is negative or too large",))
     align = context.get_preferred_array_alignment(kind.dtype)
     held = context.nrt.meminfo_alloc_aligned(builder, builder.extract_value(product, 0), align)
-    array = arrays.make_array(kind)(context, builder)
     data = context.nrt.meminfo_data(builder, held)
-    arrays.populate_array(
-        array,
+    return lower.struct(
+        kind,
         data=builder.bitcast(data, context.get_data_type(kind.dtype).as_pointer()),
         shape=cgutils.pack_array(builder, sizes, item.type),
         strides=cgutils.pack_array(builder, strides, item.type),
         itemsize=item,
+        nitems=number,
         meminfo=held,
+        parent=llvm.Constant(cgutils.voidptr_t, None),
     )
-    return array

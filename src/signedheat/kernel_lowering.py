@@ -1,6 +1,6 @@
 """From Numba's typed statements to LLVM's: short ways for what kernels are full of, with the same values.
 
-Elements and parts of arrays, loops over ranges, sums and products of numbers, and variables that need no references.
+Elements, parts and sizes of arrays, loops over ranges, sums and products of numbers, and variables (`kernel_values`).
 Everything else is left to Numba. Importing this imports Numba.
 """
 
@@ -11,7 +11,9 @@ from importlib import import_module
 from typing import Any
 
 from . import kernel_calls as calls
+from .kernel_arrays import Place, is_plain, sizes
 from .kernel_entry import Entry, is_short
+from .kernel_values import Builder, Variables, counting, drop_unused
 
 arrays: Any = import_module("numba.np.arrayobj")
 callwrapper: Any = import_module("numba.core.callwrapper")
@@ -21,8 +23,11 @@ llvm: Any = import_module("llvmlite.ir")
 lowering: Any = import_module("numba.core.lowering")
 types: Any = import_module("numba.core.types")
 
-FLOATS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"}
-INTEGERS = {operator.add: "add", operator.sub: "sub", operator.mul: "mul"}
+NAMES = "add", "sub", "mul", "pow", "floordiv", "mod", "xor"
+NUMBERS = {
+    types.float64: {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"},
+    types.int64: {operator.add: "add", operator.sub: "sub", operator.mul: "mul", operator.xor: "xor"},
+}
 COMPARED = {
     operator.lt: "<",
     operator.le: "<=",
@@ -31,7 +36,23 @@ COMPARED = {
     operator.eq: "==",
     operator.ne: "!=",
 }
-IN_PLACE = {operator.iadd: operator.add, operator.isub: operator.sub, operator.imul: operator.mul}
+IN_PLACE = {getattr(operator, f"i{name}"): getattr(operator, name) for name in NAMES}
+
+
+def _quotient(builder: Any, value: Any, divisor: Any) -> Any:
+    """Rounded down, by a positive constant."""
+    is_below = builder.icmp_signed("<", builder.srem(value, divisor), llvm.Constant(value.type, 0))
+    return builder.add(builder.sdiv(value, divisor), builder.sext(is_below, value.type))
+
+
+def _remainder(builder: Any, value: Any, divisor: Any) -> Any:
+    """Not negative, by a positive constant."""
+    rest = builder.srem(value, divisor)
+    is_below = builder.icmp_signed("<", rest, llvm.Constant(value.type, 0))
+    return builder.select(is_below, builder.add(rest, divisor), rest)
+
+
+DIVIDED = {operator.floordiv: _quotient, operator.mod: _remainder}
 
 
 class Lower(lowering.Lower):  # type: ignore[misc]
@@ -39,9 +60,27 @@ class Lower(lowering.Lower):  # type: ignore[misc]
 
     def init(self) -> None:
         """Begin a function."""
-        super().init()
         self._counted: dict[Any, bool] = {}
-        self._ranges: dict[int, tuple[Any, Any, Any]] = {}
+        self._values: dict[str, Any] = {}
+        self._held: set[str] = set()
+        self._counting: set[str] = set()
+        self._items: dict[str, list[str]] = {}
+        self._singly_assigned_vars, self._blk_local_varmap = set(), {}
+        if not self.func_ir.func_id.is_generator:
+            variables = Variables(self.blocks, lambda name: self.is_counted(self.typeof(name)))
+            self._counting = counting(self.blocks, self.typeof)
+            self._held = {name for name in variables.once if not self.is_counted(self.typeof(name))} | variables.owned
+
+    def setup_function(self, fndesc: Any) -> None:
+        """Begin to write."""
+        super().setup_function(fndesc)
+        self.builder = Builder(self.entry_block)
+        self.call_helper = self.call_conv.init_call_helper(self.builder)
+
+    def lower_normal_function(self, fndesc: Any) -> None:
+        """A function that is no generator."""
+        super().lower_normal_function(fndesc)
+        drop_unused(self.function)
 
     def is_counted(self, kind: Any) -> bool:
         """Whether values of this type are kept alive by references."""
@@ -72,17 +111,33 @@ class Lower(lowering.Lower):  # type: ignore[misc]
 
     def delvar(self, name: str) -> None:
         """The end of a variable."""
-        if self.is_counted(self.typeof(name)):
+        kind = self.typeof(name)
+        if not self.is_counted(kind):
+            return
+        if name in self._held:
+            self.decref(kind, self._values[name])
+        else:
             super().delvar(name)
+
+    def loadvar(self, name: str) -> Any:
+        """The value of a variable."""
+        value = self._values.get(name)
+        return super().loadvar(name) if value is None else value
 
     def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
         """Give a variable its value."""
+        if name in self._held:
+            self._values[name] = value
+            return
+        place = self.getvar(name)
         if argidx is None and self.is_counted(self.typeof(name)):
-            super().storevar(value, name)
-        elif name in self._singly_assigned_vars:
-            self._blk_local_varmap[name] = value
-        else:
-            self.builder.store(value, self.getvar(name))
+            self.decref(self.typeof(name), self.builder.load(place))
+        self.builder.store(value, place)
+
+    def _alloca_var(self, name: str, kind: Any) -> None:
+        """Make room for a variable that needs it."""
+        if name not in self._held:
+            super()._alloca_var(name, kind)
 
     def alloca_lltype(self, name: str, kind: Any, datamodel: Any = None) -> Any:
         """Room for a variable."""
@@ -101,77 +156,90 @@ class Lower(lowering.Lower):  # type: ignore[misc]
         op = expression.op
         if op in ("getiter", "iternext", "pair_first", "pair_second"):
             found = self._of_range(op, expression)
-        elif op == "static_getitem" and expression.index_var is not None and self._is_plain(expression.value):
-            found = self.lower_getitem(
-                kind, expression, expression.value, expression.index_var, self.fndesc.calltypes[expression]
-            )
+        elif op == "getattr" and expression.attr == "shape" and is_plain(self.typeof(expression.value.name)):
+            found = sizes(self, self.loadvar(expression.value.name), self.typeof(expression.value.name))
+        elif op == "static_getitem":
+            found = self._static_getitem(kind, expression)
         else:
             found = None
         return super().lower_expr(kind, expression) if found is None else found
 
+    def _static_getitem(self, kind: Any, expression: Any) -> Any:
+        whole = self.typeof(expression.value.name)
+        if is_plain(whole) and expression.index_var is not None:
+            signature = self.fndesc.calltypes[expression]
+            return self.lower_getitem(kind, expression, expression.value, expression.index_var, signature)
+        if isinstance(whole, types.Tuple | types.UniTuple) and isinstance(expression.index, int):
+            index = range(len(whole))[expression.index]
+            found = self.builder.extract_value(self.loadvar(expression.value.name), index)
+            self.incref(whole[index], found)
+            return self.context.cast(self.builder, found, whole[index], kind)
+        return None
+
     def lower_inst(self, statement: Any) -> None:
         """A statement."""
-        if isinstance(statement, ir.StaticSetItem) and self._is_plain(statement.target):
+        if isinstance(statement, ir.Assign):
+            name = statement.target.name
+            is_argument = isinstance(statement.value, ir.Arg)
+            if isinstance(statement.value, ir.Expr) and statement.value.op == "build_tuple":
+                self._items[name] = [one.name for one in statement.value.items]
+            self.storevar(self.lower_assign(self.typeof(name), statement), name, 0 if is_argument else None)
+        elif isinstance(statement, ir.StaticSetItem) and is_plain(self.typeof(statement.target.name)):
             signature = self.fndesc.calltypes[statement]
             self.lower_setitem(statement.target, statement.index_var, statement.value, signature)
+        elif isinstance(statement, ir.SetItem):
+            self.lower_setitem(statement.target, statement.index, statement.value, self.fndesc.calltypes[statement])
+        elif isinstance(statement, ir.Del):
+            self.delvar(statement.value)
         else:
             super().lower_inst(statement)
 
     def lower_call(self, kind: Any, expression: Any) -> Any:
         """The value of a call."""
         short = calls.lowered(self, kind, expression)
-        if short is not None:
-            return short
-        value = super().lower_call(kind, expression)
-        function = self.typeof(expression.func.name)
-        is_range = isinstance(kind, types.RangeType) and getattr(function, "typing_key", None) is range
-        if is_range and kind.dtype.signed and len(expression.args) < 3:
-            given = [self._cast_var(argument, kind.dtype) for argument in expression.args]
-            start, stop = given if len(given) == 2 else (llvm.Constant(given[0].type, 0), given[0])
-            self._ranges[id(value)] = start, stop, value
-        return value
+        return super().lower_call(kind, expression) if short is None else short
 
     def _of_range(self, op: str, expression: Any) -> Any:
         kind = self.typeof(expression.value.name)
         value = self.loadvar(expression.value.name)
-        if op == "getiter":
-            known = self._ranges.get(id(value))
-            return None if known is None else self._begin(known, self.fndesc.calltypes[expression].return_type)
-        if op == "iternext":
-            if not isinstance(kind, types.RangeIteratorType):
-                return None
+        if op == "getiter" and isinstance(kind, types.RangeType) and kind.dtype.signed:
+            return self._begin(value, kind, self.fndesc.calltypes[expression].return_type)
+        if op == "iternext" and isinstance(kind, types.RangeIteratorType) and kind.yield_type.signed:
             return self._next(value, kind, self.fndesc.calltypes[expression].return_type)
         if isinstance(kind, types.Pair) and not self.is_counted(kind):
             return self.builder.extract_value(value, int(op == "pair_second"))
         return None
 
-    def _begin(self, known: tuple[Any, Any, Any], kind: Any) -> Any:
-        """The iterator of a range whose steps are 1."""
-        start, stop, _ = known
-        builder = self.builder
-        is_any = builder.icmp_signed(">", stop, start)
-        count = builder.select(is_any, builder.sub(stop, start), llvm.Constant(stop.type, 0))
-        places = [cgutils.alloca_once(builder, count.type) for _ in range(2)]
-        builder.store(start, places[0])
-        builder.store(count, places[1])
-        return self._struct(kind, iter=places[0], count=places[1], stop=stop, step=llvm.Constant(count.type, 1))
+    def _begin(self, value: Any, kind: Any, iterator: Any) -> Any:
+        """The iterator of a range: where the next number is kept."""
+        with self.builder.goto_entry_block():
+            place = self.builder.alloca(self.context.get_value_type(kind.dtype))
+        self.builder.store(self.field(value, kind, "start"), place)
+        return self.struct(iterator, iter=place, **{name: self.field(value, kind, name) for name in ("stop", "step")})
 
     def _next(self, iterator: Any, kind: Any, pair_kind: Any) -> Any:
         """The next number of a range, and whether there is one."""
         builder = self.builder
-        place, step, left = (self._field(iterator, kind, name) for name in ("iter", "step", "count"))
-        value, count = builder.load(place), builder.load(left)
-        is_valid = builder.icmp_signed(">", count, llvm.Constant(count.type, 0))
-        builder.store(builder.sub(count, llvm.Constant(count.type, 1), flags=["nsw"]), left)
-        builder.store(builder.add(value, step), place)
+        place, stop, step = (self.field(iterator, kind, name) for name in ("iter", "stop", "step"))
+        value = builder.load(place)
+        known = getattr(step, "constant", None)
+        if isinstance(known, int):
+            is_valid = builder.icmp_signed("<" if known > 0 else ">", value, stop)
+        else:
+            is_up = builder.icmp_signed(">", step, llvm.Constant(step.type, 0))
+            signs = [builder.icmp_signed(sign, value, stop) for sign in "<>"]
+            is_valid = builder.select(is_up, *signs)
+        builder.store(builder.add(value, step, flags=["nsw"]), place)
         pair = self.context.get_constant_undef(pair_kind)
         return builder.insert_value(builder.insert_value(pair, value, 0), is_valid, 1)
 
-    def _field(self, value: Any, kind: Any, name: str) -> Any:
+    def field(self, value: Any, kind: Any, name: str) -> Any:
+        """A part of a value by its name."""
         model = self.context.data_model_manager[kind]
         return self.builder.extract_value(value, model.get_field_position(name))
 
-    def _struct(self, kind: Any, **fields: Any) -> Any:
+    def struct(self, kind: Any, **fields: Any) -> Any:
+        """A value made of parts."""
         model = self.context.data_model_manager[kind]
         value = self.context.get_constant_undef(kind)
         for name, field in fields.items():
@@ -182,121 +250,73 @@ class Lower(lowering.Lower):  # type: ignore[misc]
         """The value of an operator."""
         signature = self.fndesc.calltypes[expression]
         left, right = (types.unliteral(one) for one in signature.args)
-        name = IN_PLACE.get(op, op)
-        returned = types.unliteral(signature.return_type)
-        is_float = left == types.float64
-        if left != right or not (is_float or left == types.int64):
-            return super().lower_binop(kind, expression, op)
-        make = (FLOATS if is_float else INTEGERS).get(name) if returned == left else None
-        if make is None and not (name in COMPARED and returned == types.boolean):
+        name, returned = IN_PLACE.get(op, op), types.unliteral(signature.return_type)
+        known = self.typeof(expression.rhs.name)
+        number = known.literal_value if isinstance(known, types.IntegerLiteral) else 0
+        if name is operator.pow and number == 2 and returned == left and isinstance(left, types.Float):
+            value = self._cast_var(expression.lhs, left)
+            return self.context.cast(self.builder, self.builder.fmul(value, value), returned, kind)
+        if left != right or left not in NUMBERS:
             return super().lower_binop(kind, expression, op)
         values = [self._cast_var(one, left) for one in (expression.lhs, expression.rhs)]
-        if make is not None:
-            value = getattr(self.builder, make)(*values)
-        elif not is_float:
-            value = self.builder.icmp_signed(COMPARED[name], *values)
-        else:
-            compare = self.builder.fcmp_unordered if name is operator.ne else self.builder.fcmp_ordered
-            value = compare(COMPARED[name], *values)
+        value = None
+        if returned == left == types.int64 and number > 0 and name in DIVIDED:
+            value = DIVIDED[name](self.builder, values[0], llvm.Constant(values[0].type, number))
+        elif returned == left and name in NUMBERS[left]:
+            value = getattr(self.builder, NUMBERS[left][name])(*values)
+        elif returned == types.boolean and name in COMPARED:
+            value = self._compared(COMPARED[name], left, values)
+        if value is None:
+            return super().lower_binop(kind, expression, op)
         return self.context.cast(self.builder, value, returned, kind)
 
-    def _is_plain(self, variable: Any) -> bool:
-        kind = self.typeof(variable.name)
-        return type(kind) is types.Array and kind.ndim > 0
+    def _compared(self, sign: str, kind: Any, values: list[Any]) -> Any:
+        if kind == types.int64:
+            return self.builder.icmp_signed(sign, *values)
+        return (self.builder.fcmp_unordered if sign == "!=" else self.builder.fcmp_ordered)(sign, *values)
 
     def lower_getitem(self, kind: Any, expression: Any, value: Any, index: Any, signature: Any) -> Any:
         """An element or part of an array."""
         place = self._place(value, index, signature.args)
         if place is None:
             return super().lower_getitem(kind, expression, value, index, signature)
-        whole, pointer, taken = place
-        array = self.typeof(value.name)
         part = signature.return_type
-        if taken == array.ndim:
-            found = arrays.load_item(self.context, self.builder, array, pointer)
-        else:
-            found = self._part(whole, array, part, pointer, taken)
+        if place.left:
+            found = place.part(part)
             self.incref(part, found)
+        else:
+            found = arrays.load_item(self.context, self.builder, self.typeof(value.name), place.pointer)
         return self.context.cast(self.builder, found, part, kind)
 
     def lower_setitem(self, target: Any, index: Any, value: Any, signature: Any) -> Any:
         """Give an element of an array its value."""
         array = self.typeof(target.name)
         place = None
-        if self._is_plain(target) and not isinstance(self.typeof(value.name), types.Buffer | types.Optional):
+        if is_plain(array) and not isinstance(self.typeof(value.name), types.Buffer | types.Optional):
             place = self._place(target, index, signature.args, whole_only=True)
         if place is None:
             return super().lower_setitem(target, index, value, signature)
         given = self.context.cast(self.builder, self.loadvar(value.name), self.typeof(value.name), signature.args[2])
         given = self.context.cast(self.builder, given, signature.args[2], array.dtype)
-        return arrays.store_item(self.context, self.builder, array, given, place[1])
+        return arrays.store_item(self.context, self.builder, array, given, place.pointer)
 
     def _place(self, variable: Any, index: Any, asked: Any, whole_only: bool = False) -> Any:
-        """An array, a pointer into it, and how many of its axes the index takes; None if it has other than integers."""
+        """Where an index leads in an array; None if it has other than integers and slices without a step."""
         array, given = self.typeof(variable.name), self.typeof(index.name)
-        if not self._is_plain(variable) or self.context.enable_boundscheck:
+        if not is_plain(array) or self.context.enable_boundscheck:
             return None
-        kinds = tuple(asked[1]) if isinstance(asked[1], types.BaseTuple) else (asked[1],)
-        if not kinds or len(kinds) > array.ndim or not all(isinstance(one, types.Integer) for one in kinds):
-            return None
-        if whole_only and len(kinds) < array.ndim:
-            return None
-        value = self.context.cast(self.builder, self.loadvar(index.name), given, asked[1])
         several = isinstance(asked[1], types.BaseTuple)
+        kinds = tuple(asked[1]) if several else (asked[1],)
+        if not kinds or len(kinds) > array.ndim or (whole_only and len(kinds) < array.ndim):
+            return None
+        for one in kinds:
+            if not (isinstance(one, types.Integer) or (_is_simple(one) and not whole_only)):
+                return None
+        value = self.context.cast(self.builder, self.loadvar(index.name), given, asked[1])
         parts = [self.builder.extract_value(value, k) for k in range(len(kinds))] if several else [value]
-        whole = self.loadvar(variable.name)
-        steps = [
-            self._wrapped(part, one, whole, array, axis)
-            for axis, (part, one) in enumerate(zip(parts, kinds, strict=True))
-        ]
-        return whole, self._pointer(whole, array, steps), len(kinds)
+        known = [name in self._counting for name in self._items.get(index.name, [index.name] * len(kinds))]
+        return Place(self, self.loadvar(variable.name), array, list(zip(parts, kinds, known, strict=True)))
 
-    def _wrapped(self, index: Any, kind: Any, whole: Any, array: Any, axis: int) -> Any:
-        """An index that is not negative."""
-        if not kind.signed:
-            return self.context.cast(self.builder, index, kind, types.uintp)
-        index = self.context.cast(self.builder, index, kind, types.intp)
-        known = kind.literal_value if isinstance(kind, types.IntegerLiteral) else getattr(index, "constant", None)
-        if isinstance(known, int) and known >= 0:
-            return llvm.Constant(index.type, known)
-        from_end = self.builder.add(index, self._size(whole, array, "shape", axis))
-        is_negative = self.builder.icmp_signed("<", index, llvm.Constant(index.type, 0))
-        return self.builder.select(is_negative, from_end, index)
 
-    def _size(self, whole: Any, array: Any, field: str, axis: int) -> Any:
-        position = self.context.data_model_manager[array].get_field_position(field)
-        return self.builder.extract_value(whole, [position, axis])
-
-    def _pointer(self, whole: Any, array: Any, steps: list[Any]) -> Any:
-        builder = self.builder
-        data = self._field(whole, array, "data")
-        if array.layout != "C":
-            parts = [builder.mul(self._size(whole, array, "strides", axis), one) for axis, one in enumerate(steps)]
-            offset = parts[0]
-            for part in parts[1:]:
-                offset = builder.add(offset, part)
-            return cgutils.pointer_add(builder, data, offset)
-        place = steps[0]
-        for axis in range(1, array.ndim):
-            place = builder.mul(place, self._size(whole, array, "shape", axis))
-            if axis < len(steps):
-                place = builder.add(place, steps[axis])
-        return builder.gep(data, [place])
-
-    def _part(self, whole: Any, array: Any, part: Any, pointer: Any, taken: int) -> Any:
-        """An array of the further axes."""
-        sizes = [self._size(whole, array, "shape", axis) for axis in range(taken, array.ndim)]
-        strides = [self._size(whole, array, "strides", axis) for axis in range(taken, array.ndim)]
-        number = sizes[0]
-        for size in sizes[1:]:
-            number = self.builder.mul(number, size, flags=["nsw"])
-        kept = {name: self._field(whole, array, name) for name in ("meminfo", "parent", "itemsize")}
-        whole_type = self.context.get_value_type(types.intp)
-        return self._struct(
-            part,
-            nitems=number,
-            data=pointer,
-            shape=cgutils.pack_array(self.builder, sizes, whole_type),
-            strides=cgutils.pack_array(self.builder, strides, whole_type),
-            **kept,
-        )
+def _is_simple(kind: Any) -> bool:
+    return isinstance(kind, types.SliceType) and not kind.has_step
