@@ -275,3 +275,121 @@ def test_neither_arguments_nor_results_nor_errors_are_kept():
                 taken(a, -1, 1.0, True)
         counts.append([sys.getrefcount(one) for one in (a, a.dtype, np.dtype(float), ValueError)])
     assert all(later <= first + 10 for first, later in zip(*counts, strict=True))
+
+
+@compiled
+def parts(a, flat, i, j):
+    """Slices with any bounds, of any axes, and of slices."""
+    rows, column, row = a[i:j], a[i:j, 1], a[-1, i:]
+    middle = flat[i:j][1:]
+    return (
+        rows.shape,
+        rows.sum(),
+        column.sum(),
+        row.sum(),
+        len(middle),
+        middle.sum(),
+        flat[:j].sum(),
+        flat[i:].sum(),
+        rows,
+    )
+
+
+@pytest.mark.parametrize("i, j", [(0, 2), (1, 4), (-3, -1), (2, 1), (-9, 9), (5, 7), (0, -9)])
+@pytest.mark.parametrize("layout", ["C", "F", "every other"])
+def test_parts_are_those_of_plain_python(i, j, layout):
+    a = np.arange(24.0).reshape(4, 6)
+    a, flat = (a[:, ::2], np.arange(14)[::2]) if layout == "every other" else (np.array(a, order=layout), np.arange(7))
+    for ours, theirs in zip(parts(a, flat, i, j), parts.function(a, flat, i, j), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+@compiled
+def divided(m, x):
+    return m // 3, m % 3, m // 8, m % 8, m // 1, m % 1, x**2, m ^ 5
+
+
+@pytest.mark.parametrize("m", [-17, -16, -3, -1, 0, 2, 8, 23])
+@pytest.mark.parametrize("x", [-1.7, 1e-200, np.float32(0.3)])
+def test_quotients_and_squares_are_those_of_plain_python(m, x):
+    assert divided(m, x) == divided.function(m, x)
+
+
+@compiled
+def stepped(a, b, step):
+    """Ranges upwards and downwards, and elements at their numbers and beside them."""
+    out, last = [0 * step], -1
+    for i in range(a, b, step):
+        last = i
+        out.append(i)
+    for i in range(3, -1, -1):
+        out.append(i - last)
+    values = np.arange(5)
+    for i in range(2):
+        out.append(values[i - 1] + values[i + 1] + values[-1 - i])
+        last = i * 2
+    count = 0
+    for i in range(-2, 2):
+        out.append(values[i])
+        count += 1
+    return out, last, values[count]
+
+
+@pytest.mark.parametrize("a, b, step", [(0, 7, 2), (7, 0, -3), (-4, 4, 3), (3, 3, 1), (5, 2, 1)])
+def test_ranges_are_those_of_plain_python(a, b, step):
+    assert stepped(a, b, step) == stepped.function(a, b, step)
+
+
+@compiled
+def wandering(a, n):
+    """Variables that are assigned once, in one branch, in a loop, before a break, or several times."""
+    total, kept = 0.0, a
+    for i in range(n):
+        if i % 3 == 0:
+            made = doubled(a)
+            if made[0] > 50.0:
+                break
+            kept = made
+            continue
+        small = kept[1:]
+        if i % 4 == 1:
+            total += small.sum()
+            kept = small.copy()
+        else:
+            pair = small, doubled(small)
+            total += pair[1][0]
+        if len(kept) < 3:
+            kept = doubled(a)
+    return total, kept
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 9, 30])
+def test_arrays_live_as_long_as_they_are_used(n):
+    numba.core.runtime._nrt_python.memsys_enable_stats()
+    stats = numba.core.runtime.rtsys.get_allocation_stats
+    a = np.arange(1.0, 7.0)
+    expected, left = wandering.function(a, n), sys.getrefcount(a)
+    wandering(a, n)
+    before = stats()
+    for _ in range(20):
+        total, kept = wandering(a, n)
+        assert total == expected[0] and kept.tolist() == expected[1].tolist()
+        del kept
+    after = stats()
+    assert after.alloc - before.alloc == after.free - before.free
+    assert sys.getrefcount(a) == left
+
+
+@compiled
+def unassigned(n):
+    """A variable that only some paths give a value."""
+    for i in range(n):
+        if i > 1:
+            square = i * i
+        if i > 2:
+            n += square
+    return n
+
+
+def test_variables_that_some_paths_do_not_assign():
+    assert [unassigned(n) for n in range(6)] == [unassigned.function(n) for n in range(6)]
