@@ -23,8 +23,10 @@ FLOORS = [
         "kernel_cache",
         "kernel_compiler",
         "kernel_lowering",
+        "kernel_arrays",
         "kernel_calls",
         "kernel_entry",
+        "kernel_values",
         "kernel_steps",
         "memory",
     }

@@ -65,7 +65,8 @@ class Lower(lowering.Lower):  # type: ignore[misc]
         self._held: set[str] = set()
         self._counting: set[str] = set()
         self._items: dict[str, list[str]] = {}
-        self._singly_assigned_vars, self._blk_local_varmap = set(), {}
+        self._singly_assigned_vars: set[str] = set()  # Numba's own, which are not used
+        self._blk_local_varmap: dict[str, Any] = {}
         if not self.func_ir.func_id.is_generator:
             variables = Variables(self.blocks, lambda name: self.is_counted(self.typeof(name)))
             self._counting = counting(self.blocks, self.typeof)
