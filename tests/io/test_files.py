@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 from signedheat.geometry import nearest
 from signedheat.io import files
@@ -375,3 +376,12 @@ def test_faults_of_parsers_are_damage_and_our_own_are_not(where):
 
     with pytest.raises(sh.FileFormatError if where in ("signedheat.io.ply", "meshio") else IndexError):
         read()
+
+
+@pytest.mark.parametrize("ending", [".json", ".txt", ".obj", ".csv"])
+def test_curves_larger_than_memory_are_told_as_that(tmp_path, ending):
+    path = tmp_path / f"curves{ending}"
+    with path.open("wb") as file:
+        file.truncate(1 << 40)  # without any block on the disk
+    with refused(sh.MemoryLimitError, file=path.name):
+        sh.read_curves(path, samples.sphere(1))

@@ -34,3 +34,18 @@ def test_one_that_lacks_pixels_is_refused(tmp_path, announced):
     path.write_bytes(data[: entry + 8] + announced.to_bytes(4, "little") + data[entry + 12 :])
     with refused(sh.FileFormatError, file="mask.tif"):
         sh.read_mask(path)
+
+
+@pytest.mark.parametrize("packing", ["tiff_lzw", "tiff_deflate", "group4"])
+def test_damaged_tiffs_are_refused_and_their_library_is_not_heard(tmp_path, capfd, packing):
+    """It goes on after an error, and writes to standard error by its number."""
+    pixels = np.random.default_rng(0).random((64, 64)) > 0.5
+    image = Image.fromarray(pixels if packing == "group4" else np.uint8(255) * pixels)
+    image.save(tmp_path / "good.tif", compression=packing)
+    data = bytearray((tmp_path / "good.tif").read_bytes())
+    sh.read_mask(tmp_path / "good.tif")
+    data[200:260] = 60 * b"\x55"
+    (tmp_path / "bad.tif").write_bytes(data)
+    with refused(sh.FileFormatError, file="bad.tif"):
+        sh.read_mask(tmp_path / "bad.tif")
+    assert capfd.readouterr().err == ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from argparse import Namespace
@@ -21,6 +22,7 @@ from ..io.files import ensure_writable, extension
 from ..io.labels import LabelImage
 from ..io.surface_fields import VALUE_FORMATS
 from ..io.tets import TET_FIELD_FORMATS
+from ..parallel import run_limited
 from ..visualization import (
     PAGE_FORMATS,
     PICTURE_FORMATS,
@@ -32,7 +34,11 @@ from ..visualization import (
 )
 from .computing import Summary, drawable, prefix_errors
 from .images import field_or_image, thing_of
+from .streams import say
 from .tets import on_grid
+
+PATIENCE = 5.0
+"""Seconds within which a display must answer."""
 
 
 def run(arguments: Namespace) -> Summary:
@@ -62,10 +68,28 @@ def run(arguments: Namespace) -> Summary:
 
 def has_window() -> bool:
     """Whether there is a display, and PyVista to open a window on it."""
-    display = sys.platform in ("darwin", "win32") or any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
-    )
-    return display and find_spec("pyvista") is not None
+    if find_spec("pyvista") is None:
+        return False
+    return sys.platform in ("darwin", "win32") or display_answers()
+
+
+def display_answers() -> bool:
+    """Whether there is an X server: where there is none, VTK shows nothing and goes on."""
+    name = os.environ.get("DISPLAY", "")
+    if not name:
+        return False
+    try:
+        library = ctypes.CDLL("libX11.so.6")
+        library.XOpenDisplay.restype, library.XOpenDisplay.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
+        library.XCloseDisplay.argtypes = [ctypes.c_void_p]
+        found = run_limited(lambda: library.XOpenDisplay(os.fsencode(name)), PATIENCE)
+    except (OSError, TimeoutError):  # no such library, or a server that says nothing
+        found = None
+    if found:
+        library.XCloseDisplay(found)
+        return True
+    say(f"signedheat: no window can be opened on the display {name}: a page is written instead")
+    return False
 
 
 def ensure_output_writable(output: str) -> None:

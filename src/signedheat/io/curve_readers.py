@@ -15,7 +15,7 @@ from ..domains.curves import Curve
 from ..domains.kinds import EmbeddedSurface
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.projection import closest_points
-from ..errors import FileFormatError, SourceError
+from ..errors import FileFormatError, SignedHeatError
 from ..geometry.polylines import assemble_polylines
 from .files import PathLike, text
 from .point_lists import read_point_lists
@@ -162,7 +162,7 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
             for line in content["polylines"]
         ]
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        if isinstance(error, (FileFormatError, SourceError)):
+        if isinstance(error, SignedHeatError):
             raise
         raise FileFormatError(
             f"these are no curves with vertex ids and weights ({error!r})",

@@ -16,7 +16,7 @@ from ..errors import FileFormatError
 from ..packages import lazy_module
 from .arrays import read_npy
 from .fields import _read_npy, _read_nrrd
-from .files import PathLike, contents, ensure_fits, extension, reading, unknown_extension
+from .files import PathLike, contents, ensure_fits, extension, reading, unknown_extension, with_messages
 from .vtk_xml import read_vti
 
 Image = lazy_module("PIL.Image", "pictures as masks")
@@ -138,7 +138,11 @@ def _read_picture(path: PathLike) -> tuple[NDArray[np.float64], NDArray[np.float
         opened = Image.open(io.BytesIO(data))
         _refuse_missing_pixels(opened, len(data), path)
         ensure_fits(16 * opened.width * opened.height, path)
-        picture = opened.convert("RGBA")
+        picture, told = with_messages(lambda: opened.convert("RGBA"))
+    if told.strip() and opened.format == "TIFF":  # libtiff goes on after errors, with what it makes of the rest
+        raise FileFormatError(
+            f"it is damaged ({told.splitlines()[0]:.200})", remedy="write or download it again", path=path
+        )
     white = Image.new("RGBA", picture.size, "white")
     brightness = np.asarray(Image.alpha_composite(white, picture).convert("L")) / 255
     return brightness[::-1].T, np.zeros(2), np.ones(2)
