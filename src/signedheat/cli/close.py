@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from ..extensions.close_curves import conforming_distance, refuse_without_sides
+from ..extensions.zero_set import zero_set
 from ..io import CURVE_FORMATS, ensure_writable, write_curves
 from ..solver import SignedHeatSolver
 from ..visualization import ensure_picture_writable, save_surface
@@ -34,7 +35,7 @@ def run(arguments: Namespace) -> Summary:
                 arguments.as_oriented,
                 arguments.every_piece,
             )
-        found = field.contour(0.0)
+        found = zero_set(field, curves)
     write_curves(arguments.output, found, surface)
     if arguments.preview:
         save_surface(field, arguments.preview, found, up="xyz".index(arguments.up))

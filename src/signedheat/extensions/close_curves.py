@@ -16,6 +16,7 @@ from ..lowering.surface.intrinsic import RetriangulatedForZeroSet
 from ..progress import Progress
 from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .curve_pieces import distance_to_pieces
+from .zero_set import zero_set
 
 
 def close_curves(
@@ -77,7 +78,8 @@ def close_curves(
     """
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
     refuse_without_sides(listed)
-    return conforming_distance(domain, listed, constraint, diffusion, None, as_oriented, every_piece).contour(0.0)
+    field = conforming_distance(domain, listed, constraint, diffusion, None, as_oriented, every_piece)
+    return zero_set(field, listed)
 
 
 def conforming_distance(
