@@ -29,7 +29,7 @@ caching = lazy_module("numba.core.caching", "compiled kernels")
 kernel_compiler = lazy_module("signedheat.kernel_compiler", "compiled kernels")
 serialize = lazy_module("numba.core.serialize", "compiled kernels")
 
-FORMAT = 8
+FORMAT = 9
 """To be raised when the same kernels are compiled otherwise."""
 DAYS = 30
 """After so many, files of other versions of a kernel are removed when one is written."""

@@ -6,6 +6,7 @@ Importing this imports Numba.
 from __future__ import annotations
 
 from importlib import import_module
+from operator import is_
 from typing import Any
 
 import numpy as np
@@ -203,19 +204,38 @@ class Sequence(machinery.PassManager):  # type: ignore[misc]
 
 
 class Constraints(typeinfer.ConstraintNetwork):  # type: ignore[misc]
-    """What types depend on, without a place for the warnings of each."""
+    """What types depend on: asked again only when a type has changed, and without a place for the warnings of each."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._names: list[list[str]] = []
+        self._known: dict[int, list[Any]] = {}
 
     def propagate(self, inferer: Any) -> list[Any]:
         """Apply all; those that fail for now are told."""
         told = []
-        for constraint in self.constraints:
+        for place, constraint in enumerate(self.constraints):
+            if place in self._known and all(map(is_, self._known[place], self._types(place, inferer))):
+                continue
             try:
                 constraint(inferer)
             except errors.ForceLiteralArg as error:
                 told.append(error)
             except errors.TypingError as error:
                 told.append(utils.chain_exception(errors.TypingError(str(error), loc=constraint.loc), error))
+            else:
+                found = self._types(place, inferer)
+                if not any(isinstance(kind, types.Dispatcher | types.RecursiveCall) for kind in found):
+                    self._known[place] = found
         return told
+
+    def _types(self, place: int, inferer: Any) -> list[Any]:
+        """The types, as far as they are known, of all variables in a constraint."""
+        while place >= len(self._names):
+            parts = list(vars(self.constraints[len(self._names)]).values())
+            texts = [part for part in parts if isinstance(part, str) and part in inferer.typevars]
+            self._names.append(texts + [one.name for one in listed(None, parts)])
+        return [getattr(inferer.typevars.get(name), "type", None) for name in self._names[place]]
 
 
 REPLACED = {
