@@ -195,7 +195,8 @@ def test_turning_a_curve_turns_the_sign():
 def test_a_curve_that_bounds_nothing():
     """Round the tube of a torus: the curve tells no sides, and the method completes it on the far side."""
     mesh = torus(n_around=60, n_across=24)
-    note = sh.curve_distance(mesh, mesh.path(np.arange(24), closed=True)).diagnostics.note(SharpenedToCurves)
+    with pytest.warns(sh.InexactWarning, match="piecewise_distance"):
+        note = sh.curve_distance(mesh, mesh.path(np.arange(24), closed=True)).diagnostics.note(SharpenedToCurves)
     assert note.free_ends == 0
     assert note.sides_by_curves < 0.1
     assert note.completed_length > 0.3
@@ -219,3 +220,12 @@ def test_lines_that_meet_on_a_spine_are_never_turned(pages):
     phi = sh.curve_distance(mesh, lines)
     assert np.array_equal(np.sign(phi.values), np.sign(height))
     assert np.allclose(phi.values, sh.curve_distance(mesh, lines, as_oriented=True).values, rtol=0, atol=1e-12)
+
+
+def test_circles_that_bound_together_are_completed_by_nothing():
+    """Both circles of a section across a torus: nothing is told."""
+    mesh = torus(n_around=48, n_across=16)
+    circles = mesh.level_set(mesh.vertices @ [1.0, 0.15, 0.1], 0.1)
+    assert len(circles) == 2
+    both = sh.curve_distance(mesh, circles).diagnostics.note(SharpenedToCurves)
+    assert both.completed_length == 0

@@ -525,6 +525,17 @@ def test_bad_triangles_are_retriangulated():
     assert phi.cut[0].length == pytest.approx(2 * np.pi * 0.4, rel=0.1)
 
 
+def test_unoriented_curve_along_edges_of_bad_triangles():
+    """Refined for their angles, the triangles keep the edges along which the curve runs: φ is zero on it, no less."""
+    mesh = sheared(torus(n_around=48, n_across=16))
+    ids = np.arange(16) + 160
+    curve = mesh.path(ids, oriented=False)
+    phi = sh.piecewise_distance(mesh, curve)
+    assert isinstance(phi.domain, sh.IntrinsicTriangulation)
+    assert np.abs(phi(mesh.points_at(ids))).max() < 0.5 * mesh.edge_lengths.mean()
+    assert phi(mesh.points_at((ids + 384) % 768)).min() > 1.0
+
+
 @pytest.mark.parametrize("slack", [-0.1, np.nan, "much"])
 def test_bad_slack(slack):
     mesh = sphere(1)

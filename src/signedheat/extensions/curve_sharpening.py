@@ -25,6 +25,9 @@ from ..progress import Progress
 FAR = 1.0
 """Triangle sizes: what the zero set has farther from any curve stands in for missing curve."""
 
+INVENTED = 0.05
+"""Share of the zero set, apart from curves without an end, from which these are told to bound nothing."""
+
 FALSE_ZERO_WIDTH = 4.0
 """Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
 
@@ -123,6 +126,12 @@ def sharpened_to_curves(
         counts.append(windows)
     there_length = sum(float(part.lengths.sum()) for part in parts)
     note = SharpenedToCurves(completed / (completed + there_length or 1.0), len(sides.free_ends), float(known.mean()))
+    if note.completed_length > INVENTED and not note.free_ends:
+        warn_user(
+            f"curves without free ends bound no region: {note.completed_length:.0%} of what distance is measured to is "
+            "where its sign must change elsewhere. piecewise_distance lets it jump there",
+            InexactWarning,
+        )
     new = np.copysign(distance, np.where(side != 0, side, values))
     return np.where(np.isnan(values), np.nan, new), (note, told(triangles, *counts))
 

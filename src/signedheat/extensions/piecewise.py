@@ -222,24 +222,26 @@ def _retriangulated(
 ) -> tuple[TriangleMesh | PolygonMesh | IntrinsicTriangulation, SurfaceDiscretization]:
     """The domain, or the intrinsic triangulation of it that bad triangles or unoriented curves ask for."""
     discretization = _lowered(domain, exact)
-    fits = conforms(discretization, sources)
     if isinstance(domain, IntrinsicTriangulation):
-        return domain, discretization
-    keep = () if fits and intrinsic is not True else sources
+        return domain, conforming(discretization, sources)
+    fits = conforms(discretization, sources)
     if isinstance(domain, TriangleMesh) and (intrinsic is True or (intrinsic == "auto" and is_spoiled(domain))):
         angle, coarsest = (28.0, np.inf) if intrinsic is True else (ANGLE, COARSEST)
+        ways = (sources,) if intrinsic is True else ((), sources)  # unoriented curves along edges must keep these
         try:
-            refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=coarsest)
-            return refined, _lowered(refined, exact)
+            for keep in ways:
+                refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=coarsest)
+                if conforms(surface := _lowered(refined, exact), sources):
+                    return refined, surface
         except GeometryError:  # faces too thin
             if intrinsic is True:
                 raise
+        if intrinsic is True:
+            return refined, conforming(surface, sources)
     if fits:
         return domain, discretization
     domain = intrinsic_delaunay(domain.triangulation, keep=sources)
-    discretization = _lowered(domain, exact)
-    conforms(discretization, sources)  # or it is refused: curves on faces so flat that rounding moves them
-    return domain, discretization
+    return domain, conforming(_lowered(domain, exact), sources)
 
 
 def _field(
@@ -273,13 +275,19 @@ def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation, exact:
 def conforms(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> bool:
     """Whether the triangles conform to all sources, so that `adapt` does not refine them."""
     adapted = discretization.adapt(sources)[0].triangles
-    fits = adapted.corner_vertices is discretization.triangles.corner_vertices
-    if not fits and isinstance(discretization.domain, IntrinsicTriangulation):
-        raise SourceError(
-            "an unoriented curve runs across faces of the intrinsic triangulation",
-            remedy="make it with intrinsic_delaunay(mesh, keep=curve), or orient the curve",
-        )
-    return fits
+    return adapted.corner_vertices is discretization.triangles.corner_vertices
+
+
+def conforming(
+    discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
+) -> SurfaceDiscretization:
+    """The discretisation; refused if its triangles do not conform, be it that rounding moved curves on flat faces."""
+    if conforms(discretization, sources):
+        return discretization
+    raise SourceError(
+        "an unoriented curve runs across faces of the intrinsic triangulation",
+        remedy="make it with intrinsic_delaunay(mesh, keep=curve), or orient the curve",
+    )
 
 
 def corner_slopes(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> NDArray[np.float64]:
