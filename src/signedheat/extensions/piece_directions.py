@@ -7,11 +7,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..geometry.synchronization import best_signs, nested_groups
-from .curve_votes import AS_GIVEN, Votes
+from .curve_votes import Votes
 
-FACING = (1.0, 4.0)
+FACING = (1.0, 2.0)
 """Weights of a winding number that is wrong by one, beside the energy of ends: small ones first, as both agree more
 easily then."""
+STRICT, NONE = 4.0, 0.05
+"""Weight, and scatter beside that of smaller weights, with which curves hardly scatter at all: nothing is spurious."""
+AS_GIVEN = 0.1
+"""Vote of a piece of mean length for its own direction, beside them: what spurious pieces tell is less."""
 MANY = 1000
 """Pieces from which those that their ends tie most to each other are turned together."""
 MOST = 0.35
@@ -43,6 +47,9 @@ def directions(votes: Votes, among: NDArray[np.int64]) -> NDArray[np.float64]:
     found = np.ones(len(told))
     for weight in FACING:
         found = best_signs(told - 2 * weight * scattered, found)
+    strictly = best_signs(told - 2 * STRICT * scattered, found)
+    if strictly @ scattered @ strictly < NONE * (found @ scattered @ found):
+        found = strictly
     signs: NDArray[np.float64] = held.T @ (found[:-1] * found[-1])
     none_complete = len(votes.pieces) == len(votes.windings.parts)
     many = none_complete and lengths[signs < 0].sum() > MOST * lengths.sum()
