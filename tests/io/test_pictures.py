@@ -44,7 +44,7 @@ def test_damaged_tiffs_are_refused_and_their_library_is_not_heard(tmp_path, capf
     image.save(tmp_path / "good.tif", compression=packing)
     data = bytearray((tmp_path / "good.tif").read_bytes())
     sh.read_mask(tmp_path / "good.tif")
-    data[200:260] = 60 * b"\x55"
+    data[100:160] = 60 * b"\xff"
     (tmp_path / "bad.tif").write_bytes(data)
     with refused(sh.FileFormatError, file="bad.tif"):
         sh.read_mask(tmp_path / "bad.tif")

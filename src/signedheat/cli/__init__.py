@@ -72,7 +72,7 @@ def _is_expected(error: BaseException) -> bool:
 
 def _one_line(error: BaseException) -> str:
     if isinstance(error, MemoryError):
-        return "there is not enough memory: choose a lower --resolution or a smaller shape"
+        return "there is not enough memory: choose a lower resolution or a smaller shape"
     if _is_expected(error):
         return " ".join(str(error).split())
     trace = error.__traceback__

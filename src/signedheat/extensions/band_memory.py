@@ -71,7 +71,7 @@ def refuse_band_beyond_memory(plan: BandPlan) -> None:
     fitting = ROOM * _fitting_spacing(spacing, width, share)
     raise MemoryLimitError(
         f"the band needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
-        remedy=f"use a spacing of {fitting:.2g} or more, or let tiled_distance keep it on disk (--tiles)",
+        remedy=f"use a spacing of {fitting:.2g} or more, or keep it on disk: tiled_distance, volume --tiles",
     )
 
 
