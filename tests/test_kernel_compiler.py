@@ -310,7 +310,7 @@ def divided(m, x):
 
 
 @pytest.mark.parametrize("m", [-17, -16, -3, -1, 0, 2, 8, 23])
-@pytest.mark.parametrize("x", [-1.7, 1e-200, np.float32(0.3)])
+@pytest.mark.parametrize("x", [-1.7, 1e-200, 3e100])
 def test_quotients_and_squares_are_those_of_plain_python(m, x):
     assert divided(m, x) == divided.function(m, x)
 
