@@ -229,3 +229,21 @@ def test_circles_that_bound_together_are_completed_by_nothing():
     assert len(circles) == 2
     both = sh.curve_distance(mesh, circles).diagnostics.note(SharpenedToCurves)
     assert both.completed_length == 0
+
+
+def test_pieces_with_normals_on_faces_that_look_either_way():
+    """They are not turned: a third of the signs and more were wrong."""
+    ball = sphere(3)
+    flipped = (np.random.default_rng(0).random(ball.n_faces) < 0.4)[:, None]
+    mesh = sh.TriangleMesh(ball.vertices, np.where(flipped, ball.faces[:, ::-1], ball.faces))
+    height = mesh.vertices @ [1.0, 0.15, 0.1] + 0.13
+    whole = mesh.level_set(height, 0.0)[0]
+    assert whole.normals is not None
+    step = whole.n_points // 4
+    kept = int(0.65 * step)
+    pieces = [
+        sh.Curve(whole.faces[a : a + kept], whole.barycentric[a : a + kept], normals=whole.normals[a : a + kept - 1])
+        for a in range(0, 4 * step, step)
+    ]
+    phi = sh.curve_distance(mesh, pieces)
+    assert np.mean(np.sign(phi.values) != np.sign(height)) < 0.01

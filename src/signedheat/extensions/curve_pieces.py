@@ -13,6 +13,8 @@ from ..constraints import Constraint
 from ..diagnostics import Note
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.kinds import SurfaceDomain
+from ..domains.level_sets import is_consistent
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import InexactWarning, warn_user
 from ..fields.vertex_field import VertexField
 from ..solver import SignedHeatSolver, distance_unwarned
@@ -64,9 +66,10 @@ def distance_to_pieces(
 ) -> tuple[VertexField[Surface], list[CurveOrPoints]]:
     """Distance to curves that may be pieces of broken ones, and the curves that it was measured to.
 
-    The pieces are turned until they agree (`curve_orientation`). Then those that agree with none, one after the other,
-    are suspected. If the others agree well, so that most of a shape is there, suspects are left out that lie away from
-    the zero set of the others.
+    The pieces are turned until they agree (`curve_orientation`). Then those that agree with none, one after the
+    other, are suspected. Where faces look either way, as on surfaces with one side, pieces are taken as they are:
+    left of a curve is another side from face to face. If the others agree well, so that most of a shape is there,
+    suspects are left out that lie away from the zero set of the others.
 
     Parameters
     ----------
@@ -82,7 +85,7 @@ def distance_to_pieces(
     listed = flattened(curves)
     surface = surface_of(solver)
     votes = Votes.of(surface, listed)
-    if not votes.are_several:
+    if not votes.are_several or (isinstance(solver.domain, TriangleMesh) and not is_consistent(solver.domain)):
         return distance_unwarned(solver, listed, constraint), listed
     suspects = np.empty(0, dtype=np.int64) if every_piece else suspected(votes)
     once = triangulated_once(solver, listed)
