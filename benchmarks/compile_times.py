@@ -73,7 +73,7 @@ def of_command(name: str) -> tuple[float, int]:
         usage = resource.getrusage(resource.RUSAGE_CHILDREN)
         spent = [usage.ru_utime + usage.ru_stime]
         for _ in range(3):
-            command = [sys.executable, "-m", "signedheat.cli", *COMMANDS[name].split(), "--quiet"]
+            command = [sys.executable, "-m", "signedheat", *COMMANDS[name].split(), "--quiet"]
             subprocess.run(command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
             usage = resource.getrusage(resource.RUSAGE_CHILDREN)
             spent.append(usage.ru_utime + usage.ru_stime)

@@ -47,7 +47,7 @@ FLOORS = [
     {"batches"},
     {"", "public"},  # the package itself, with the public names
     {"samples"},
-    {"cli"},
+    {"cli", "__main__"},
 ]
 """From the ground up: a module may import what is on its own floor or below. docs/architecture.md shows the same."""
 

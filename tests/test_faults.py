@@ -191,7 +191,7 @@ sys.exit(main(["info", "ball.stl"]))
 )
 def test_environments_that_make_no_sense(tmp_path, variables):
     ready(tmp_path)
-    command = ["-m", "signedheat.cli", "surface", "ball.stl", "curve.txt", "-o", "phi.ply"]
+    command = ["-m", "signedheat", "surface", "ball.stl", "curve.txt", "-o", "phi.ply"]
     sh.write_curves(
         tmp_path / "curve.txt", sh.read(tmp_path / "ball.stl").path([0, 1, 2]), sh.read(tmp_path / "ball.stl")
     )

@@ -296,7 +296,7 @@ def test_tets_from_the_command_line(tmp_path, capsys):
 
 def test_who_reads_the_output_may_stop_reading(tmp_path):
     sphere(1).save(tmp_path / "ball.stl")
-    command = [sys.executable, "-m", "signedheat.cli", "info", str(tmp_path / "ball.stl")]
+    command = [sys.executable, "-m", "signedheat", "info", str(tmp_path / "ball.stl")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         assert process.stderr.read() == b""

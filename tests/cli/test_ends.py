@@ -17,7 +17,7 @@ from signedheat.cli import info, main
 from signedheat.cli.usage.options import PLANAR
 from signedheat.io import POLYLINE_FORMATS
 
-COMMAND = [sys.executable, "-m", "signedheat.cli"]
+COMMAND = [sys.executable, "-m", "signedheat"]
 
 
 @pytest.fixture(scope="module")

@@ -308,7 +308,7 @@ def test_outputs_are_checked_before_anything_else(tmp_path, capsys):
 
 def test_module_runs_as_a_process(tmp_path, ball):
     output = str(tmp_path / "a.npz")
-    command = [sys.executable, "-m", "signedheat.cli", "volume", ball, "-o", output, "--resolution", "16"]
+    command = [sys.executable, "-m", "signedheat", "volume", ball, "-o", output, "--resolution", "16"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0 and all(line.startswith(NOTE) for line in done.stderr.splitlines())
     done = subprocess.run([*command[:4], "missing.stl", "-o", output], capture_output=True, text=True)

@@ -14,7 +14,7 @@ from signedheat.cli.standard import sniffed
 
 
 def run(*arguments, data=b""):
-    command = [sys.executable, "-m", "signedheat.cli", *arguments]
+    command = [sys.executable, "-m", "signedheat", *arguments]
     return subprocess.run(command, input=data, capture_output=True, check=False)
 
 

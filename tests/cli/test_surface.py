@@ -10,6 +10,7 @@ import pytest
 
 import signedheat as sh
 from shapes.surface_cases import sphere, square
+from signedheat import samples
 from signedheat.cli import main
 
 
@@ -43,6 +44,16 @@ def test_json_contours_and_a_picture(files, capsys):
     mesh = sh.read(files / "ball.ply")
     assert len(sh.read_curves(summary["contours"], mesh)) >= 5
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
+
+
+def test_vertices_that_no_curve_reaches_are_told_on_standard_error(tmp_path, capsys):
+    mesh = square(5)
+    samples.union(mesh, sh.TriangleMesh(mesh.vertices + 5, mesh.faces)).save(tmp_path / "two.ply")
+    sh.write_curves(tmp_path / "curve.txt", [mesh.path([10, 11, 12, 13, 14])], mesh)
+    command = ["surface", str(tmp_path / "two.ply"), str(tmp_path / "curve.txt"), "-o", str(tmp_path / "phi.npz")]
+    assert main([*command, "--quiet"]) == 0
+    said = capsys.readouterr().err
+    assert said.startswith("signedheat: no source is connected to 25 of 50 vertices") and said.count("\n") == 1
 
 
 def test_levels(files, capsys):

@@ -219,3 +219,10 @@ def test_lines_and_other_cells_of_meshio_are_no_points(kind, corners):
             take(cells)
         assert kind in caught.value.remedy
     assert sh.PointCloud.from_meshio(cells).n_points == BALL.n_vertices  # asked for
+
+
+def test_tets_of_meshio_that_are_no_rows_of_four_vertices_are_refused():
+    mesh = meshio.Mesh(np.eye(4, 3), [("tetra", np.arange(4)[None])])
+    mesh.cells[0].data = np.zeros((1, 8), dtype=int)
+    with refused(sh.GeometryError, "tets"):
+        sh.TetMesh.from_meshio(mesh)

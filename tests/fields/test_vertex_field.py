@@ -73,8 +73,9 @@ def test_unreached_parts_are_left_out_of_contours():
         np.concatenate([mesh.vertices, mesh.vertices + np.array([0, 0, 1])]),
         np.concatenate([mesh.faces, mesh.faces + 25]),
     )
-    with pytest.warns(sh.UnreachedWarning):
+    with pytest.warns(sh.UnreachedWarning) as caught:
         phi = sh.SignedHeatSolver(two).distance(two.path([10, 11, 12, 13, 14]))
+    assert caught[0].filename == __file__  # the line of the user, not one of ours
     assert np.isnan(phi.values[25:]).all() and phi.diagnostics.unreached.tolist() == list(range(25, 50))
     for curve in phi.contour(0.1):
         assert (positions(two, curve)[:, 2] == 0).all()

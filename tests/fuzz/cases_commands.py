@@ -287,12 +287,21 @@ def _refuse(constant: str) -> None:
     raise Wrong("no JSON", constant)
 
 
+def _values(field: Any) -> np.ndarray:
+    """Those of a band without its nodes beyond the walls, which have none."""
+    if not isinstance(field, sh.BandField):
+        return np.asarray(field.values)
+    steps = np.moveaxis(np.indices((8, 8, 8)), 0, -1)
+    nodes = 8 * field.blocks.places[:, None, None, None] + steps
+    return np.asarray(field.values[(nodes < field.grid.shape).all(axis=-1)])
+
+
 def _judge_file(path: Path, told: str) -> None:
     """All numbers are finite, or something was said."""
     try:
         if path.suffix in (".npz", ".vti", ".nrrd", ".npy") and "out" in path.name:
             found = np.load(path) if path.suffix == ".npz" else None
-            numbers = sh.load_field(path).values if found is None or "distances" not in found else found["distances"]
+            numbers = _values(sh.load_field(path)) if found is None or "distances" not in found else found["distances"]
         elif path.suffix in (".stl", ".ply", ".off", ".obj", ".vtp"):
             read: Any = sh.read(path)
             numbers = getattr(read, "vertices", np.zeros(0))

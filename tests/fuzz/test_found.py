@@ -60,6 +60,16 @@ FOUND = [
     ("space queries", 400, 3031), ("space queries", 400, 5229),
     # polygons that overlap, and shapes without any face, in bands
     ("space queries", 1122, 41), ("space queries", 1122, 466),
+    # five points whose solid leaves the box, far from any of them, in a band
+    ("space queries", 1123, 2356),
+    # a Delaunay triangulation with the point at infinity
+    ("space queries", 1123, 7427),
+    # areas that rounding makes negative
+    ("surface curves", 1123, 2399),
+    # tets of no corners beside others, in a VTK file
+    ("files tet fields", 1123, 6794),
+    # parts of a surface without curves, told by a command on standard output alone
+    ("commands", 1123, 1948),
     # a picture of 230 bytes that announces 75 million pixels
     ("files masks", 20261122, 753),
     # arguments that are quoted, compared or counted

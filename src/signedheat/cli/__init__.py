@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 
@@ -34,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         128 + the number of a signal: stopped by it.
     """
     open_standard_streams()
-    with Signals() as signals:
+    with Signals() as signals, _warnings_in_lines():
         try:
             return _run(argv)
         except SystemExit as stop:  # argparse: help was asked for, or the usage is wrong
@@ -63,6 +66,16 @@ def _run(argv: Sequence[str] | None) -> int:
     elif text and not (arguments.quiet or standard.takes_output):
         tell(standard.named(text))
     return FAILED if summary.get("failed") else 0  # of many, some
+
+
+@contextmanager
+def _warnings_in_lines() -> Iterator[None]:
+    """Say what a result is not, in a line, instead of where in the code that was found."""
+    with warnings.catch_warnings():
+        if not sys.warnoptions:
+            warnings.simplefilter("default", UserWarning)
+        warnings.showwarning = lambda message, *_, **__: say(f"signedheat: {' '.join(str(message).split())}")
+        yield
 
 
 def _is_expected(error: BaseException) -> bool:

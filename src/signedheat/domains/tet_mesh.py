@@ -148,7 +148,7 @@ class TetMesh(Displayed, Frozen):
         Raises
         ------
         GeometryError
-            If it has no tets.
+            If it has no tets, or tets of other than four corners.
         """
         blocks = [block.data for block in mesh.cells if block.type == "tetra"]
         if not blocks:
@@ -157,6 +157,9 @@ class TetMesh(Displayed, Frozen):
                 f"the mesh holds no tets, but {', '.join(kinds)}",
                 remedy="convert it to tetrahedra first",
             )
+        for block in blocks:
+            if block.ndim != 2 or block.shape[1] != 4:
+                raise GeometryError(f"tets are rows of four vertices, not an array of {block.shape}", element="tets")
         return cls(mesh.points, np.concatenate(blocks))
 
     def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:

@@ -86,8 +86,11 @@ def solve_tile(plan: BandPlan, tile: NDArray[np.integer]) -> Tile:
     values = (signs * distances).astype(np.float32).reshape(-1, SIDE, SIDE, SIDE)
     confidence = confidence.reshape(values.shape)
     off_grid(values, Blocks(places, blocks.shape), np.nan)
-    kept = np.nanmin(np.abs(values), axis=(1, 2, 3), initial=np.inf) <= plan.reach
-    kept |= plan.at_walls(places, SIDE) & (values < 0).any(axis=(1, 2, 3))
+    in_band = np.nanmin(np.abs(values), axis=(1, 2, 3), initial=np.inf) <= plan.reach
+    kept = in_band | plan.at_walls(places, SIDE) & (values < 0).any(axis=(1, 2, 3))
+    deep = kept & ~in_band  # crossings near them are not all in the tile
+    roughly = np.maximum(np.abs(sides.function[own][deep]), plan.reach).reshape(-1, SIDE, SIDE, SIDE)
+    values[deep] = np.sign(values[deep]) * np.minimum(np.abs(values[deep]), roughly)
     place = crossings[:, 1:4] / (SIDE * plan.steps)
     inner = ((place >= low) & (place < high)).all(axis=1)
     return Tile(places[kept], values[kept], confidence[kept], crossings[inner])

@@ -74,6 +74,8 @@ def sign_links(
         tets = scipy.spatial.Delaunay(places + moves)
     except (scipy.spatial.QhullError, ValueError):
         return near, False
+    if tets.simplices.max() >= len(places):  # Qhull gave up on precision, and its point at infinity is a corner
+        return near, False
     flat = np.ptp(places @ np.linalg.eigh(np.cov(places.T))[1][:, 0]) <= 10 * JOGGLE * float(reaches.max())
     if flat:
         return near, False

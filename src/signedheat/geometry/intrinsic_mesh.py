@@ -108,9 +108,9 @@ class IntrinsicMesh(Frozen):
 
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
-        """(m,) areas."""
+        """(m,) areas, where rounding does not make them negative."""
         first, _, last = self.edge_vectors.T
-        return -0.5 * (np.conj(first) * last).imag
+        return np.maximum(-0.5 * (np.conj(first) * last).imag, 0.0)
 
     @property
     def areas_as_divisors(self) -> NDArray[np.float64]:
