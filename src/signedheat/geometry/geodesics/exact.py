@@ -23,9 +23,9 @@ from .initial_windows import MADE, WANTED, Faces, Search
 from .propagation_kernels import ROUND, continue_search, start_search
 from .sources import GeodesicSources, PlacedSegments, zero_line
 
-WINDOWS_PER_HALFEDGE, FEW_WINDOWS, ON_SMALL = 100, 1_000_000, 1000
+WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 200, 1_000_000, 1000
 """A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual. Small meshes
-of many sheets take more, which is little in all."""
+of many sheets take more for each side of a face, which is little in all; where many share each edge nothing would do."""
 
 Report: TypeAlias = Callable[[], None]
 """Called every tenth of a second or so; an exception that it raises ends the search."""
@@ -109,8 +109,7 @@ def is_pseudosource(triangles: IntrinsicMesh) -> NDArray[np.bool_]:
 
 def window_limit(triangles: IntrinsicMesh) -> int:
     """Number of windows after which a search is cut short."""
-    n_halfedges = 3 * triangles.n_faces
-    return min(ON_SMALL * n_halfedges, WINDOWS_PER_HALFEDGE * n_halfedges + FEW_WINDOWS)
+    return min(ON_SMALL * 3 * triangles.n_faces, WINDOWS_PER_EDGE * triangles.n_edges + FEW_WINDOWS)
 
 
 def _distances(
