@@ -25,7 +25,7 @@ from .sources import GeodesicSources, PlacedSegments, zero_line
 
 WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 200, 1_000_000, 1000
 """A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual. Small meshes
-of many sheets take more for each side of a face, which is little in all; where many share each edge nothing would do."""
+of many sheets take more, which is little in all."""
 
 Report: TypeAlias = Callable[[], None]
 """Called every tenth of a second or so; an exception that it raises ends the search."""
