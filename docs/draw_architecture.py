@@ -11,7 +11,11 @@ from matplotlib.patches import FancyBboxPatch
 from PIL import Image
 
 FLOORS = [
-    ("cli   visualization   samples   public   batches   io", "commands, pictures, many shapes, files", "#f3d9c1"),
+    (
+        "__main__   cli   visualization   samples   public   batches   io",
+        "commands, pictures, many shapes, files",
+        "#f3d9c1",
+    ),
     ("extensions", "sharpening, jumps, completion, morphology, tet meshing", "#f7e6d0"),
     ("solver   fields", "SignedHeatSolver, signed_distance; values that know their domain", "#fbf1de"),
     ("method   extrapolation   constraints", "diffuse → normalize → integrate, once, on discretisations", "#fff6c9"),
@@ -21,8 +25,9 @@ FLOORS = [
     ("operators   linear", "sparse matrices, matrix-free stencils, factorisations, Krylov", "#c9dcee"),
     ("geometry", "arrays in, arrays out: intrinsic meshes, geodesics, flips, clipping", "#bccfe8"),
     (
-        "cache compiled diagnostics errors frozen kernel_cache kernel_calls kernel_compiler kernel_entry "
-        "kernel_lowering kernel_steps memory packages parallel progress reprs slots",
+        "cache compiled diagnostics errors frozen kernel_arrays kernel_cache kernel_calls "
+        "kernel_compiler kernel_entry kernel_lowering kernel_steps kernel_values memory packages "
+        "parallel progress reprs slots",
         "used by all",
         "#d9d9e3",
     ),
@@ -41,16 +46,17 @@ def draw(path: Path) -> None:
     """Floors on the left, from the bottom up; data on the right."""
     figure = Figure(figsize=(11, 6.2), dpi=100)
     axes = figure.add_axes((0, 0, 1, 1))
-    axes.set(xlim=(0, 11), ylim=(-0.35, len(FLOORS) + 0.55))
+    axes.set(xlim=(0, 11), ylim=(-0.55, len(FLOORS) + 0.55))
     axes.axis("off")
     level = [len(FLOORS) - 1 - k for k in range(len(FLOORS))]
     for (names, what, color), y in zip(FLOORS, level, strict=True):
-        axes.add_patch(_box(0.75, y + 0.06, 7.1, 0.86, color))
         lines = wrap(names, 95, replace_whitespace=False) if len(names) > 95 else [names]
+        deeper = 0.2 * max(len(lines) - 2, 0)
+        axes.add_patch(_box(0.75, y + 0.06 - deeper, 7.1, 0.86 + deeper, color))
         size = min(11.5, 750 / max(len(line) for line in lines))  # that it fits into the box
         text = {"family": "monospace", "size": size, "weight": "bold", "va": "center"}
-        axes.text(0.95, y + 0.62, "\n".join(lines), linespacing=1.1, **text)
-        axes.text(0.95, y + 0.28 - 0.09 * (len(lines) - 1), what, size=9.5, va="center", color="#333333")
+        axes.text(0.95, y + 0.62 - 0.7 * deeper, "\n".join(lines), linespacing=1.1, **text)
+        axes.text(0.95, y + 0.28 - 0.09 * (len(lines) - 1) - 0.7 * deeper, what, size=9.5, va="center", color="#333333")
     axes.annotate("", (0.4, 0.1), (0.4, len(FLOORS) - 0.1), arrowprops={"arrowstyle": "-|>", "lw": 1.8})
     axes.text(0.16, len(FLOORS) / 2, "imports point down", rotation=90, va="center", ha="center", size=10)
     axes.text(9.4, len(FLOORS) + 0.2, "the way of the data", ha="center", size=10)

@@ -286,3 +286,8 @@ def test_commands(folder, monkeypatch, capsys, words, status, message):
     assert message in said and said.count("\n") == 1 and "Traceback" not in said
     assert sorted(path.name for path in folder.iterdir()) == before
     assert all((folder / name).read_text() == "precious" for name in ("out.stl", "out.obj"))
+
+
+def test_curve_distance_off_surfaces():
+    with refused(sh.SourceError, "domain"):
+        sh.curve_distance(GRID, RING)

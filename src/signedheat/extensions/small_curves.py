@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 from ..discretization import discretize
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
+from ..errors import SourceError
 from ..lowering.surface.curve_groups import CurveGroups
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..lowering.surface.intrinsic import Retriangulated
@@ -45,9 +46,19 @@ def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveO
 
 
 def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
-    """The discretisation that the solver uses for all sources, or else that of its domain."""
+    """The discretisation that the solver uses for all sources, or else that of its domain.
+
+    Raises
+    ------
+    SourceError
+        If the domain is no surface, so that no curve lies on it.
+    """
     made = solver.discretization
-    return made if isinstance(made, SurfaceDiscretization) else cast("SurfaceDiscretization", discretize(solver.domain))
+    found = made if isinstance(made, SurfaceDiscretization) else discretize(solver.domain)
+    if not isinstance(found, SurfaceDiscretization):
+        kind = type(solver.domain).__name__
+        raise SourceError(f"curves lie on surfaces, not on a {kind}", element="domain", remedy="pass a mesh")
+    return found
 
 
 def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
