@@ -19,6 +19,7 @@ from shapes.tet_cases import boxes
 from signedheat import memory, samples
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
 from signedheat.extensions.solid_memory import BYTES_IF_CLOSED, BYTES_IF_SCATTERED, bytes_of_faces
+from signedheat.extensions.tetrahedralize import BYTES_PER_TET
 from signedheat.lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
 from signedheat.lowering.surface import intrinsic
 from signedheat.memory import available_memory
@@ -200,8 +201,17 @@ def test_piecewise_fields_that_do_not_fit_name_a_number_of_triangles_that_does(e
         with refused(sh.MemoryLimitError) as caught:
             sh.piecewise_distance(surface, half, exact=exact)
         fitting = int(caught.value.remedy.split()[3].replace(",", ""))
-        room = free - memory.libraries()
+        room = (free - memory.libraries()) / memory.ROOM
         assert piecewise_estimate(fitting, exact) <= room < piecewise_estimate(fitting + 1, exact)
+
+
+@pytest.mark.parametrize("free", [200e6, 400e6])
+def test_lattices_that_do_not_fit_name_a_resolution_that_does(free, monkeypatch):
+    monkeypatch.setattr(memory, "_free", lambda: int(free))
+    with refused(sh.MemoryLimitError) as caught:
+        sh.tetrahedralize(BALL, resolution=120)
+    n_tets = sh.tetrahedralize(BALL, resolution=int(float(caught.value.remedy.split()[-1]))).n_tets
+    assert 0.4 * free < BYTES_PER_TET * n_tets <= free - memory.libraries()
 
 
 def test_meshes_that_do_not_fit_are_refused_before_they_are_refined(monkeypatch):

@@ -32,6 +32,10 @@ MAPPED = {"VmSize": 685_000_000, "VmData": 165_000_000}
 """Bytes that libraries still map besides, and hardly touch: they count where a process's own limits do."""
 
 
+ROOM = 1.1
+"""By how much what is told to fit is smaller than it must be: what is free changes from one call to the next."""
+
+
 def libraries() -> int:
     """What libraries still take: most of it is the compiler, which the first kernel loads."""
     if "signedheat.kernel_compiler" in sys.modules:
@@ -59,7 +63,7 @@ def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float]
         return
     raise MemoryLimitError(
         f"{what} needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
-        remedy=remedy(fitting_count(count, estimate, available - libraries())),
+        remedy=remedy(fitting_count(count, estimate, (available - libraries()) / ROOM)),
     )
 
 

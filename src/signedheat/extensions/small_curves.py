@@ -26,10 +26,11 @@ Surface = TypeVar("Surface", bound=SurfaceDomain)
 def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
     """Whether oriented curves, or the pieces of one of them, are so short that triangles do not resolve them."""
     surface, listed = surface_of(solver), flattened(curves)
+    parts = chain.from_iterable(surface.segments(listed))  # refuses curves that do not fit
+    lengths = [float(part.lengths.sum()) for part in parts if part.oriented]
     short = SHORT * surface.spacing
     if isinstance(solver.domain, TriangleMesh) and (CurveGroups.of(solver.domain, listed).lengths < short).any():
         return True
-    lengths = [float(part.lengths.sum()) for part in chain.from_iterable(surface.segments(listed)) if part.oriented]
     return bool(lengths) and sum(lengths) < short
 
 
