@@ -34,6 +34,7 @@ from signedheat.lowering.surface.digital_surfaces import BYTES_PER_VOXEL
 from signedheat.lowering.surface.intrinsic import BYTES_REFINED
 from signedheat.lowering.surface.memory import memory_estimate as surface_estimate
 from signedheat.lowering.surface.point_clouds import BYTES_PER_POINT, NEIGHBORS
+from signedheat.lowering.surface.polygons import LIGHTER
 from signedheat.lowering.tets.discretization import memory_estimate as tet_estimate
 from signedheat.memory import libraries
 
@@ -80,7 +81,7 @@ def case(kind: str, size: int) -> tuple[Callable[[], object], float]:
         vertices, quads = globe(size)
         polygons = sh.PolygonMesh(vertices, quads)
         at = polygons.points_at(0)
-        return lambda: sh.SignedHeatSolver(polygons).distance(at), surface_estimate(4 * len(quads))
+        return lambda: sh.SignedHeatSolver(polygons).distance(at), surface_estimate(round(LIGHTER * 4 * len(quads)))
     if kind == "points":
         cloud = sh.PointCloud(spiral(size))
         beside = NEIGHBORS + BYTES_PER_POINT * size
