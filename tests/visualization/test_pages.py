@@ -14,7 +14,7 @@ import pytest
 import signedheat as sh
 from shapes.browser import Browser, is_there
 from signedheat import samples
-from signedheat.cli import main
+from signedheat.cli import main, view
 from signedheat.visualization import save_page
 
 GRID = sh.Grid((-1.6, -1.6, -1.6), 0.1, (33, 33, 33))
@@ -191,7 +191,7 @@ def test_view_writes_a_page_where_there_is_no_display(tmp_path, monkeypatch, cap
 
 def test_view_opens_a_window_where_there_is_one(tmp_path, monkeypatch, capsys):
     pyvista = pytest.importorskip("pyvista")
-    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(view, "display_answers", lambda: True)
     monkeypatch.setattr(pyvista, "OFF_SCREEN", True)
     opened = []
     monkeypatch.setattr(pyvista.Plotter, "show", lambda self: opened.append(len(self.actors)))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ...domains.curves import Curve
 from ...domains.triangle_mesh import TriangleMesh
@@ -63,7 +63,7 @@ def nearest_others(ends: NDArray[np.float64]) -> NDArray[np.int64]:
     An end that is nearer to its own other end than to any other piece is linked to its own piece.
     """
     piece = np.arange(len(ends)) // 2
-    near, found = cKDTree(ends).query(ends, k=min(3, len(ends)))
+    near, found = scipy.spatial.cKDTree(ends).query(ends, k=min(3, len(ends)))
     own = piece[found] == piece[:, None]
     own[:, 0] |= found[:, 0] == np.arange(len(ends))
     first = np.where(own, np.inf, near).argmin(axis=1)
