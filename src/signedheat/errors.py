@@ -76,7 +76,7 @@ class OutsideError(SignedHeatError):
 
 
 class MemoryLimitError(SignedHeatError):
-    """A problem that does not fit in memory, refused before anything is allocated."""
+    """A problem that does not fit in memory, or a result on disk, refused before anything is allocated."""
 
 
 class FactorizationError(SignedHeatError):

@@ -11,6 +11,7 @@ from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold, sphere, torus
 from signedheat import samples
 from signedheat.extensions import band_memory, bands
+from signedheat.extensions.band_plan import plan_band
 from signedheat.extensions.bands import band_around
 
 
@@ -229,3 +230,33 @@ def test_a_band_beyond_memory_is_refused_with_a_spacing_that_fits(monkeypatch):
     assert 0.01 < spacing < 0.02
     with pytest.raises(ReachedError):
         sh.solid_distance(ball, spacing=spacing, band=0.04)
+
+
+@pytest.mark.parametrize("spacing", [1e-4, 1e-9, 1e-12])
+@pytest.mark.parametrize("band", [1e-3, 3.0])
+def test_a_band_far_beyond_memory_is_refused_before_a_coarser_one_is_computed(monkeypatch, spacing, band):
+    monkeypatch.setattr(band_memory, "available_memory", lambda: 400_000_000)
+    monkeypatch.setattr(bands, "joined_band", lambda *_: pytest.fail("a band was computed"))
+    with refused(sh.MemoryLimitError) as caught:
+        sh.solid_distance(sphere(500), spacing=spacing, band=band)
+    assert float(re.search(r"spacing of ([0-9.e-]+)", caught.value.remedy).group(1)) > spacing
+
+
+def test_the_volume_beside_a_surface_is_that_of_its_shell():
+    coarse = sh.solid_distance(sphere(5000), resolution=64)
+    for reach in (0.3, 0.1, 0.001):
+        shell = 4 / 3 * np.pi * ((1 + reach) ** 3 - (1 - reach) ** 3)
+        assert band_memory.volume_within(coarse, reach) == pytest.approx(shell, rel=0.05)
+    assert band_memory.volume_within(coarse, 9.0) == pytest.approx(np.prod(coarse.grid.spacing) * coarse.grid.n_nodes)
+
+
+def half_sphere():
+    whole = sphere(2000)
+    return sh.TriangleMesh(whole.vertices, whole.faces[whole.vertices[whole.faces, 2].mean(axis=1) < 0.3])
+
+
+def test_bands_over_open_surface_wider_than_a_tile_need_memory_for_all_of_it():
+    coarse = sh.solid_distance(half_sphere(), resolution=65)
+    grid = sh.Grid(coarse.grid.origin, coarse.grid.spacing / 8, [8 * (n - 1) + 1 for n in coarse.grid.shape])
+    narrow, wide = (band_memory.memory_of_band(plan_band(coarse, grid, band))[1] for band in (0.03, 0.6))
+    assert narrow < 0.5e9 < 1.5e9 < wide

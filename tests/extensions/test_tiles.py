@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -14,8 +15,9 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold, sphere
-from signedheat.extensions import band_plan
+from signedheat.extensions import band_grids, band_memory, band_plan
 from signedheat.extensions.band_stores import TilesComputed
 
 pytest.importorskip("zarr")
@@ -103,9 +105,9 @@ def test_points_without_normals_go_in_tiles_too(tmp_path):
 @pytest.fixture
 def steep(monkeypatch):
     """Grids as those of thousands of nodes: 8 of them for each of the coarse grid, and a band between the two."""
-    monkeypatch.setattr(band_plan, "FEWEST", 10)
-    monkeypatch.setattr(band_plan, "MOST", 20)
-    monkeypatch.setattr(band_plan, "STEEPEST", 8)
+    monkeypatch.setattr(band_grids, "FEWEST", 10)
+    monkeypatch.setattr(band_grids, "MOST", 20)
+    monkeypatch.setattr(band_grids, "STEEPEST", 8)
 
 
 def test_far_finer_bands_have_one_between_and_come_as_near_to_the_truth(steep, tmp_path):
@@ -224,3 +226,27 @@ def test_workers_of_2_gb_compute_what_would_take_8_on_a_whole_grid(tmp_path, clu
     points *= 1.01 / np.linalg.norm(points, axis=1, keepdims=True)
     points = points[points @ np.array([0.6, 0.0, 0.8]) < 0.9]
     np.testing.assert_allclose(band(points), 0.01, atol=3e-4)  # 20,000 points: faces lie up to 2e-4 within the sphere
+
+
+def test_tiles_beyond_the_disk_are_refused_before_any_is_computed(tmp_path):
+    with refused(sh.MemoryLimitError) as caught:
+        sh.tiled_distance(holed(), tmp_path / "new" / "tiles", spacing=1e-9, band=1e-3)
+    assert "disk" in caught.value.cause
+    assert float(re.search(r"spacing of ([0-9.e-]+)", caught.value.remedy).group(1)) > 1e-9
+    assert not (tmp_path / "new").exists()
+
+
+def test_tiles_whose_work_does_not_fit_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(band_memory, "available_memory", lambda: 150_000_000)
+    with refused(sh.MemoryLimitError) as caught:
+        sh.tiled_distance(holed(), tmp_path, resolution=RESOLUTION, band=BAND)
+    assert "at a time" in caught.value.cause
+
+
+def test_tiles_are_found_in_a_box_of_a_trillion_of_them():
+    speck = box([0.5, 0.5, 0.5], [0.5001, 0.5001, 0.5001])
+    coarse = sh.solid_distance(speck, sh.Grid(np.zeros(3), np.full(3, 1 / 32), (33, 33, 33)))
+    plan = band_plan.plan_band(coarse, sh.Grid(np.zeros(3), coarse.grid.spacing / 2**15, (2**20 + 1,) * 3), 1e-5)
+    assert 1 <= len(plan.tiles) <= 64
+    middle = (plan.tiles + 0.5) * band_plan.TILE * plan.steps
+    assert np.linalg.norm(middle - 0.50005, axis=1).max() < 5e-4

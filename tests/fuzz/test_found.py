@@ -72,6 +72,8 @@ FOUND = [
     ("files tet fields", 1123, 6794),
     # parts of a surface without curves, told by a command on standard output alone
     ("commands", 1123, 1948),
+    # a band around ten points with 10¹² nodes along each edge
+    ("commands", 1126, 701),
     # a picture of 230 bytes that announces 75 million pixels
     ("files masks", 20261122, 753),
     # arguments that are quoted, compared or counted

@@ -17,7 +17,8 @@ from ..errors import SourceError
 from ..lowering.area_elements import sample_on_grid
 from ..operators.grid.block_method import BlockSources, SomeNodes
 from ..operators.grid.blocks import SIDE, Blocks, block_points
-from .band_plan import ENDS, BandPlan
+from .band_grids import ENDS
+from .band_plan import BandPlan
 from .sides import LEVEL, MIDDLE, SLOPE, doubt_beside
 
 FULL, NONE = 1.5, ENDS
@@ -49,9 +50,18 @@ def needed_blocks(plan: BandPlan, low: NDArray[np.int64], high: NDArray[np.int64
     reach = min(plan.reach / (SIDE * float(plan.steps.min())), float(max(plan.grid.shape)))
     beside = 2 + int(reach)
     wide = max(beside, halo(plan)) if plan.has_ends(low - beside, high + beside) else beside
-    held = plan.blocks_in(low - wide, high + wide)
-    own, around = (((held >= low - n) & (held < high + n)).all(axis=1) for n in (0, beside))
-    return held[own | (around & plan.blocks_near(plan.open_places, held)) | near_ends(plan, held)], wide
+
+    def kept(places: NDArray[np.int64], size: int) -> NDArray[np.bool_]:
+        first, last = places * size, (places + 1) * size
+        result = np.asarray(((last > low) & (first < high)).all(axis=1))
+        around = ((last > low - beside) & (first < high + beside)).all(axis=1)
+        rest = np.flatnonzero(~result & around)
+        result[rest] = plan.blocks_near(plan.open_places, places[rest], size)
+        rest = np.flatnonzero(~result)
+        result[rest] = plan.blocks_near(plan.end_tree, places[rest], size)
+        return result
+
+    return plan.blocks_in(low - wide, high + wide, kept), wide
 
 
 def completed_function(

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.grid import Grid
 from ..errors import MemoryLimitError
+from ..fields.grid_field import GridField
 from ..memory import available_memory, libraries
 from ..operators.grid.blocks import CUBE, NODES, SIDE
 from ..parallel import n_threads
@@ -20,13 +24,22 @@ KEPT = 0.7
 """Share of the blocks counted that have nodes in the band."""
 BYTES, BYTES_AT_WORK, BYTES_SOLVED = 6, 30, 200
 """Measured: of each node of a band; of a node of a tile that is computed; and of one where the method is repeated."""
+USUAL, BYTES_BEYOND = 28**3, 22
+"""Blocks of the box around a tile in which completed surface is looked for; the others' bytes include that of so many,
+each node more takes these."""
+BYTES_ON_DISK = 10
+"""Of each node, in its tile and in the band that the tiles make."""
 BYTES_COMPLETED = 2 * 144
 """Of each point of completed surface, which tiles have and the band gets from them."""
 
 ROOM = 1.1
 """By how much the spacing that is told to fit is larger than it must be."""
 LEAST = 0.01
-"""Share of the values that is taken to fit where even less would not."""
+"""Share of the memory that is taken to be left for values where the work alone takes all."""
+CLOSE = 1.01
+"""Ratio up to which that spacing is narrowed down."""
+SURELY = 0.5
+"""Share of the nodes that a band surely has, of those that the coarse field tells."""
 FIXED, FIXED_AT_ENDS = 75_000_000, 50_000_000
 """Bytes that trees of faces and threads take besides; and what solving takes where the surface ends."""
 
@@ -40,9 +53,12 @@ def memory_of_band(plan: BandPlan) -> tuple[int, int]:
     if not len(tiles):
         return 0, 0
     counts = [_blocks_of(plan, tile) for tile in _some(tiles)]
-    held = np.mean([own for own, _, _ in counts]) * len(tiles)
+    held = np.mean([counted[0] for counted in counts]) * len(tiles)
     at_ends = [_blocks_of(plan, tile) for tile in _some(np.unique(plan.ends // (TILE * plan.steps), axis=0))]
-    at_work = max(around * BYTES_AT_WORK + solved * BYTES_SOLVED for _, around, solved in counts + at_ends)
+    at_work = max(
+        around * BYTES_AT_WORK + solved * BYTES_SOLVED + max(box - USUAL, 0) * BYTES_BEYOND
+        for _, around, solved, box in counts + at_ends
+    )
     values = NODES * KEPT * held * BYTES + BYTES_COMPLETED * completed_points(plan)
     fixed = FIXED + (FIXED_AT_ENDS if len(plan.ends) else 0)
     return int(values), int(fixed + NODES * n_threads() * at_work)
@@ -61,39 +77,92 @@ def completed_points(plan: BandPlan) -> float:
 
 def refuse_band_beyond_memory(plan: BandPlan) -> None:
     """Raise `MemoryLimitError` if a band will not fit, and tell the spacing at which it would."""
-    available = available_memory()
     values, at_work = memory_of_band(plan)
+    _refuse(plan.far, plan.grid, plan.width, values, at_work)
+
+
+def refuse_band_far_beyond_memory(coarse: GridField, grid: Grid, band: float) -> None:
+    """The same before any band between is computed, where not even half the nodes would fit."""
+    values = BYTES * volume_within(coarse, band) / float(np.prod(grid.spacing))
+    _refuse(coarse, grid, band, SURELY * values, FIXED)
+
+
+def refuse_work_beyond_memory(plan: BandPlan) -> None:
+    """Raise `MemoryLimitError` if the tiles that are computed at a time will not fit, wherever they are kept."""
+    available = available_memory()
+    needed = memory_of_band(plan)[1] + libraries()
+    if available is None or needed <= available:
+        return
+    raise MemoryLimitError(
+        f"{n_threads()} tiles at a time need about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
+        remedy=f"use a band narrower than {plan.width:.2g}, a larger spacing, or fewer threads",
+    )
+
+
+def refuse_tiles_beyond_disk(coarse: GridField, grid: Grid, band: float, folder: Path) -> None:
+    """Raise `MemoryLimitError` if not even half the nodes of a band would fit on the disk of a folder."""
+    there = next(place for place in (folder, *folder.parents) if place.exists())
+    free = shutil.disk_usage(there).free
+    needed = SURELY * BYTES_ON_DISK * volume_within(coarse, band) / float(np.prod(grid.spacing))
+    if needed <= free:
+        return
+    fitting = ROOM * _fitting_spacing(coarse, float(grid.spacing.min()), band, SURELY * free / needed)
+    raise MemoryLimitError(
+        f"the tiles need about {needed / SURELY / 1e9:.2g} GB, and {free / 1e9:.2g} GB are free "
+        f"on the disk of {folder}",
+        remedy=f"use a spacing of {fitting:.2g} or more, a narrower band, or a folder on a larger disk",
+    )
+
+
+def _refuse(coarse: GridField, grid: Grid, width: float, values: float, at_work: float) -> None:
+    """Raise `MemoryLimitError` if the values of a band and what takes part in the work are more than there is."""
+    available = available_memory()
     needed = values + at_work + libraries()
     if available is None or needed <= available:
         return
-    spacing, width = float(plan.steps.min()), plan.width
-    share = max((available - at_work - libraries()) / values, LEAST)
-    fitting = ROOM * _fitting_spacing(spacing, width, share)
+    left = max(available - at_work - libraries(), LEAST * available) / values
+    fitting = ROOM * _fitting_spacing(coarse, float(grid.spacing.min()), width, left)
     raise MemoryLimitError(
         f"the band needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
         remedy=f"use a spacing of {fitting:.2g} or more, or keep it on disk: tiled_distance, volume --tiles",
     )
 
 
-def _blocks_of(plan: BandPlan, tile: NDArray[Any]) -> tuple[int, int, int]:
-    """Number of blocks of a tile, of those that are computed for it, and of those where the method is repeated."""
+def volume_within(coarse: GridField, reach: float) -> float:
+    """Volume of the places nearer to a surface than `reach`, from the distances of coarse nodes.
+
+    Each node stands for a cell through which distance goes up by its side.
+    """
+    half = 0.5 * float(coarse.grid.spacing.max())
+    cells = 0.0
+    for values in np.abs(coarse.values):
+        within = np.minimum(values + half, reach) - np.maximum(values - half, -reach)
+        cells += float(np.maximum(within, 0.0).sum(dtype=np.float64)) / (2.0 * half)
+    return cells * float(np.prod(coarse.grid.spacing))
+
+
+def _blocks_of(plan: BandPlan, tile: NDArray[Any]) -> tuple[int, int, int, int]:
+    """Number of blocks of a tile, of those that are computed for it, where the method is repeated, and in its box."""
     low = np.asarray(tile, dtype=np.int64) * CUBE
     high = low + CUBE
     own = plan.blocks_in(low, high)
     needed, wide = needed_blocks(plan, low, high)
-    return len(own), len(needed), int(near_ends(plan, needed).sum()) if wide else 0
+    last = -(-np.array(plan.grid.shape) // SIDE)
+    box = np.minimum(high + wide, last) - np.maximum(low - wide, 0)
+    return len(own), len(needed), int(near_ends(plan, needed).sum()) if wide else 0, int(np.prod(box)) if wide else 0
 
 
-def _fitting_spacing(spacing: float, width: float, share: float) -> float:
-    """The least spacing with that share of the nodes, of which there are 2 (b / h + 6) / h² for a piece of surface."""
+def _fitting_spacing(coarse: GridField, spacing: float, width: float, share: float) -> float:
+    """The least spacing with that share of the nodes, which lie as near to the surface or in a block with such."""
 
     def nodes(h: float) -> float:
-        return (width / h + 0.75 * SIDE) / h**2
+        return volume_within(coarse, width + 0.75 * SIDE * h) / h**3
 
+    most = share * nodes(spacing)
     low, high = spacing, spacing
-    while nodes(high) > share * nodes(spacing):
-        high *= 2.0
-    for _ in range(40):
+    while nodes(high) > most:
+        low, high = high, 2.0 * high
+    while high > CLOSE * low:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if nodes(middle) <= share * nodes(spacing) else (middle, high)
+        low, high = (low, middle) if nodes(middle) <= most else (middle, high)
     return high

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy
@@ -22,6 +23,7 @@ from ..geometry.touching_faces import touching_faces
 from ..geometry.winding_tree import WindingTree
 from ..operators.grid.blocks import CUBE, SIDE
 from ..operators.grid.exact_surface import ExactSurface
+from .band_grids import ENDS, FAR, LEAST, SLACK
 from .rims import Rims, rims_of
 
 TILE = SIDE * CUBE
@@ -30,26 +32,15 @@ NEAR = 2.0
 """Coarse cells from a face within which it tells the side."""
 WIDEST = 1e3
 """Half width of a band, relative to the grid, beyond which it is taken for a mistake."""
-FAR = 1.5
-"""Cells from any face beyond which a zero set stands in for missing surface."""
-RATIO = 4
-"""Spacing of the coarse grid over that of the band, where nothing speaks against it."""
-STEEPEST = 16
-"""The same from which on another band is computed between them: near the ends of the surface fine nodes within some
-coarse cells are solved for, whose number grows with its square."""
-FEWEST, MOST = 64, 257
-"""Nodes of the coarse grid along its longest side: with fewer it misses what it must complete, with more it is slow."""
-SLACK = 0.75
-"""Coarse cells by which distance may be off between the nodes of the coarse field."""
-ENDS = 2.5
-"""Coarse cells from ends of the surface up to which the fine solution counts."""
+ROUGH = 0.1
+"""By how much places may be farther away than asked, relative, where that saves time."""
 TOUCHING = 1e-3
 """Cells between faces that lie on each other."""
 BEYOND, COVERED = 2.0, 0.75
 """Cells beyond an end at which surface goes on inside bodies, as where they were united, if this is the winding number
 there: nothing is missing."""
-LEAST = 2.0
-"""Cells that a band is wide on either side at least."""
+Kept: TypeAlias = Callable[[NDArray[np.int64], int], NDArray[np.bool_]]
+"""From the places of cubes, and the number of blocks along their edges, to which of them to keep."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,22 +159,34 @@ class BandPlan:
 
     @cached_property
     def tiles(self) -> NDArray[np.int64]:
-        """(t, 3) first nodes, divided by `TILE`, of the tiles that hold blocks of the band."""
-        shape = -(-np.array(self.grid.shape) // TILE)
-        return self._near(np.argwhere(np.ones(shape, dtype=bool)), TILE)
-
-    def blocks_in(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(n, 3) places of the blocks that may hold nodes of the band, in a box of blocks [low, high)."""
+        """(t, 3) first nodes, divided by `TILE`, of the tiles that hold blocks of the band, in their order."""
         limit = -(-np.array(self.grid.shape) // SIDE)
-        low, high = np.maximum(low, 0), np.minimum(high, limit)
-        size = CUBE
+        found = self._divided(np.zeros(3, dtype=np.int64), limit, CUBE)
+        return found[np.lexsort(found.T[::-1])]
+
+    def blocks_in(self, low: NDArray[np.int64], high: NDArray[np.int64], kept: Kept | None = None) -> NDArray[np.int64]:
+        """(n, 3) places of the blocks that may hold nodes of the band, in a box of blocks [low, high).
+
+        With `kept`, those of them alone that it tells to keep; it is asked for cubes of ever fewer blocks.
+        """
+        limit = -(-np.array(self.grid.shape) // SIDE)
+        return self._divided(np.maximum(low, 0), np.minimum(high, limit), 1, kept)
+
+    def _divided(
+        self, low: NDArray[np.int64], high: NDArray[np.int64], least: int, kept: Kept | None = None
+    ) -> NDArray[np.int64]:
+        """Places of cubes of `least` blocks in a box that may hold nodes of the band, by halving larger ones."""
+        longest = max(int((high - low).max()), least)
+        size = least << (-(-longest // least) - 1).bit_length()
         first, last = low // size, -(-high // size)
         places = first + np.argwhere(np.ones(np.maximum(last - first, 0), dtype=bool))
         inner = np.argwhere(np.ones((2, 2, 2), dtype=bool))
         while True:
             places = places[((places * size < high) & ((places + 1) * size > low)).all(axis=1)]
+            if kept is not None:
+                places = places[kept(places, size)]
             places = self._near(places, size * SIDE)
-            if size == 1:
+            if size == least:
                 return places
             places = (2 * places[:, None] + inner).reshape(-1, 3)
             size //= 2
@@ -196,12 +199,15 @@ class BandPlan:
         """Whether the surface ends so near to a box of blocks that the fine solution counts there."""
         return self._is_near(self.end_tree, low, high, ENDS * self.coarse_cell)
 
-    def blocks_near(self, tree: scipy.spatial.cKDTree | None, places: NDArray[np.integer]) -> NDArray[np.bool_]:
-        """(n,) which of some blocks have nodes so near to open places or ends that the fine solution may count."""
-        if tree is None:
+    def blocks_near(
+        self, tree: scipy.spatial.cKDTree | None, places: NDArray[np.integer], size: int = 1
+    ) -> NDArray[np.bool_]:
+        """(n,) which cubes of `size` blocks have nodes so near to open places or ends that the fine solution counts."""
+        if tree is None or not len(places):
             return np.zeros(len(places), dtype=bool)
-        centres = (places.astype(np.int64) * SIDE + 0.5 * (SIDE - 1)) * self.steps
-        within = ENDS * self.coarse_cell + 0.5 * float(np.linalg.norm((SIDE - 1) * self.steps))
+        last = size * SIDE - 1
+        centres = (places.astype(np.int64) * size * SIDE + 0.5 * last) * self.steps
+        within = ENDS * self.coarse_cell + 0.5 * float(np.linalg.norm(last * self.steps))
         found: NDArray[np.bool_] = tree.query(centres, distance_upper_bound=within)[0] <= within
         return found
 
@@ -246,12 +252,12 @@ class BandPlan:
         if self.open_places is not None:
             rest = np.flatnonzero(~near)
             within = self.open_reach + radius
-            rest = rest[self.open_places.query(centres[rest], distance_upper_bound=within)[0] <= within]
+            rest = rest[_may_be_within(self.open_places, centres[rest], within)]
             heights, cells = self._coarse_heights(centres[rest])
             near[rest] = np.abs(heights) <= self.reach + radius + SLACK * cells
             if self.end_tree is not None:  # where the fine surface need not be where the coarse one is
                 rest = rest[~near[rest]]
-                near[rest] = self.end_tree.query(centres[rest], distance_upper_bound=within)[0] <= within
+                near[rest] = _may_be_within(self.end_tree, centres[rest], within)
             walls = np.flatnonzero(~near & self.at_walls(places, size))
             near[walls] = self.coarse_function(centres[walls]) < self.reach + radius
         return places[near]
@@ -292,35 +298,20 @@ class BandPlan:
         return ExactSurface(self.features, crossings, origin, steps, telling, None, self.asked, self.share, self.closed)
 
 
+def _may_be_within(tree: scipy.spatial.cKDTree, points: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
+    """(n,) which points have places of a tree within reach; some a little beyond are told, too.
+
+    Exactly the nearest is searched for long where many are about as near.
+    """
+    found = tree.query(points, eps=ROUGH, distance_upper_bound=(1 + ROUGH) * reach)[0]
+    return np.asarray(np.isfinite(found))
+
+
 def _linear(values: NDArray[Any], grid: Grid, points: NDArray[np.float64]) -> NDArray[Any]:
     """(n,) values of nodes at places around the first, linear between them, and beyond the walls as at them."""
     index = (points / grid.spacing).T
     result: NDArray[Any] = scipy.ndimage.map_coordinates(values, index, order=1, mode="nearest")
     return result
-
-
-def coarse_grid(grid: Grid) -> Grid:
-    """The grid of the coarse field for a band on a grid: its nodes are some of those, as far as they reach."""
-    factor, longest = RATIO, max(grid.shape) - 1
-    while longest // factor >= MOST:
-        factor *= 2
-    while factor > 1 and longest // factor < FEWEST - 1:
-        factor //= 2
-    return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
-
-
-def grid_between(coarse: Grid, grid: Grid) -> Grid | None:
-    """That of another band, where the grid of a band is far finer than its coarse one; None where it is not."""
-    if round(float((coarse.spacing / grid.spacing).max())) < STEEPEST:
-        return None
-    return Grid(grid.origin, RATIO * grid.spacing, [1 - (-(n - 1) // RATIO) for n in grid.shape])
-
-
-def width_between(grid: Grid, band: float) -> float:
-    """Half width of the band of that: wherever blocks of a band are computed, it tells their coarse field."""
-    fine = float(grid.spacing.max())
-    beside = float(np.linalg.norm(SIDE * grid.spacing)) + (max(FAR, ENDS) + SLACK) * RATIO * fine
-    return max(float(band), LEAST * fine) + float(np.linalg.norm(grid.spacing)) + beside
 
 
 def plan_band(coarse: GridField | BandField, grid: Grid, band: float) -> BandPlan:

@@ -15,7 +15,8 @@ from ..geometry.nearest_faces import NearestFaces
 from ..operators.grid.blocks import CUBE, NODES, SIDE, Blocks, block_points, off_grid
 from ..operators.grid.closest_points import crossed_edges, crossings_at, distances_to_crossings
 from .band_completion import NONE, completed_function, needed_blocks
-from .band_plan import FAR, NEAR, BandPlan
+from .band_grids import FAR
+from .band_plan import NEAR, BandPlan
 from .band_specks import without_specks
 from .shape_sharpening import stands_in
 

@@ -18,8 +18,9 @@ from ..memory import paged
 from ..operators.grid.blocks import Blocks
 from ..parallel import n_threads
 from ..progress import Progress, within
-from .band_memory import refuse_band_beyond_memory
-from .band_plan import BandPlan, grid_between, plan_band, width_between
+from .band_grids import grid_between, width_between
+from .band_memory import refuse_band_beyond_memory, refuse_band_far_beyond_memory
+from .band_plan import BandPlan, plan_band
 from .band_tiles import Tile, solve_tile
 
 BETWEEN = 0.2
@@ -53,6 +54,7 @@ def band_around(coarse: GridField, grid: Grid, band: float, progress: Progress |
     between = grid_between(coarse.grid, grid)
     if between is None:
         return joined_band(coarse, grid, band, progress)
+    refuse_band_far_beyond_memory(coarse, grid, band)
     wide = band_around(coarse, between, width_between(grid, band), within(progress, 0.0, BETWEEN))
     return joined_band(wide, grid, band, within(progress, BETWEEN, 1.0))
 

@@ -25,7 +25,7 @@ from ..operators.grid.block_method import BlockSources, SomeNodes
 from ..operators.grid.blocks import SIDE, Blocks
 from ..progress import Progress, within
 from ..solver import SignedHeatSolver, as_list, band_of_phi
-from .band_plan import LEAST, coarse_grid
+from .band_grids import LEAST, coarse_grid
 
 COARSE = 0.6
 """Share of the progress that the coarse solution is."""

@@ -30,7 +30,7 @@ from ..operators.grid.fitted_points import mean_gap
 from ..operators.grid.line_winding import closed_winding_numbers
 from ..progress import Progress, Stopwatch, within
 from ..solver import SignedHeatSolver, checked
-from .band_plan import coarse_grid
+from .band_grids import coarse_grid
 from .bands import band_around
 from .exact_uniting import Overlaps, exactly_without_covered, overlaps_of
 from .face_density import as_if_whole

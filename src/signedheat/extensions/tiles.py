@@ -29,7 +29,9 @@ from ..packages import lazy_module, require
 from ..parallel import connected, n_threads
 from ..progress import Progress, within
 from ..solver import checked
-from .band_plan import BandPlan, coarse_grid, grid_between, plan_band, width_between
+from .band_grids import coarse_grid, grid_between, width_between
+from .band_memory import refuse_tiles_beyond_disk, refuse_work_beyond_memory
+from .band_plan import BandPlan, plan_band
 from .band_stores import TilesComputed, load_plan, read_tile, save_plan, saved_fingerprint, solve_into, tile_blocks
 from .joining import joined_shape
 from .solid_distance import coarse_distance
@@ -96,6 +98,8 @@ def tiled_distance(
     ------
     FileFormatError
         If the folder holds tiles of something else.
+    MemoryLimitError
+        If the tiles will surely not fit on the disk of the folder, or those at work at a time in memory.
     MissingPackageError
         If zarr is not installed, or for a cluster distributed.
     SourceError, GeometryError
@@ -116,7 +120,13 @@ def tiled_distance(
     grid = Grid.around(bounds_around([solid]), resolution, padding, spacing) if domain is None else domain
     key = _key(solid, grid, (band, constraint, diffusion, as_oriented, keep_overlaps))
     steps = Steps(not as_oriented, not keep_overlaps, True, checked(constraint), diffusion)
-    run = _Run(key, scheduler, lambda told: coarse_distance(solid, grid, steps, told))
+
+    def coarsest(told: Progress | None) -> GridField:
+        coarse = coarse_distance(solid, grid, steps, told)
+        refuse_tiles_beyond_disk(coarse, grid, band, folder)
+        return coarse
+
+    run = _Run(key, scheduler, coarsest)
     field, note = _in_tiles(run, folder, grid, band, progress)
     return replace(field, diagnostics=field.diagnostics.noting(note))
 
@@ -155,6 +165,8 @@ def _in_tiles(
     plan = load_plan(folder, run.key)
     places = [(int(a), int(b), int(c)) for a, b, c in plan.tiles]
     missing = [place for place in places if tile_blocks(folder, place) is None]
+    if missing and run.scheduler is None:
+        refuse_work_beyond_memory(plan)
     peak = 0
     for done, (_, memory) in enumerate(_computed(str(folder), run, missing)):
         peak = max(peak, memory)
