@@ -7,7 +7,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
-from signedheat import samples
+from signedheat import memory, samples
 from signedheat.cli import main
 
 BALL = samples.sphere(4)
@@ -85,6 +85,22 @@ def test_a_sheet_gains_twice_its_area_times_the_distance(sides):
     flat = (above + below) * sheet.face_areas.sum()
     # Rounded ends add at most half a disk along the rim.
     assert flat * 0.97 < volume(solid) < flat * 1.03 + 0.5 * np.pi * reach**2 * rim
+
+
+def test_a_triangle_is_thickened_to_its_exact_distance():
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    solid = sh.thicken(sh.TriangleMesh(corners, [[0, 1, 2]]), 0.3, resolution=96)
+    assert is_closed_and_manifold(solid)
+    prism, slant = 2 * 0.3 * 0.5, np.sqrt(2.0)
+    rounded = 0.5 * np.pi * 0.3**2 * (2 + slant) + 4 / 3 * np.pi * 0.3**3
+    assert volume(solid) == pytest.approx(prism + rounded, rel=2e-3)
+
+
+def test_thickening_beyond_memory_is_refused(monkeypatch):
+    monkeypatch.setattr(memory, "_free", lambda: 100_000_000)
+    with pytest.raises(sh.MemoryLimitError) as caught:
+        sh.thicken(waved_sheet(), 0.1, resolution=400)
+    assert caught.value.remedy
 
 
 def test_thickening_evenly_does_not_ask_which_side_is_which():

@@ -74,6 +74,8 @@ FOUND = [
     ("commands", 1123, 1948),
     # a band around ten points with 10¹² nodes along each edge
     ("commands", 1126, 701),
+    # sheets thickened by many times their size
+    ("commands", 1130, 4932), ("commands", 1130, 5694),
     # a picture of 230 bytes that announces 75 million pixels
     ("files masks", 20261122, 753),
     # arguments that are quoted, compared or counted
