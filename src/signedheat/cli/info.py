@@ -158,11 +158,13 @@ def _widths_text(widths: Thickness) -> dict[str, str]:
 
 
 def _least_spacing(shape: Any) -> float | None:
-    """Spacing of the finest grid around the shape that fits into the memory that is free."""
+    """Spacing of the finest grid around the shape that fits into the memory that is free; None if there is none."""
     available = available_memory()
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    return float(fitting_spacing(Grid.around(shape.bounds, 128), available, *_most(shape)).max())
+    grid = Grid.around(shape.bounds, 128)
+    spacing = fitting_spacing(grid, available, *_most(shape))
+    return float(spacing.max()) if (spacing < grid.upper - grid.origin).all() else None
 
 
 def _memory(shape: Any, resolution: int) -> int | None:

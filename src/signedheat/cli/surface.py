@@ -17,6 +17,7 @@ from ..fields.vertex_field import VertexField
 from ..io import ensure_writable, read, read_curves, write_curves
 from ..io.globe import read_globe_curves
 from ..io.surface_fields import VERTEX_FIELD_FORMATS
+from ..lowering.surface.memory import refuse_too_many
 from ..solver import SignedHeatSolver
 from ..visualization import ensure_picture_writable, save_surface
 from .computing import Summary, constraint_of, prefix_errors
@@ -128,4 +129,7 @@ def read_surface(path: str) -> Any:
             element="surface",
             path=path,
         )
+    if isinstance(surface, TriangleMesh):  # before curves are looked for on it
+        with prefix_errors(path):
+            refuse_too_many(surface.n_faces, surface.n_faces, "triangles")
     return surface

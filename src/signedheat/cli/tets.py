@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from argparse import Namespace
 from typing import Any
 
@@ -13,6 +14,8 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import ensure_writable, read
 from ..io.tets import TET_FIELD_FORMATS
+from ..lowering.tets.discretization import memory_estimate
+from ..memory import refuse_beyond_memory
 from ..packages import require
 from ..visualization import ensure_picture_writable, save_slices
 from .computing import Summary, compute, describe, prefix_errors
@@ -38,7 +41,9 @@ def run(arguments: Namespace) -> Summary:
         )
     with prefix_errors(arguments.shape):
         if mesh is None:
-            mesh = tetrahedralize(shape, resolution=arguments.resolution or RESOLUTION, padding=arguments.padding)
+            resolution = arguments.resolution or RESOLUTION
+            mesh = tetrahedralize(shape, resolution=resolution, padding=arguments.padding)
+            _refuse_beyond_memory(mesh.n_tets, resolution)
         field = compute(shape, mesh, arguments)
     field.save(arguments.output)
     if arguments.preview:
@@ -51,6 +56,19 @@ def run(arguments: Namespace) -> Summary:
     }
     text = f"{arguments.output}: {mesh.n_tets} tets, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
     return summary, text
+
+
+def _refuse_beyond_memory(n_tets: int, resolution: int) -> None:
+    """Raise `MemoryLimitError` if distance on a lattice will not fit, and tell the resolution at which it does.
+
+    The number of tets grows at least with its square.
+    """
+    refuse_beyond_memory(
+        f"distance on {n_tets:,} tets",
+        n_tets,
+        memory_estimate,
+        lambda fitting: f"lower the resolution from {resolution} to {int(resolution * math.sqrt(fitting / n_tets))}",
+    )
 
 
 def on_grid(field: TetField) -> GridField:

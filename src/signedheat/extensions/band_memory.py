@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from ..domains.grid import Grid
 from ..errors import MemoryLimitError
+from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..memory import available_memory, libraries
 from ..operators.grid.blocks import CUBE, NODES, SIDE
 from ..parallel import n_threads
 from .band_completion import near_ends, needed_blocks
+from .band_grids import coarse_grid
 from .band_plan import TILE, BandPlan
 
 LOOKED_AT = 24
@@ -34,10 +36,8 @@ BYTES_COMPLETED = 2 * 144
 
 ROOM = 1.1
 """By how much the spacing that is told to fit is larger than it must be."""
-LEAST = 0.01
-"""Share of the memory that is taken to be left for values where the work alone takes all."""
 CLOSE = 1.01
-"""Ratio up to which that spacing is narrowed down."""
+"""Ratio up to which the spacing that fits is narrowed down."""
 SURELY = 0.5
 """Share of the nodes that a band surely has, of those that the coarse field tells."""
 FIXED, FIXED_AT_ENDS = 75_000_000, 50_000_000
@@ -59,7 +59,7 @@ def memory_of_band(plan: BandPlan) -> tuple[int, int]:
         around * BYTES_AT_WORK + solved * BYTES_SOLVED + max(box - USUAL, 0) * BYTES_BEYOND
         for _, around, solved, box in counts + at_ends
     )
-    values = NODES * KEPT * held * BYTES + BYTES_COMPLETED * completed_points(plan)
+    values = NODES * KEPT * held * BYTES + BYTES_COMPLETED * completed_points(plan.coarse, plan.grid)
     fixed = FIXED + (FIXED_AT_ENDS if len(plan.ends) else 0)
     return int(values), int(fixed + NODES * n_threads() * at_work)
 
@@ -69,10 +69,10 @@ def _some(tiles: NDArray[Any]) -> NDArray[Any]:
     return tiles[np.unique(np.linspace(0, len(tiles) - 1, LOOKED_AT).astype(np.int64))] if len(tiles) else tiles
 
 
-def completed_points(plan: BandPlan) -> float:
+def completed_points(coarse: GridField | BandField, grid: Grid) -> float:
     """About how many points of completed surface a band has: as many as the coarse field for each of its squares."""
-    surface = plan.coarse.surface
-    return 0.0 if surface is None else len(surface.crossings) * (plan.coarse_cell / plan.cell) ** 2
+    finer = float(coarse.grid.spacing.max() / grid.spacing.max())
+    return 0.0 if coarse.surface is None else len(coarse.surface.crossings) * finer**2
 
 
 def refuse_band_beyond_memory(plan: BandPlan) -> None:
@@ -84,7 +84,9 @@ def refuse_band_beyond_memory(plan: BandPlan) -> None:
 def refuse_band_far_beyond_memory(coarse: GridField, grid: Grid, band: float) -> None:
     """The same before any band between is computed, where not even half the nodes would fit."""
     values = BYTES * volume_within(coarse, band) / float(np.prod(grid.spacing))
-    _refuse(coarse, grid, band, SURELY * values, FIXED)
+    values += BYTES_COMPLETED * completed_points(coarse, grid)
+    at_work = FIXED + FIXED_AT_ENDS + n_threads() * NODES * CUBE**3 * BYTES_AT_WORK
+    _refuse(coarse, grid, band, values, at_work, SURELY)
 
 
 def refuse_work_beyond_memory(plan: BandPlan) -> None:
@@ -114,17 +116,24 @@ def refuse_tiles_beyond_disk(coarse: GridField, grid: Grid, band: float, folder:
     )
 
 
-def _refuse(coarse: GridField, grid: Grid, width: float, values: float, at_work: float) -> None:
-    """Raise `MemoryLimitError` if the values of a band and what takes part in the work are more than there is."""
+def _refuse(coarse: GridField, grid: Grid, width: float, values: float, at_work: float, surely: float = 1.0) -> None:
+    """Raise `MemoryLimitError` if what is at work and a share of the values of a band are more than there is."""
     available = available_memory()
-    needed = values + at_work + libraries()
-    if available is None or needed <= available:
+    if available is None or surely * values + at_work + libraries() <= available:
         return
-    left = max(available - at_work - libraries(), LEAST * available) / values
-    fitting = ROOM * _fitting_spacing(coarse, float(grid.spacing.min()), width, left)
+    needed = values + at_work + libraries()
+    told = f"the band needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free"
+    left = (available - at_work - libraries()) / values
+    if left <= 0:
+        raise MemoryLimitError(
+            told, remedy=f"free some memory, or use a narrower band: its work takes {(needed - values) / 1e9:.2g} GB"
+        )
+    spacing = float(grid.spacing.min())
+    fitting = ROOM * _fitting_spacing(coarse, spacing, width, left)
+    while _coarse_nodes(grid, fitting / spacing) > coarse.grid.n_nodes:  # of which so many did fit
+        fitting *= CLOSE
     raise MemoryLimitError(
-        f"the band needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
-        remedy=f"use a spacing of {fitting:.2g} or more, or keep it on disk: tiled_distance, volume --tiles",
+        told, remedy=f"use a spacing of {fitting:.2g} or more, or keep it on disk: tiled_distance, volume --tiles"
     )
 
 
@@ -139,6 +148,12 @@ def volume_within(coarse: GridField, reach: float) -> float:
         within = np.minimum(values + half, reach) - np.maximum(values - half, -reach)
         cells += float(np.maximum(within, 0.0).sum(dtype=np.float64)) / (2.0 * half)
     return cells * float(np.prod(coarse.grid.spacing))
+
+
+def _coarse_nodes(grid: Grid, ratio: float) -> int:
+    """Nodes of the coarse grid of a band whose spacing is that of a grid times a ratio."""
+    shape = np.ceil((np.array(grid.shape) - 1) / ratio).astype(np.int64) + 1
+    return coarse_grid(Grid(grid.origin, ratio * grid.spacing, shape)).n_nodes
 
 
 def _blocks_of(plan: BandPlan, tile: NDArray[Any]) -> tuple[int, int, int, int]:

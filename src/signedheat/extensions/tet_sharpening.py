@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import Note, RoundCorners
-from ..discretization import SourceTerm, discretize
+from ..discretization import SourceTerm
 from ..domains.foreign import as_shapes
 from ..domains.kinds import Shapes
 from ..errors import UnsupportedTypeError
 from ..fields.tet_field import TetField
 from ..geometry.marching_tets import level_triangles
-from ..lowering.tets.discretization import TetDiscretization
+from ..lowering.tets.discretization import TetDiscretization, lowered_tets
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
@@ -42,8 +42,7 @@ def _(
         )
     if shape is not None:
         method = ToShapes(tuple(cast("list[Shape]", as_shapes(shape))))
-    lowered = discretize(field.mesh)
-    assert isinstance(lowered, TetDiscretization)
+    lowered = lowered_tets(field.mesh)  # of which nothing is solved
     elements = LinearElements.on_tets(field.mesh.geometry, lowered.unknowns, lowered.n_unknowns)
     new, diagnostics = sharpened(field, lowered, elements, field.values[lowered.vertices], method, progress)
     return replace(field, values=lowered.at_vertices(new), diagnostics=diagnostics)

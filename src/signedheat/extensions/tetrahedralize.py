@@ -146,7 +146,9 @@ def _refuse_too_many(least: float, expected: float, resolution: float, power: in
 
     def lower(fitting: int) -> str:
         most = resolution * (fitting / expected) ** (1 / power)
-        return f"lower the resolution from {resolution:g} to at most {most:.3g}"
+        return (
+            f"lower the resolution from {resolution:g} to at most {math.floor(most) if most >= 2 else round(most, 2)}"
+        )
 
     count = math.ceil(min(least, 1e18))
     refuse_beyond_memory(f"a lattice of {least:,.3g} tets", count, lambda number: BYTES_PER_TET * number, lower)

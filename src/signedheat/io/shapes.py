@@ -9,6 +9,7 @@ from ..domains.exchange import save_shape
 from ..domains.foreign import ForeignShape, as_shape
 from ..domains.kinds import Shape
 from ..domains.tet_mesh import TetMesh
+from ..memory import refuse_beyond_memory
 from .elements import SurfaceShape
 from .files import PathLike, extension, reading, replacing, unknown_extension
 from .glb import read_glb
@@ -51,6 +52,9 @@ WRITERS: dict[str, Callable[[SurfaceShape, PathLike], bytes]] = {
 
 SHAPE_FORMATS = frozenset(WRITERS)
 
+MANY, BYTES_PER_FACE = 100_000, 250
+"""Faces from which on their memory is looked at; and measured: what each takes at least, whatever is asked of it."""
+
 
 def read(path: PathLike) -> Shape:
     """Read a shape, in the format given by the extension.
@@ -76,6 +80,8 @@ def read(path: PathLike) -> Shape:
     ------
     FileFormatError
         If the file is missing, of unknown format, truncated or damaged.
+    MemoryLimitError
+        If too little memory is free for so large a file, or to do anything with so many faces.
     GeometryError
         If the shape is invalid: no element, NaN or infinite coordinates, a vertex id that does not exist.
 
@@ -91,7 +97,16 @@ def read(path: PathLike) -> Shape:
     if reader is None:
         raise unknown_extension(path, READERS, "a shape")
     with reading(path):
-        return reader(path)
+        shape = reader(path)
+        faces = getattr(shape, "n_faces", 0) or len(getattr(shape, "corners", ()))
+        if faces >= MANY:
+            refuse_beyond_memory(
+                f"a surface of {faces:,} faces",
+                faces,
+                lambda n: float(BYTES_PER_FACE * n),
+                lambda n: f"use at most {n:,} faces, coarsened or in parts",
+            )
+        return shape
 
 
 def save(shape: Shape | ForeignShape, path: PathLike) -> None:

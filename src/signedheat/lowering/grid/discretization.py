@@ -84,10 +84,12 @@ def refuse_beyond_memory(
         return
     fitting = scale * ROOM * fitting_spacing(grid, available, *(at_most or (per_node, beside, area)))
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
+    coarser = f"choose a spacing of {spacing} or more, or a lower resolution"
+    some_nodes = (fitting < scale * (grid.upper - grid.origin)).all()
     raise MemoryLimitError(
         f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
         f"and {available / 1e9:.1f} GB are free",
-        remedy=f"choose a spacing of {spacing} or more, or a lower resolution",
+        remedy=coarser if some_nodes else "its source alone takes that much: coarsen it, or take it in parts",
     )
 
 

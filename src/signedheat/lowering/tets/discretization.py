@@ -204,4 +204,9 @@ def _(domain: TetMesh) -> TetDiscretization:
         memory_estimate,
         lambda number: f"use at most {number:,} tets, as with a lower resolution of tetrahedralize",
     )
-    return TetDiscretization(domain, direct=len(domain.faces.vertices) <= DIRECT_FACES)
+    return lowered_tets(domain)
+
+
+def lowered_tets(mesh: TetMesh) -> TetDiscretization:
+    """A tet mesh as the three steps see it, whether distance on it fits into memory or not."""
+    return TetDiscretization(mesh, direct=len(mesh.faces.vertices) <= DIRECT_FACES)
