@@ -34,13 +34,13 @@ BYTES_ON_DISK = 10
 BYTES_COMPLETED = 2 * 144
 """Of each point of completed surface, which tiles have and the band gets from them."""
 
-ROOM = 1.1
+ROOM = 1.25
 """By how much the spacing that is told to fit is larger than it must be."""
 CLOSE = 1.01
 """Ratio up to which the spacing that fits is narrowed down."""
 SURELY = 0.5
 """Share of the nodes that a band surely has, of those that the coarse field tells."""
-FIXED, FIXED_AT_ENDS = 75_000_000, 50_000_000
+FIXED, FIXED_AT_ENDS = 75_000_000, 75_000_000
 """Bytes that trees of faces and threads take besides; and what solving takes where the surface ends."""
 
 
