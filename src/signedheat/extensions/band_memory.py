@@ -112,7 +112,7 @@ def refuse_tiles_beyond_disk(coarse: GridField, grid: Grid, band: float, folder:
     raise MemoryLimitError(
         f"the tiles need about {needed / SURELY / 1e9:.2g} GB, and {free / 1e9:.2g} GB are free "
         f"on the disk of {folder}",
-        remedy=f"use a spacing of {fitting:.2g} or more, a narrower band, or a folder on a larger disk",
+        remedy=f"use a spacing of {fitting:.3g} or more, a narrower band, or a folder on a larger disk",
     )
 
 
@@ -133,7 +133,7 @@ def _refuse(coarse: GridField, grid: Grid, width: float, values: float, at_work:
     while _coarse_nodes(grid, fitting / spacing) > coarse.grid.n_nodes:  # of which so many did fit
         fitting *= CLOSE
     raise MemoryLimitError(
-        told, remedy=f"use a spacing of {fitting:.2g} or more, or keep it on disk: tiled_distance, volume --tiles"
+        told, remedy=f"use a spacing of {fitting:.3g} or more, or keep it on disk: tiled_distance, volume --tiles"
     )
 
 
