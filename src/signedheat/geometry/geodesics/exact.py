@@ -23,7 +23,7 @@ from .initial_windows import MADE, WANTED, Faces, Search
 from .propagation_kernels import ROUND, continue_search, start_search
 from .sources import GeodesicSources, PlacedSegments, zero_line
 
-WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 200, 1_000_000, 1000
+WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 100, 4_000_000, 1000
 """A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual. Small meshes
 of many sheets take more, which is little in all."""
 
