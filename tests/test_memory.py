@@ -101,7 +101,7 @@ def test_the_spacing_that_is_proposed_fits(shape):
 
 
 def test_libraries_that_others_have_imported_and_nobody_used():
-    """Of Numba, what its import leaves to be taken; the first process fills the cache."""
+    """Of Numba, what its import leaves to be taken; the first process fills the cache. The wrong figure is 21 MB off."""
     code = """
 import sys, numpy as np, signedheat as sh, memory
 from signedheat.memory import libraries
@@ -117,7 +117,7 @@ print((told - (memory.resident("VmHWM") - before)) / 1e6)
         command = [sys.executable, "-c", code, how]
         made = subprocess.run(command, capture_output=True, text=True, check=True, cwd=BENCHMARK.parent)
         excess.append(float(made.stdout))
-    assert all(abs(megabytes) < 10 for megabytes in excess[1:]), excess
+    assert all(abs(megabytes) < 15 for megabytes in excess[1:]), excess
 
 
 def test_how_much_surface_there_is_counts(monkeypatch):

@@ -1,6 +1,7 @@
 """Several files at once, and options of `morph` beside those of its sisters."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -88,3 +89,17 @@ def test_bad_usage_of_morph(tmp_path, ball, capsys, options):
     given = [option for option in options if option != "thicken"]
     assert main(["morph", operation, ball, "0.1", "-o", str(tmp_path / "a.stl"), *given]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_what_packages_tell_each_other_is_no_warning_of_a_command(tmp_path, monkeypatch, capsys):
+    """As matplotlib 3.8 about pyparsing, which has warnings of its own shown."""
+
+    def deprecated(_):
+        warnings.simplefilter("always")
+        warnings.warn("parseString is deprecated", DeprecationWarning, stacklevel=1)
+        warnings.warn("a surface\nwith holes", UserWarning, stacklevel=1)
+        return samples.sphere(1)
+
+    monkeypatch.setattr("signedheat.io.shapes.READERS", {".ply": deprecated})
+    assert main(["info", "ball.ply"]) == 0
+    assert capsys.readouterr().err == "signedheat: a surface with holes\n"

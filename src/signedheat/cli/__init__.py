@@ -68,13 +68,19 @@ def _run(argv: Sequence[str] | None) -> int:
     return FAILED if summary.get("failed") else 0  # of many, some
 
 
+def _say_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
+    """A warning on a line of its own; not those of packages about each other, which turn their warnings on themselves."""
+    if sys.warnoptions or not issubclass(category, DeprecationWarning | PendingDeprecationWarning):
+        say(f"signedheat: {' '.join(str(message).split())}")
+
+
 @contextmanager
 def _warnings_in_lines() -> Iterator[None]:
     """Say what a result is not, in a line, instead of where in the code that was found."""
     with warnings.catch_warnings():
         if not sys.warnoptions:
             warnings.simplefilter("default", UserWarning)
-        warnings.showwarning = lambda message, *_, **__: say(f"signedheat: {' '.join(str(message).split())}")
+        warnings.showwarning = _say_warning
         yield
 
 
