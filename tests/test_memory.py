@@ -101,7 +101,7 @@ def test_the_spacing_that_is_proposed_fits(shape):
 
 
 def test_libraries_that_others_have_imported_and_nobody_used():
-    """Of Numba, what its import leaves to be taken; the first process fills the cache. The wrong figure is 21 MB off."""
+    """Of Numba, what its import leaves to be taken, which is 21 MB less; the first process fills the cache."""
     code = """
 import sys, numpy as np, signedheat as sh, memory
 from signedheat.memory import libraries
