@@ -69,7 +69,7 @@ def _run(argv: Sequence[str] | None) -> int:
 
 
 def _say_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
-    """A warning on a line of its own; not those of packages about each other, some of which have theirs always shown."""
+    """A warning on a line of its own; not those of packages about each other, which some have always shown."""
     if sys.warnoptions or not issubclass(category, DeprecationWarning | PendingDeprecationWarning):
         say(f"signedheat: {' '.join(str(message).split())}")
 
