@@ -212,7 +212,9 @@ def _on_pool(folder: str, key: str, places: list[Place], pool: Executor) -> Iter
             yield job.result()
     except BrokenProcessPool as error:
         raise SignedHeatError(
-            "a process of the pool died", remedy="give it more memory and run again: what is done stays", path=folder
+            "a process of the pool died",
+            remedy="give it more memory, or start it under if __name__ == '__main__'; run again: what is done stays",
+            path=folder,
         ) from error
     finally:
         for job in jobs:
