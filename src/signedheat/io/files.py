@@ -31,10 +31,9 @@ from ..parallel import run_limited
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")
 PACKAGE = f"{__package__.partition('.')[0]}."
-TAKEN = {".off": 14, ".obj": 13, ".glb": 15, ".vtu": 8, ".vtp": 5, ".vtk": 4, ".msh": 4}
-TAKEN |= {".ply": 4, ".stl": 5, ".xyz": 4}
-"""Bytes that a shape takes while it is read for each byte of its file, measured with some hundred thousand faces; the
-least of the binary and the textual kinds of a format."""
+TAKEN = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
+"""Bytes that a shape takes while it is read for each byte of its file, measured with some hundred thousand faces; less
+where files may hold more than positions and faces. Of other formats more is known once they are read in part."""
 READERS = f"{__package__}.", f"{PACKAGE}parallel", f"{PACKAGE}packages"
 """Modules that read, and those by which they call parsers of other packages."""
 

@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..packages import lazy_module
-from .files import PathLike, contents, contents_beside, extension, parsed_by_others
+from .files import PathLike, contents, contents_beside, ensure_fits, extension, parsed_by_others
 
 trimesh = lazy_module("trimesh", ".glb and .gltf files")
+
+BYTES = 80
+"""Measured: what each position, index or the like takes while a scene is read."""
 
 
 def read_glb(path: PathLike) -> TriangleMesh:
@@ -65,6 +68,7 @@ def _without_looks(data: bytes, path: PathLike) -> tuple[bytes, dict[str, bytes]
             remedy="write or download it again",
             path=path,
         )
+    ensure_fits(BYTES * sum(accessor.get("count", 0) for accessor in tree.get("accessors", [])), path)
     for looks in ("materials", "textures", "images", "samplers"):
         tree.pop(looks, None)
     for mesh in tree.get("meshes", []):

@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
 from .elements import SurfaceShape, assemble, face_lists, points_of, refuse
-from .files import PathLike, numbers, text
+from .files import PathLike, ensure_fits, numbers, text
+
+BYTES = 400
+"""Measured: what each line takes while it is read."""
 
 
 def read_obj(path: PathLike) -> SurfaceShape:
@@ -56,7 +59,9 @@ def write_pc(shape: SurfaceShape, path: PathLike) -> bytes:
 
 def _lines_by_keyword(path: PathLike) -> dict[str, list[list[str]]]:
     lines: dict[str, list[list[str]]] = {"v": [], "vn": [], "f": [], "l": []}
-    for line in re.sub(r"\\[ \t]*\r?\n", " ", text(path)).splitlines():
+    content = text(path)
+    ensure_fits(BYTES * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
+    for line in re.sub(r"\\[ \t]*\r?\n", " ", content).splitlines():
         words = line.partition("#")[0].split()
         if words and words[0] in lines:
             lines[words[0]].append(words[1:])
