@@ -126,7 +126,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|---|---|")
     for name, build in cases():
         mesh, curves = build()
-        print(f"| {name} | Eq. 16 | {row(mesh, curves, slack=0, intrinsic=False)} |", flush=True)
+        print(f"| {name} | Eq. 16 | {row(mesh, curves, smoothing=None, intrinsic=False)} |", flush=True)
         print(f"| | default | {row(mesh, curves)} |", flush=True)
 
 

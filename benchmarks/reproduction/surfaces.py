@@ -137,7 +137,7 @@ def curves_that_bound_nothing(page: Page) -> None:
     picture = new_figure(15, 4.6)
     for k, (name, (mesh, curves)) in enumerate(cases.items()):
         continuous = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves, sh.Free())
-        field = sh.piecewise_distance(mesh, curves, smoothing=1.0)
+        field = sh.piecewise_distance(mesh, curves)
         slopes = [
             float(np.mean(np.abs(1 - np.linalg.norm(gradient, axis=1))))
             for gradient in (continuous.face_gradients, field.split().face_gradients)

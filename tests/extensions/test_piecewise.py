@@ -10,6 +10,7 @@ from refusals import refused
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
 from signedheat.extensions.jump_solvers import JumpProblem, minimize_exactly, minimize_fast
+from signedheat.extensions.piecewise_slopes import smoothed
 from signedheat.fields.piecewise_field import chains
 from signedheat.geometry.face_pairs import face_pairs
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
@@ -74,7 +75,8 @@ def test_loop_round_the_tube_is_cut_across_the_tube():
     assert 2 * np.pi * 0.6 < cut.height < 2 * np.pi * 1.4  # between the ways round the inner and the outer equator
     ring = np.arctan2(*mesh.vertices[cut.vertices, 1::-1].T)
     assert np.abs(ring).min() > 2 * np.pi / 64  # not at the source
-    assert np.allclose(np.linalg.norm(phi.face_gradients, axis=1), 1)
+    slope = np.linalg.norm(phi.face_gradients, axis=1)
+    assert np.sqrt(np.average((slope - 1) ** 2, weights=mesh.face_areas)) < 0.08
 
 
 def test_source_is_cut_only_where_nothing_else_is_possible():
@@ -88,7 +90,7 @@ def test_source_is_cut_only_where_nothing_else_is_possible():
 def test_gradient_is_one_and_source_is_zero():
     mesh = sphere(4)
     curve = arc(mesh)
-    phi = sh.piecewise_distance(mesh, curve)
+    phi = sh.piecewise_distance(mesh, curve, smoothing=None)
     spacing = mesh.edge_lengths.mean()
     assert np.allclose(np.linalg.norm(phi.face_gradients, axis=1), 1)
     assert np.abs(phi(curve)).max() < spacing
@@ -133,7 +135,7 @@ def test_orientation_of_faces_does_not_matter():
 def test_reversal_changes_the_sign():
     mesh = torus(n_around=40, n_across=20)
     curve = mesh.path(range(20), closed=True)
-    forth, back = (sh.piecewise_distance(mesh, c, exact=True) for c in (curve, curve.reversed()))
+    forth, back = (sh.piecewise_distance(mesh, c, exact=True, smoothing=None) for c in (curve, curve.reversed()))
     assert forth.diagnostics.note(Jumps).objective == pytest.approx(back.diagnostics.note(Jumps).objective, rel=1e-9)
     assert np.allclose(forth.face_gradients, -back.face_gradients)
 
@@ -205,7 +207,8 @@ def test_intrinsic_triangulation_equals_the_mesh():
     ]
     assert best[0] == pytest.approx(best[1], rel=1e-9)  # several fields may reach it
     plain, intrinsic = (
-        sh.piecewise_distance(domain, curve, diffusion=tau) for domain, tau in zip(domains, diffusion, strict=True)
+        sh.piecewise_distance(domain, curve, diffusion=tau, smoothing=10 * tau**0.5)
+        for domain, tau in zip(domains, diffusion, strict=True)
     )
     middle = sh.SurfacePoints(np.arange(mesh.n_faces), np.full((mesh.n_faces, 3), 1 / 3))
     assert np.abs(plain(middle) - intrinsic(middle)).max() < 1e-6
@@ -266,20 +269,37 @@ def test_unoriented_curve_across_faces(kind):
         curve = domain.polyline(np.stack([np.cos(t), np.sin(t), 0.03 + 0 * t], axis=1), oriented=False)
     phi = sh.piecewise_distance(domain, curve)
     assert isinstance(phi.domain, sh.IntrinsicTriangulation)
-    assert np.abs(phi(curve)).max() < 0.5 * mesh.edge_lengths.mean()
+    assert np.abs(phi(curve)).max() < mesh.edge_lengths.mean()  # at its ends, where slopes turn
     poles = domain.points_at([int(np.argmin(np.linalg.norm(mesh.vertices - [0, 0, s], axis=1))) for s in (1, -1)])
-    # Truth is π/2 ∓ 0.03. The plain field errs by 0.17 and less, for t = h² and an arc of one radian.
-    assert phi(poles) == pytest.approx([np.pi / 2 - 0.03, np.pi / 2 + 0.03], abs=0.12)
+    # Truth is π/2 ∓ 0.03. The plain field errs by 0.17, for t = h² and an arc of one radian.
+    assert phi(poles) == pytest.approx([np.pi / 2 - 0.03, np.pi / 2 + 0.03], abs=0.14)
 
 
 def test_smoothing_takes_small_jumps_away_and_leaves_the_cut():
     mesh, curve = CASES["round the tube"]()
-    rough, smooth = sh.piecewise_distance(mesh, curve), sh.piecewise_distance(mesh, curve, smoothing=1.0)
+    rough, smooth = (sh.piecewise_distance(mesh, curve, smoothing=width, slack=0) for width in (None, 1.0))
     small = np.abs(rough.jumps)[~rough.is_cut]
     assert small.max() > 1e-3
-    assert np.abs(smooth.jumps)[~rough.is_cut].max() < 1e-12
+    assert np.abs(smooth.jumps)[~smooth.is_cut].max() < 1e-12
     assert [c.length for c in smooth.cut] == pytest.approx([c.length for c in rough.cut])
     assert np.abs(smooth.values - rough.values).max() < 2 * mesh.edge_lengths.mean()
+
+
+def test_smoothed_between_the_means_at_vertices_and_step_three():
+    """Of no width, the means of φ₀ at the vertices; of great width, the function whose slopes are nearest to Y."""
+    mesh = sphere(3)
+    circle = mesh.level_set(mesh.vertices[:, 2], 0.3)
+    solver = sh.SignedHeatSolver(mesh, intrinsic=False, diffusion=1.0)
+    plain = solver.distance(circle, sh.Free()).values
+    rough, wide = (sh.piecewise_distance(mesh, circle, smoothing=w, intrinsic=False) for w in (None, 1e4))
+    difference = wide.split().values[wide.split().domain.faces] - plain[mesh.faces]
+    assert np.ptp(difference) < 1e-6
+    triangles, pairs = rough.triangles, rough.pairs
+    none = np.zeros(len(pairs.faces), dtype=bool)
+    narrow, _ = smoothed(triangles, pairs, np.zeros(mesh.n_faces, complex), rough.values, none, 1e-9)
+    weight = np.repeat(mesh.face_areas, 3)
+    mean = np.bincount(mesh.faces.ravel(), weight * rough.values.ravel()) / np.bincount(mesh.faces.ravel(), weight)
+    assert np.allclose(narrow, mean[mesh.faces])
 
 
 def test_save_and_contour_show_the_jump(tmp_path):
@@ -416,7 +436,7 @@ def test_triangles_on_which_slopes_mean_nothing_are_told():
     )
     section = mesh.level_set(mesh.vertices @ [0.3, 0, 1], 0.45 * height)
     with pytest.warns(sh.InexactWarning):
-        rough = sh.piecewise_distance(mesh, section, intrinsic=False)
+        rough = sh.piecewise_distance(mesh, section, intrinsic=False, smoothing=None)
     fine = sh.piecewise_distance(mesh, section)
     errors = [phi.diagnostics.note(Jumps).integration_error for phi in (rough, fine)]
     assert errors[0] > 1 and errors[1] < 0.1
@@ -472,23 +492,41 @@ def figure_eight_bottle(n: int = 60, m: int = 32) -> tuple[sh.TriangleMesh, sh.C
     return mesh, mesh.path(ids[0], closed=True)
 
 
-GATHERED = {
-    "halves": (lambda: bumpy_halves(5), 0.8),
-    "open arc": (CASES["open arc"], 0.85),
-    "Klein bottle": (figure_eight_bottle, 0.8),
+def arc_round_a_torus() -> tuple[sh.TriangleMesh, sh.Curve]:
+    mesh = shaken(torus(n_around=80, n_across=36), 0.01)
+    whole = max(mesh.level_set(mesh.vertices @ [1, 0.2, 0.1], 0.0), key=lambda curve: curve.n_points)
+    part = slice(int(0.4 * whole.n_points))
+    return mesh, sh.Curve(whole.faces[part], whole.barycentric[part])
+
+
+FORKED = {
+    "halves": lambda: bumpy_halves(5),
+    "open arc": CASES["open arc"],
+    "arc round a torus": arc_round_a_torus,
+    "loop of a Klein bottle": figure_eight_bottle,
+    "path on a Klein bottle": lambda: ((m := figure_eight_bottle(96, 48)[0]), m.path(np.arange(60) * 48 + 12)),
 }
 
 
-@pytest.mark.parametrize("case", GATHERED)
-def test_gathered_jumps_leave_less_error_of_slopes(case):
-    build, share = GATHERED[case]
-    mesh, curves = build()
-    spread, gathered = (
-        sh.piecewise_distance(mesh, curves, intrinsic=False, slack=s).diagnostics.note(Jumps) for s in (0, 0.1)
-    )
-    assert spread.objective == spread.least == gathered.least
-    assert gathered.least < gathered.objective <= 1.1 * gathered.least
-    assert gathered.integration_error < share * spread.integration_error
+@pytest.mark.parametrize("case", FORKED)
+def test_cuts_do_not_fork_and_slopes_are_nearer_than_with_forks(case):
+    mesh, curves = FORKED[case]()
+    raw, clean = (sh.piecewise_distance(mesh, curves, smoothing=w) for w in (None, 10.0))
+    notes = [phi.diagnostics.note(Jumps) for phi in (raw, clean)]
+    assert forks(clean) == 0 and len(clean.cut) <= 3
+    assert notes[1].integration_error < 0.85 * notes[0].integration_error
+    assert notes[1].least == notes[0].objective and notes[1].objective <= 1.1 * notes[1].least
+
+
+def test_some_of_the_cuts_forked():
+    """Or the test above shows nothing."""
+    raw = [sh.piecewise_distance(*FORKED[case](), smoothing=None) for case in FORKED]
+    assert sum(forks(phi) > 0 for phi in raw) >= 2
+
+
+def forks(phi: sh.PiecewiseField) -> int:
+    edges = np.unique(phi.pairs.edges[phi.is_cut])
+    return int((np.bincount(phi.triangles.edges.vertices[edges].ravel()) > 2).sum())
 
 
 def test_slack_is_never_exceeded():

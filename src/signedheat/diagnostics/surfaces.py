@@ -175,7 +175,7 @@ class Jumps(Note):
     Attributes
     ----------
     objective : float
-        The objective of Eq. 16.
+        The objective of Eq. 16, before what jumps off the cut was smoothed.
     least : float
         The least that was found, before jumps were concentrated: `objective` itself where they were not.
     bound, gap : float

@@ -8,7 +8,7 @@ rises less and less with the height of a jump leads it on one line. Each round m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 from .jump_solvers import JumpProblem, minimize_fast
 
 HEIGHT = 3.0
-"""s, in sides of a typical triangle: jumps below it cost as before. What is higher is a cut (`piecewise_field.FAR`)."""
+"""s, in sides of a typical triangle: jumps below it cost as before. What is higher is a cut (`cut_lines.FAR`)."""
 
 REWEIGHTINGS = 2
 """More of them move cuts without an end, towards the shortest instead of the lowest ones."""
-
-NEARLY_LEAST = 1.1
-"""Error, beside the least one, up to which fewer lines are worth more."""
 
 _TOLERANCE, _MAX_ROUNDS = 0.02, 200  # the same lines, to a vertex, as with .005 and 600 on nine shapes of eleven
 
@@ -46,23 +43,3 @@ def concentrated(problem: JumpProblem, constants: NDArray[np.float64], side: flo
         tangent = replace(problem, weights=problem.weights / (1.0 + jump / (HEIGHT * side)))
         constants = minimize_fast(tangent, _TOLERANCE, _MAX_ROUNDS).constants
         yield constants
-
-
-def fewest_lines(
-    tried: Sequence[NDArray[np.float64]], error: Callable[[NDArray[np.float64]], float]
-) -> NDArray[np.float64]:
-    """The last of some constants, each more concentrated than the one before, whose error is nearly the least.
-
-    It is never above that of the first.
-
-    Examples
-    --------
-    >>> plain, once, twice = np.array([3.0]), np.array([1.0]), np.array([1.05])
-    >>> fewest_lines([plain, once, twice], lambda constants: constants[0])
-    array([1.05])
-    >>> fewest_lines([once, twice], lambda constants: constants[0])
-    array([1.])
-    """
-    errors = [error(constants) for constants in tried]
-    limit = min(NEARLY_LEAST * min(errors), errors[0])
-    return tried[max(k for k, value in enumerate(errors) if value <= limit)]

@@ -1,4 +1,4 @@
-"""Slopes of piecewise distance, once its corners are averaged at the vertices: continuity, error and smoothing."""
+"""Slopes of piecewise distance: step 3 on the surface cut open, continuity, error and smoothing."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..fields.piecewise_field import FAR, PiecewiseField, typical_size
-from ..geometry.face_pairs import FacePairs
+from ..fields.piecewise_field import PiecewiseField
+from ..geometry.face_pairs import FacePairs, split_corners
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..linear import factorize
-from ..operators.cotan import cotan_matrix
+from ..operators.cotan import cotan_matrix, divergence
+from .cut_lines import FAR, Opened, high_jumps, typical_size, unforked
 
 
 def is_continuous(
@@ -45,26 +46,73 @@ def gradients(triangles: IntrinsicMesh, at_corners: NDArray[np.float64]) -> NDAr
     return result
 
 
-def smoothed(phi: PiecewiseField, width: float) -> NDArray[np.float64]:
-    """(m, 3) corner values after heat flow on the surface split along the cut: ``(M + ½ width² C) φ = M φ₀``."""
-    opened, first, mass = split_triangles(phi)
-    matrix = sparse.csr_matrix(0.5 * width**2 * cotan_matrix(opened) + sparse.diags_array(mass))
-    start = np.nan_to_num(first)
-    return np.where(np.isnan(phi.values), np.nan, factorize(matrix).solve(mass * start)[opened.corner_vertices])
+def smoothed(
+    triangles: IntrinsicMesh,
+    pairs: FacePairs,
+    directions: NDArray[np.complex128],
+    rough: NDArray[np.float64],
+    cut: NDArray[np.bool_],
+    width: float,
+) -> tuple[NDArray[np.float64], float]:
+    """(m, 3) values continuous off the cut, and the error of their slopes: ``(M + w² C) φ = M φ₀ + w² b``.
+
+    The heat flow of Fig. 12 on what φ₀ differs by from a function of slopes Y, so that it does not flatten those. It
+    minimises ``∫ (φ − φ₀)² + w² ∫ |∇φ − Y|²`` on the surface cut open: within the width w it is step 3 (Eq. 13), which
+    alone would spread over all of the surface what the cut does not take up.
+
+    Parameters
+    ----------
+    triangles, pairs : IntrinsicMesh, FacePairs
+        The surface.
+    directions : (m,) complex
+        Y.
+    rough : (m, 3) float
+        φ₀ at the corners of the triangles.
+    cut : (p,) bool
+        The pairs of faces that the cut separates.
+    width : float
+        w.
+    """
+    opened = cut_open(triangles, pairs, cut)
+    owner = opened.corner_vertices.ravel()
+    share = np.repeat(triangles.face_areas / 3.0, 3)
+    mass = np.asarray(np.bincount(owner, share), dtype=np.float64)
+    matrix = sparse.csr_matrix(width**2 * cotan_matrix(opened) + sparse.diags_array(mass))
+    pulled = np.bincount(owner, share * rough.ravel()) + width**2 * divergence(opened, directions)
+    at_corners = factorize(matrix).solve(pulled)[opened.corner_vertices]
+    return at_corners, slope_error(triangles, at_corners, directions)
+
+
+def on_lines(
+    triangles: IntrinsicMesh,
+    pairs: FacePairs,
+    directions: NDArray[np.complex128],
+    width: float,
+    rough: NDArray[np.float64],
+) -> Opened:
+    """Values `smoothed` between the lines on which rough ones jump, less forks."""
+
+    def integrate(cut: NDArray[np.bool_]) -> tuple[NDArray[np.float64], float]:
+        return smoothed(triangles, pairs, directions, rough, cut, width)
+
+    return unforked(triangles, pairs, high_jumps(triangles, pairs, rough), integrate)
+
+
+def slope_error(triangles: IntrinsicMesh, at_corners: NDArray[np.float64], directions: NDArray[np.complex128]) -> float:
+    """Root mean square of ∇φ − Y, where φ is known."""
+    known = ~np.isnan(at_corners[:, 0])
+    error = np.abs(gradients(triangles, at_corners) - directions)
+    return float(np.sqrt(np.average(error[known] ** 2, weights=triangles.face_areas[known])))
 
 
 def integration_error(phi: PiecewiseField, directions: NDArray[np.complex128]) -> float:
     """Root mean square of ∇φ̄ − Y, where φ̄ averages φ over the corners at each vertex of the split surface."""
-    opened, mean, _ = split_triangles(phi)
-    known = ~np.isnan(phi.values[:, 0])
-    error = np.abs(gradients(phi.triangles, mean[opened.corner_vertices]) - directions)
-    return float(np.sqrt(np.average(error[known] ** 2, weights=phi.triangles.face_areas[known])))
-
-
-def split_triangles(phi: PiecewiseField) -> tuple[IntrinsicMesh, NDArray[np.float64], NDArray[np.float64]]:
-    """The triangles with vertices doubled along the cut, and the mean value and lumped mass at each vertex."""
-    owner, vertices = phi.split_vertices
-    opened = replace(phi.triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=len(vertices))
+    owner = phi.split_vertices[0]
     mean = np.bincount(owner, phi.values.ravel()) / np.bincount(owner)
-    masses = np.asarray(np.bincount(owner, np.repeat(phi.triangles.face_areas / 3.0, 3)), dtype=np.float64)
-    return opened, mean, masses
+    return slope_error(phi.triangles, mean[owner].reshape(-1, 3), directions)
+
+
+def cut_open(triangles: IntrinsicMesh, pairs: FacePairs, cut: NDArray[np.bool_]) -> IntrinsicMesh:
+    """The triangles with vertices doubled along a cut."""
+    owner = split_corners(triangles, pairs, cut)
+    return replace(triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=int(owner.max(initial=-1)) + 1)

@@ -16,8 +16,7 @@ from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..frozen import Frozen
-from ..geometry.components import connected_components
-from ..geometry.face_pairs import FacePairs, face_pairs
+from ..geometry.face_pairs import FacePairs, face_pairs, split_corners
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import locate_points
 from .vertex_field import VertexField
@@ -26,13 +25,6 @@ if TYPE_CHECKING:
     from os import PathLike
 
     import pyvista
-
-
-FAR = 3.0
-"""Somewhere on a cut the jump is at least this many times the longest side of a typical triangle."""
-
-TWIG = 5.0
-"""A branch of a cut whose jump is nowhere this many times that side is none, unless the cut itself is as low."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +76,8 @@ class PiecewiseField(Displayed, Frozen):
         φ at the corners of the triangles, in the units of the vertices; NaN where no source is connected.
     triangles : IntrinsicMesh
         The triangles as an intrinsic mesh.
+    is_cut : (p,) bool
+        Those of the `pairs` of triangles that the cut separates.
     diagnostics : Diagnostics
         Timings, diffusion time, and the notes described in `signedheat.piecewise_distance`.
     """
@@ -92,6 +86,7 @@ class PiecewiseField(Displayed, Frozen):
     surface: TriangleMesh | IntrinsicTriangulation
     values: NDArray[np.float64]
     triangles: IntrinsicMesh = field(repr=False)
+    is_cut: NDArray[np.bool_] = field(repr=False)
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
 
     def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
@@ -136,31 +131,6 @@ class PiecewiseField(Displayed, Frozen):
         return face_pairs(self.triangles)
 
     @cached_property
-    def is_cut(self) -> NDArray[np.bool_]:
-        """(p,) pairs separated by a cut.
-
-        These are the pairs across which φ jumps by more than it changes within a triangle, on connected lines with a
-        jump of `FAR` times that somewhere. Errors in bad triangles are about their size, and no cuts. Nor are low
-        branches of a line (`without_twigs`): there the directions turn within several triangles, and so do the jumps.
-        """
-        longest, typical = self.triangles.edge_lengths.max(axis=1), typical_size(self.triangles)
-        height = np.abs(self.jumps).max(axis=1)
-        high = np.flatnonzero(height > np.maximum(longest[self.pairs.faces].max(axis=1), typical))
-        ends = self.triangles.edges.vertices[self.pairs.edges[high]]
-        n = self.triangles.n_vertices
-        line = connected_components(n, *ends.T)[ends[:, 0]]
-        far = np.zeros(n, dtype=bool)
-        far[line[height[high] > FAR * typical]] = True
-        high, line = high[far[line]], line[far[line]]
-        highest = np.zeros(n)
-        np.maximum.at(highest, line, height[high])
-        least = np.minimum(TWIG * typical, 0.5 * highest[line])
-        ends = self.triangles.edges.vertices[self.pairs.edges[high]]
-        result = np.zeros(len(height), dtype=bool)
-        result[high[without_twigs(ends, height[high] > least)]] = True
-        return result
-
-    @cached_property
     def cut(self) -> list[Cut]:
         """The lines across which φ is discontinuous, longest first; empty if it is continuous."""
         pairs = np.flatnonzero(self.is_cut)
@@ -193,9 +163,7 @@ class PiecewiseField(Displayed, Frozen):
     @cached_property
     def split_vertices(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(3m,) vertex of the split mesh at each corner, and the original vertex of each vertex of the split mesh."""
-        whole = ~self.is_cut
-        ends = np.concatenate([self.pairs.tails[whole], self.pairs.heads[whole]])
-        owner = connected_components(self.values.size, *ends.T)
+        owner = split_corners(self.triangles, self.pairs, self.is_cut)
         _, first = np.unique(owner, return_index=True)
         return owner, self.surface.faces.ravel()[first]
 
@@ -215,41 +183,6 @@ class PiecewiseField(Displayed, Frozen):
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"PiecewiseField({self.domain!r}, values from {low:.4g} to {high:.4g}, {len(self.cut)} cuts)"
-
-
-def typical_size(triangles: IntrinsicMesh) -> float:
-    """The longest side of a typical triangle."""
-    return float(np.average(triangles.edge_lengths.max(axis=1), weights=triangles.face_areas))
-
-
-def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of some edges are left when lines between ends and forks are taken away that are high nowhere.
-
-    What is left is joined to longer lines, among which there may be such lines again.
-
-    Parameters
-    ----------
-    edges : (k, 2) int
-        Vertex ids; the same edge may come more than once.
-    high : (k,) bool
-        Edges that keep a line.
-
-    Examples
-    --------
-    >>> twig, line = [3, 9], [[1, 2], [2, 3], [3, 4]]
-    >>> without_twigs(np.array([twig, *line]), np.array([False, True, False, True])).tolist()
-    [False, True, True, True]
-    """
-    once, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    keeps = np.zeros(len(once), dtype=bool)
-    keeps[which.ravel()[high]] = True
-    left = np.arange(len(once))
-    while True:
-        low = [chain for chain, _ in chains(once[left]) if not keeps[left[chain]].any()]
-        if not low:
-            result: NDArray[np.bool_] = np.isin(which.ravel(), left)
-            return result
-        left = np.delete(left, np.concatenate(low))
 
 
 def chains(edges: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .components import connected_components
 from .intrinsic_mesh import IntrinsicMesh
 
 
@@ -80,3 +81,18 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
         heads=np.where(forward, end, begin),
         shares=np.where(count[edges] > 2, 0.5, 1.0),
     )
+
+
+def split_corners(triangles: IntrinsicMesh, pairs: FacePairs, cut: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(3m,) vertex of each corner, once the surface is cut open between some of the pairs (p,): ids from zero.
+
+    Examples
+    --------
+    >>> two = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [2, 1, 3]]), np.ones((2, 3)), 4)
+    >>> split_corners(two, face_pairs(two), np.array([False])).tolist()
+    [0, 1, 2, 2, 1, 3]
+    >>> split_corners(two, face_pairs(two), np.array([True])).tolist()
+    [0, 1, 2, 3, 4, 5]
+    """
+    ends = np.concatenate([pairs.tails[~cut], pairs.heads[~cut]])
+    return connected_components(triangles.corner_vertices.size, *ends.T)

@@ -1,0 +1,190 @@
+"""The lines along which a function jumps: found among jumps everywhere, then as few of them as slopes need, unforked.
+
+The least cost of Eq. 16 leads the jumps that some directions ask for along branching lines, and some along lines of
+their own. Without a branch the function that continues across it still follows most directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..fields.piecewise_field import chains
+from ..geometry.components import connected_components
+from ..geometry.face_pairs import FacePairs
+from ..geometry.intrinsic_mesh import IntrinsicMesh
+
+FAR = 3.0
+"""Somewhere on a cut the jump is at least this many times the longest side of a typical triangle."""
+
+TWIG = 5.0
+"""A branch of a cut whose jump is nowhere this many times that side is none, unless the cut itself is as low."""
+
+HARDLY_WORSE = 1.1
+"""Error of slopes, beside that with all lines, up to which fewer lines are worth more."""
+
+
+class Opened(NamedTuple):
+    """A function that jumps on some lines only.
+
+    Attributes
+    ----------
+    cut : (p,) bool
+        The pairs of faces that the lines separate.
+    n_lines : int
+        How many lines these are.
+    values : (m, 3) float
+        The function at the corners of the triangles.
+    error : float
+        That of its slopes.
+    """
+
+    cut: NDArray[np.bool_]
+    n_lines: int
+    values: NDArray[np.float64]
+    error: float
+
+
+def typical_size(triangles: IntrinsicMesh) -> float:
+    """The longest side of a typical triangle."""
+    return float(np.average(triangles.edge_lengths.max(axis=1), weights=triangles.face_areas))
+
+
+def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(p,) pairs of faces between which (m, 3) values at their corners jump, on lines.
+
+    These are the pairs across which the values jump by more than they change within a triangle, on connected lines with
+    a jump of `FAR` times that somewhere. Errors in bad triangles are about their size, and no cuts. Nor are low
+    branches of a line (`without_twigs`): there the directions turn within several triangles, and so do the jumps.
+    """
+    longest, typical = triangles.edge_lengths.max(axis=1), typical_size(triangles)
+    height = np.abs(pairs.ends(values)).max(axis=1)
+    high = np.flatnonzero(height > np.maximum(longest[pairs.faces].max(axis=1), typical))
+    ends = triangles.edges.vertices[pairs.edges[high]]
+    n = triangles.n_vertices
+    line = connected_components(n, *ends.T)[ends[:, 0]]
+    far = np.zeros(n, dtype=bool)
+    far[line[height[high] > FAR * typical]] = True
+    high, line = high[far[line]], line[far[line]]
+    highest = np.zeros(n)
+    np.maximum.at(highest, line, height[high])
+    least = np.minimum(TWIG * typical, 0.5 * highest[line])
+    ends = triangles.edges.vertices[pairs.edges[high]]
+    result = np.zeros(len(height), dtype=bool)
+    result[high[without_twigs(ends, height[high] > least)]] = True
+    return result
+
+
+def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of some edges are left when lines between ends and forks are taken away that are high nowhere.
+
+    What is left is joined to longer lines, among which there may be such lines again.
+
+    Parameters
+    ----------
+    edges : (k, 2) int
+        Vertex ids; the same edge may come more than once.
+    high : (k,) bool
+        Edges that keep a line.
+
+    Examples
+    --------
+    >>> twig, line = [3, 9], [[1, 2], [2, 3], [3, 4]]
+    >>> without_twigs(np.array([twig, *line]), np.array([False, True, False, True])).tolist()
+    [False, True, True, True]
+    """
+    once, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    keeps = np.zeros(len(once), dtype=bool)
+    keeps[which.ravel()[high]] = True
+    left = np.arange(len(once))
+    while True:
+        low = [chain for chain, _ in chains(once[left]) if not keeps[left[chain]].any()]
+        if not low:
+            result: NDArray[np.bool_] = np.isin(which.ravel(), left)
+            return result
+        left = np.delete(left, np.concatenate(low))
+
+
+def unforked(
+    triangles: IntrinsicMesh,
+    pairs: FacePairs,
+    cut: NDArray[np.bool_],
+    integrate: Callable[[NDArray[np.bool_]], tuple[NDArray[np.float64], float]],
+) -> Opened:
+    """What is left of a cut when its lines are taken away, lowest first, and the function that jumps there.
+
+    While there are forks, one of the lines at them goes; then others as long as slopes get `HARDLY_WORSE`.
+
+    Parameters
+    ----------
+    triangles, pairs : IntrinsicMesh, FacePairs
+        The surface.
+    cut : (p,) bool
+        Pairs that it separates.
+    integrate : callable
+        From a cut to the values of the function that jumps there only, and the error of its slopes.
+    """
+    values, error = integrate(cut)
+    limit = HARDLY_WORSE * error
+    while True:
+        edges = np.unique(pairs.edges[cut])
+        ends = triangles.edges.vertices[edges]
+        lines = [chain for chain, _ in chains(ends)]
+        if not lines:
+            break
+        forked = at_forks(ends, lines)
+        lowest = _lowest(pairs, cut, [edges[line] for line in forked or lines], values)
+        fewer = cut & ~np.isin(pairs.edges, lowest)
+        without, its_error = integrate(fewer)
+        if not forked and its_error > limit:
+            break
+        cut, values, error = fewer, without, its_error
+    return Opened(cut, len(lines), values, error)
+
+
+def fewest_lines(found: Sequence[Opened]) -> int:
+    """Which of some functions jumps on the fewest lines, of those whose slopes are `HARDLY_WORSE` than the best.
+
+    Examples
+    --------
+    >>> many, few, wrong = (Opened(np.zeros(0), n, np.zeros(0), error) for n, error in ((9, 1.0), (2, 1.05), (1, 3.0)))
+    >>> fewest_lines([many, few, wrong])
+    1
+    """
+    limit = HARDLY_WORSE * min(each.error for each in found)
+    good = [k for k, each in enumerate(found) if each.error <= limit]
+    return min(good, key=lambda k: (found[k].n_lines, found[k].error))
+
+
+def at_forks(edges: NDArray[np.int64], lines: Sequence[NDArray[np.int64]]) -> list[NDArray[np.int64]]:
+    """Those of some lines that meet others, or themselves, at vertices from which more than two edges start.
+
+    Parameters
+    ----------
+    edges : (k, 2) int
+        Vertex ids.
+    lines : sequence of (j,) int
+        The edges of each line.
+
+    Examples
+    --------
+    >>> loop, tail = np.array([0, 1, 2]), np.array([3])
+    >>> len(at_forks(np.array([[5, 6], [6, 7], [7, 5], [5, 9]]), [loop, tail]))
+    2
+    >>> len(at_forks(np.array([[5, 6], [6, 7], [7, 5], [8, 9]]), [loop, tail]))
+    0
+    """
+    is_fork = np.bincount(edges.ravel()) > 2
+    return [line for line in lines if is_fork[edges[line]].any()]
+
+
+def _lowest(
+    pairs: FacePairs, cut: NDArray[np.bool_], lines: list[NDArray[np.int64]], values: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """The line along which the mean jump is least."""
+    height = np.abs(pairs.ends(values)).mean(axis=1)[cut]
+    edges = pairs.edges[cut]
+    return min(lines, key=lambda line: float(height[np.isin(edges, line)].mean()))
