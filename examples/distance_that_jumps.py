@@ -38,7 +38,7 @@ def main(folder: Path) -> float:
         lengths.append(cut.length)
         print(f"{title}: {phi.diagnostics.note(Jumps).gap:.1%} from the least objective at most; {cut}")
         direction = np.array([0.2, -0.8, 0.7]) if mesh is ring else np.array([0.9, 0.3, 0.5])
-        draw_surface(phi.split(), panel, sources, view=direction)
+        draw_surface(phi, panel, sources, view=direction)
         panel.set_title(f"{title}: cut {cut.length:.2f} long", fontsize=10)
     figure.savefig(folder / "distance_that_jumps.png")
     plt.close(figure)

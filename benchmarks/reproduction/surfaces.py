@@ -149,7 +149,7 @@ def curves_that_bound_nothing(page: Page) -> None:
         )
         axes = picture.add_subplot(1, 3, k + 1)
         view = np.array([0.2, -0.8, 0.7]) if mesh is ring else np.array([0.9, 0.3, 0.5])
-        draw_surface(field.split(), axes, curves, view=view)
+        draw_surface(field, axes, curves, view=view)
         axes.set_title(name)
     page.draw(picture)
 

@@ -25,8 +25,8 @@ def is_continuous(
 ) -> bool:
     """Whether the constants of the faces leave no cut, neither as a line nor spread over many small jumps.
 
-    Spread out, it makes ∇φ̄, of the means φ̄ of φ at the vertices, differ from Y by more than a half in all faces around
-    the corners of some face. Where Y turns back, at equal distance from two parts of the source, few faces in a row do.
+    Spread out, it makes ∇φ̄, of the means φ̄ of φ at the vertices, differ from Y by more than a half in two rows of faces
+    around some face. Where Y turns back, at equal distance from two parts of the source, few faces beside each other do.
     """
     values = slopes + constants[:, None]
     if np.abs(pairs.ends(values)).max(initial=0.0) > FAR * typical_size(triangles):
@@ -34,9 +34,11 @@ def is_continuous(
     corners, n = triangles.corner_vertices, triangles.n_vertices
     mean = np.bincount(corners.ravel(), values.ravel(), n) / np.maximum(np.bincount(corners.ravel(), minlength=n), 1)
     rough = np.abs(gradients(triangles, mean[corners]) - directions) > 0.5
-    around = np.ones(n, dtype=bool)
-    around[corners[~rough]] = False
-    return not around[corners].all(axis=1).any()
+    for _ in range(2):
+        inner = np.ones(n, dtype=bool)
+        inner[corners[~rough]] = False
+        rough = inner[corners].all(axis=1)
+    return not rough.any()
 
 
 def gradients(triangles: IntrinsicMesh, at_corners: NDArray[np.float64]) -> NDArray[np.complex128]:

@@ -137,7 +137,8 @@ def _(field: VertexField, axes: Any, **options: Any) -> bool:
 
 @draw.register
 def _(field: PiecewiseField, axes: Any, **options: Any) -> bool:
-    return draw(field.split(), axes, **options)
+    draw_surface(field, axes, **options)
+    return True
 
 
 def _best_axis(field: GridField) -> int:

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..domains.triangle_mesh import TriangleMesh
+from ..fields.piecewise_field import PiecewiseField
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike
 from .colors import add_color_bar, distance_colors, isolines_between
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def save_surface(
-    field: VertexField, path: PathLike, sources: Sequence[Any] = (), n_contours: int = 20, up: int = 2
+    field: VertexField | PiecewiseField, path: PathLike, sources: Sequence[Any] = (), n_contours: int = 20, up: int = 2
 ) -> None:
     """Write a picture of a surface coloured by φ, with isolines, from a direction from which the sources are visible.
 
@@ -28,7 +31,7 @@ def save_surface(
 
     Parameters
     ----------
-    field : VertexField
+    field : VertexField or PiecewiseField
         Distance on a surface.
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
@@ -61,7 +64,7 @@ def add_legend(axes: Axes, with_sources: bool) -> None:
 
 
 def draw_surface(
-    field: VertexField,
+    field: VertexField | PiecewiseField,
     axes: Axes,
     sources: Sequence[Any] = (),
     n_contours: int = 20,
@@ -69,8 +72,8 @@ def draw_surface(
     up: int = 2,
 ) -> None:
     """Draw into axes, with a colour bar. `view` is a direction from the surface to the eye."""
-    own, field = field.restrict().domain.triangulation, field.subdivided()
-    mesh, values = field.domain.triangulation, field.domain.on_triangulation(field.values)
+    own, painted = _own_and_painted(field)
+    mesh, values = painted.domain.triangulation, painted.domain.on_triangulation(painted.values)
     flat = [item for source in sources for item in (source if isinstance(source, Sequence) else [source])]
     direction = toward_sources(own, flat, up) if view is None else view
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
@@ -92,6 +95,15 @@ def draw_surface(
     axes.set_axis_off()
     spanned = np.array([low, *isolines, high]) if high > low else isolines  # both signs, however little of one there is
     add_color_bar(axes.figure, [axes], colors, spanned, step)
+
+
+def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, VertexField]:
+    """The triangles to which sources refer, and the field on those on which it is linear."""
+    if isinstance(field, PiecewiseField):
+        domain = field.domain
+        own = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
+        return own, field.split()
+    return field.restrict().domain.triangulation, field.subdivided()
 
 
 def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[np.bool_], step: float) -> None:
