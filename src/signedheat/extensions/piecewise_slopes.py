@@ -26,7 +26,7 @@ def is_continuous(
     """Whether the constants of the faces leave no cut, neither as a line nor spread over many small jumps.
 
     Spread out, it makes ∇φ̄, of the means φ̄ of φ at the vertices, differ from Y by more than a half in two rows of faces
-    around some face. Where Y turns back, at equal distance from two parts of the source, few faces beside each other do.
+    around some face. Where Y turns back, at equal distance from two parts of the source, few faces side by side do.
     """
     values = slopes + constants[:, None]
     if np.abs(pairs.ends(values)).max(initial=0.0) > FAR * typical_size(triangles):
@@ -37,8 +37,8 @@ def is_continuous(
     for _ in range(2):
         inner = np.ones(n, dtype=bool)
         inner[corners[~rough]] = False
-        rough = inner[corners].all(axis=1)
-    return not rough.any()
+        rough = np.asarray(inner[corners].all(axis=1))
+    return not bool(rough.any())
 
 
 def gradients(triangles: IntrinsicMesh, at_corners: NDArray[np.float64]) -> NDArray[np.complex128]:

@@ -72,8 +72,7 @@ def draw_surface(
     up: int = 2,
 ) -> None:
     """Draw into axes, with a colour bar. `view` is a direction from the surface to the eye."""
-    own, painted = _own_and_painted(field)
-    mesh, values = painted.domain.triangulation, painted.domain.on_triangulation(painted.values)
+    own, mesh, values = _own_and_painted(field)
     flat = [item for source in sources for item in (source if isinstance(source, Sequence) else [source])]
     direction = toward_sources(own, flat, up) if view is None else view
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
@@ -97,13 +96,13 @@ def draw_surface(
     add_color_bar(axes.figure, [axes], colors, spanned, step)
 
 
-def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, VertexField]:
-    """The triangles to which sources refer, and the field on those on which it is linear."""
-    if isinstance(field, PiecewiseField):
-        domain = field.domain
-        own = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
-        return own, field.split()
-    return field.restrict().domain.triangulation, field.subdivided()
+def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, Any, NDArray[np.float64]]:
+    """The triangles to which sources refer, and those on which φ is linear with the values at their vertices."""
+    domain = field.domain
+    own = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
+    painted = field.split() if isinstance(field, PiecewiseField) else field.subdivided()
+    surface: Any = painted.domain
+    return own, surface.triangulation, surface.on_triangulation(painted.values)
 
 
 def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[np.bool_], step: float) -> None:
