@@ -77,3 +77,25 @@ def test_a_picture_of_something_else_is_told_apart():
     n = min(len(k) for k in known)
     m = min(k.shape[1] for k in known)
     assert np.abs(known[0][:n, :m] - known[1][:n, :m]).mean() > 0.03
+
+
+def test_sources_are_drawn_where_they_are_whatever_triangles_the_field_has():
+    """A piecewise field on a refinement is painted on other faces than those that its curves refer to."""
+    mesh = samples.torus(n_around=32, n_across=16)
+    loop = mesh.path(range(16), closed=True)
+    fields = [
+        sh.SignedHeatSolver(mesh).distance(loop),
+        sh.piecewise_distance(mesh, loop),
+        sh.piecewise_distance(mesh, loop, intrinsic=True),
+    ]
+    assert isinstance(fields[2].domain, sh.IntrinsicTriangulation)
+    drawn = []
+    for field in fields:
+        axes = visualization.figures.new_figure(4, 4).add_subplot()
+        visualization.draw_surface(field, axes, [loop], view=np.array([0.5, -0.3, 0.7]))
+        drawn.append(axes.lines[-1].get_xydata())
+    assert np.isfinite(drawn[0]).all(axis=1).sum() > 5
+    for line in drawn[1:]:
+        both = np.isfinite(line).all(axis=1) & np.isfinite(drawn[0]).all(axis=1)
+        assert both.sum() > 5
+        assert np.abs(line - drawn[0])[both].max() < 1
