@@ -102,7 +102,9 @@ def add_color_bar(
         apart = round_step((isolines[-1] - isolines[0]) / TICKS)
         ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
         reach = float(colors.norm.vmax or 0.0)
-        low, high = max(min(isolines[0] - step, 0.0), -reach), min(max(isolines[-1] + step, 0.0), reach)
+        first, last = isolines[0], isolines[-1]
+        low = 0.0 if abs(first) < 1e-9 * reach else max(min(first - step, 0.0), -reach)  # no colour that is nowhere
+        high = 0.0 if abs(last) < 1e-9 * reach else min(max(last + step, 0.0), reach)
         bar.ax.set_ylim(low, high)
         bar.set_ticks(legible(ticks, low, high))
         bar.ax.yaxis.set_major_formatter("{x:g}")
