@@ -389,17 +389,31 @@ def test_bad_domain_and_source():
         sh.piecewise_distance(sh.intrinsic_delaunay(mesh), across)
 
 
-def test_progress_can_cancel():
+@pytest.mark.parametrize(("step", "above"), [("integrate", 0.4), ("cut", 0.6), ("cut", 0.7)])
+def test_progress_can_cancel(step, above):
     class Stop(Exception):
         pass
 
-    def progress(fraction, step):
-        if 0.5 < fraction < 0.75:  # amid the rounds
+    def progress(fraction, now):
+        if now == step and above < fraction < 0.8:  # amid the rounds
             raise Stop
 
     mesh, curve = CASES["open arc"]()
     with pytest.raises(Stop):
         sh.piecewise_distance(mesh, curve, progress=progress)
+
+
+def test_progress_grows():
+    told = []
+    mesh, curves = bumpy_halves(3)
+    sh.piecewise_distance(mesh, curves, progress=lambda fraction, step: told.append((fraction, step)))
+    steps = ["prepare", "diffuse", "integrate", "cut", "finish"]
+    assert {step for _, step in told} == {*steps, "done"}
+    assert 0 <= min(told)[0] and max(told)[0] == 1 and told[-1] == (1.0, "done")
+    first = [
+        min(f for f, step in told if step == each) for each in ("prepare", "diffuse", "integrate", "cut", "finish")
+    ]
+    assert np.allclose(first, [0, 0.2, 0.4, 0.6, 0.8])
 
 
 @pytest.mark.parametrize("build", [lambda: sphere(4), lambda: torus(n_around=96, n_across=48)])

@@ -8,7 +8,7 @@ rises less and less with the height of a jump leads it on one line. Each round m
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +25,12 @@ REWEIGHTINGS = 2
 _TOLERANCE, _MAX_ROUNDS = 0.02, 200  # the same lines, to a vertex, as with .005 and 600 on nine shapes of eleven
 
 
-def concentrated(problem: JumpProblem, constants: NDArray[np.float64], side: float) -> Iterator[NDArray[np.float64]]:
+def concentrated(
+    problem: JumpProblem,
+    constants: NDArray[np.float64],
+    side: float,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[NDArray[np.float64]]:
     """Constants of the faces whose jumps lie on fewer and fewer lines.
 
     Parameters
@@ -36,10 +41,12 @@ def concentrated(problem: JumpProblem, constants: NDArray[np.float64], side: flo
         Constants that minimise its objective.
     side : float
         The longest side of a typical triangle.
+    progress : callable, optional
+        Called with a fraction from 0 to 1 in each round.
     """
     for _ in range(REWEIGHTINGS):
         difference = problem.differences(constants)
         jump = np.abs(difference - np.clip(difference, problem.low, problem.high))
         tangent = replace(problem, weights=problem.weights / (1.0 + jump / (HEIGHT * side)))
-        constants = minimize_fast(tangent, _TOLERANCE, _MAX_ROUNDS).constants
+        constants = minimize_fast(tangent, _TOLERANCE, _MAX_ROUNDS, progress).constants
         yield constants

@@ -8,7 +8,7 @@ jumps on a cut that is short and runs where Y is not integrable.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -146,7 +146,7 @@ def piecewise_distance(
     if smoothing is not None:
         smoothing = positive_number(smoothing, "smoothing")
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(sources)
-    stopwatch = Stopwatch(progress, steps=4)
+    stopwatch = Stopwatch(progress, steps=5)
     slack = finite_number(slack, "slack", least=0)
     with stopwatch("prepare"):
         diffusion = positive_number(diffusion, "diffusion")
@@ -161,21 +161,24 @@ def piecewise_distance(
         pairs = face_pairs(triangles)
         slopes = corner_slopes(triangles, directions)
         problem = jump_problem(triangles, pairs, slopes, guarded_edges(triangles, parts))
-        inner = None if progress is None else lambda share: progress(0.5 + 0.25 * share, "integrate")
-
         continuous = partial(is_continuous, triangles, pairs, slopes, directions)
         if exact:
             solution = minimize_exactly(problem)
         else:
-            solution = minimize_fast(problem, progress=inner, enough=continuous)
+            solution = minimize_fast(problem, progress=part_of(progress, 0.4, 0.6, "integrate"), enough=continuous)
         jumping = solution.constants
         values = slopes + jumping[:, None]
+    with stopwatch("cut"):
         cut = high_jumps(triangles, pairs, values)
         if smoothing is not None:
-            tried = [] if exact or continuous(jumping) else concentrated(problem, jumping, typical_size(triangles))
+            inner = part_of(progress, 0.6, 0.7, "cut")
+            tried = (
+                [] if exact or continuous(jumping) else concentrated(problem, jumping, typical_size(triangles), inner)
+            )
             affordable = [c for c in tried if problem.objective(c) <= (1.0 + slack) * solution.objective]
             candidates = [jumping, *affordable]
-            between_lines = partial(on_lines, triangles, pairs, directions, smoothing * 2 * discretization.spacing)
+            width, inner = smoothing * 2 * discretization.spacing, part_of(progress, 0.7, 0.8, "cut")
+            between_lines = partial(on_lines, triangles, pairs, directions, width, progress=inner)
             found = [between_lines(slopes + constants[:, None]) for constants in candidates]
             best = fewest_lines(found)
             jumping, cut, values = candidates[best], found[best].cut, found[best].values
@@ -193,6 +196,11 @@ def piecewise_distance(
         )
     notes = (jumps_of(phi, solution, problem.objective(jumping), error), *discretization.notes)
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
+
+
+def part_of(progress: Progress | None, start: float, stop: float, step: str) -> Callable[[float], None] | None:
+    """What is told the fraction done of a part of one step."""
+    return None if progress is None else lambda share: progress(start + (stop - start) * share, step)
 
 
 def jumps_of(phi: PiecewiseField, solution: JumpSolution, objective: float, error: float) -> Jumps:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -91,13 +92,20 @@ def on_lines(
     directions: NDArray[np.complex128],
     width: float,
     rough: NDArray[np.float64],
+    progress: Callable[[float], None] | None = None,
 ) -> Opened:
-    """Values `smoothed` between the lines on which rough ones jump, less forks."""
+    """Values `smoothed` between the lines on which rough ones jump, less forks.
+
+    `progress` is called with the fraction of the cut that is gone, each time that the surface has been cut open.
+    """
+    lines = high_jumps(triangles, pairs, rough)
 
     def integrate(cut: NDArray[np.bool_]) -> tuple[NDArray[np.float64], float]:
+        if progress is not None:
+            progress(1.0 - cut.sum() / max(lines.sum(), 1))
         return smoothed(triangles, pairs, directions, rough, cut, width)
 
-    return unforked(triangles, pairs, high_jumps(triangles, pairs, rough), integrate)
+    return unforked(triangles, pairs, lines, integrate)
 
 
 def slope_error(triangles: IntrinsicMesh, at_corners: NDArray[np.float64], directions: NDArray[np.complex128]) -> float:
