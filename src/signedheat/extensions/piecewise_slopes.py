@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,6 +16,9 @@ from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..linear import factorize
 from ..operators.cotan import cotan_matrix, divergence
 from .cut_lines import FAR, Opened, high_jumps, typical_size, unforked
+
+WIDEST = 10.0
+"""Greatest width of smoothing, over the root of the area: step 3 all but alone. M would be lost to rounding beside w² C."""
 
 
 def is_continuous(
@@ -74,12 +78,13 @@ def smoothed(
     cut : (p,) bool
         The pairs of faces that the cut separates.
     width : float
-        w.
+        w; more than `WIDEST` is that.
     """
     opened = cut_open(triangles, pairs, cut)
     owner = opened.corner_vertices.ravel()
     share = np.repeat(triangles.face_areas / 3.0, 3)
     mass = np.asarray(np.bincount(owner, share), dtype=np.float64)
+    width = min(width, WIDEST * math.sqrt(triangles.face_areas.sum()))
     matrix = sparse.csr_matrix(width**2 * cotan_matrix(opened) + sparse.diags_array(mass))
     pulled = np.bincount(owner, share * rough.ravel()) + width**2 * divergence(opened, directions)
     at_corners = factorize(matrix).solve(pulled)[opened.corner_vertices]
