@@ -18,7 +18,7 @@ from ..operators.cotan import cotan_matrix, divergence
 from .cut_lines import FAR, Opened, high_jumps, typical_size, unforked
 
 WIDEST = 10.0
-"""Greatest width of smoothing, over the root of the area: step 3 all but alone. M would be lost to rounding beside w² C."""
+"""Greatest width of smoothing, over the root of the area: that is step 3 all but alone. Beside w² C rounding took M."""
 
 
 def is_continuous(
