@@ -76,7 +76,7 @@ def piecewise_distance(
     triangle is the diffused, normalised source normal Y; κ_e is the difference between the components of Y along e in
     the two faces at e (Eq. 15, Eq. 16). Edges at the source have 100 times the weight, so that the cut avoids the
     source wherever possible. Then jumps that are spread over an area are gathered on few lines, which raises the
-    objective by some per cent, lines that slopes hardly need are taken away, one at every fork too, and what jumps
+    objective by some per cent, lines that slopes hardly need are taken away, at forks all but two, and what jumps
     elsewhere is smoothed (Fig. 12): φ is discontinuous on clean lines only, and its slopes are near Y. For curves that
     bound a region the field has no cut, and differs from that of `SignedHeatSolver.distance` by at most
     ``integration_error / √λ`` in the root mean square, λ the least positive eigenvalue of the Laplacian. Surfaces may
@@ -171,15 +171,15 @@ def piecewise_distance(
     with stopwatch("cut"):
         cut = high_jumps(triangles, pairs, values)
         if smoothing is not None:
-            inner = part_of(progress, 0.6, 0.7, "cut")
-            tried = (
-                [] if exact or continuous(jumping) else concentrated(problem, jumping, typical_size(triangles), inner)
-            )
-            affordable = [c for c in tried if problem.objective(c) <= (1.0 + slack) * solution.objective]
-            candidates = [jumping, *affordable]
+            candidates = [jumping]
+            if not exact and not continuous(jumping):
+                inner = part_of(progress, 0.6, 0.7, "cut")
+                gathered = concentrated(problem, jumping, typical_size(triangles), inner)
+                limit = (1.0 + slack) * solution.objective
+                candidates += [constants for constants in gathered if problem.objective(constants) <= limit]
             width, inner = smoothing * 2 * discretization.spacing, part_of(progress, 0.7, 0.8, "cut")
-            between_lines = partial(on_lines, triangles, pairs, directions, width, progress=inner)
-            found = [between_lines(slopes + constants[:, None]) for constants in candidates]
+            clean = partial(on_lines, triangles, pairs, directions, width, progress=inner)
+            found = [clean(slopes + constants[:, None]) for constants in candidates]
             best = fewest_lines(found)
             jumping, cut, values = candidates[best], found[best].cut, found[best].values
     with stopwatch("finish"):
