@@ -9,6 +9,7 @@ import signedheat as sh
 from refusals import refused
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
+from signedheat.extensions.cut_lines import unforked
 from signedheat.extensions.jump_solvers import JumpProblem, minimize_exactly, minimize_fast
 from signedheat.extensions.piecewise_slopes import smoothed
 from signedheat.fields.piecewise_field import chains
@@ -541,6 +542,34 @@ def test_some_of_the_cuts_forked():
 def forks(phi: sh.PiecewiseField) -> int:
     edges = np.unique(phi.pairs.edges[phi.is_cut])
     return int((np.bincount(phi.triangles.edges.vertices[edges].ravel()) > 2).sum())
+
+
+@pytest.mark.parametrize("spare", [0, 7, 30, 60])
+def test_few_functions_are_made_for_many_lines(spare):
+    """Sixty lines of which some are not needed: so many go, and the surface is cut open some ten times."""
+    mesh = sphere(4)
+    triangles = discretize(mesh).triangles
+    pairs = face_pairs(triangles)
+    used, chosen = np.zeros(mesh.n_vertices, dtype=bool), []
+    for pair in np.random.default_rng(0).permutation(len(pairs.faces)):
+        ends = triangles.edges.vertices[pairs.edges[pair]]
+        if not used[ends].any() and len(chosen) < 60:
+            used[ends] = True
+            chosen.append(pair)
+    needed, cut = np.zeros((2, len(pairs.faces)), dtype=bool)
+    cut[chosen] = True
+    needed[chosen[spare:]] = True
+    heights = np.zeros(3 * mesh.n_faces)
+    heights[pairs.tails[chosen, 0]] = heights[pairs.heads[chosen, 0]] = np.where(needed[chosen], 2.0, 1.0)
+    made = []
+
+    def integrate(opened):
+        made.append(opened)
+        return heights.reshape(-1, 3), 1.0 + (needed & ~opened).sum()
+
+    found = unforked(triangles, pairs, cut, integrate)
+    assert np.array_equal(found.cut, needed) and found.n_lines == 60 - spare
+    assert len(made) < 16
 
 
 def test_slack_is_never_exceeded():
