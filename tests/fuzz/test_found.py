@@ -76,6 +76,8 @@ FOUND = [
     ("commands", 1126, 701),
     # sheets thickened by many times their size
     ("commands", 1130, 4932), ("commands", 1130, 5694),
+    # parts of a surface far smaller than the width over which jumps are smoothed
+    ("surface piecewise", 1145, 3772),
     # a picture of 230 bytes that announces 75 million pixels
     ("files masks", 20261122, 753),
     # arguments that are quoted, compared or counted

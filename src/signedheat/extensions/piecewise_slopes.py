@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -18,7 +17,7 @@ from ..operators.cotan import cotan_matrix, divergence
 from .cut_lines import FAR, Opened, high_jumps, typical_size, unforked
 
 WIDEST = 10.0
-"""Greatest width of smoothing, over the root of the area: that is step 3 all but alone. Beside w² C rounding took M."""
+"""Greatest width, over the root of the area of a part: that is step 3 all but alone. Beside w² C rounding took M."""
 
 
 def is_continuous(
@@ -84,9 +83,11 @@ def smoothed(
     owner = opened.corner_vertices.ravel()
     share = np.repeat(triangles.face_areas / 3.0, 3)
     mass = np.asarray(np.bincount(owner, share), dtype=np.float64)
-    width = min(width, WIDEST * math.sqrt(triangles.face_areas.sum()))
-    matrix = sparse.csr_matrix(width**2 * cotan_matrix(opened) + sparse.diags_array(mass))
-    pulled = np.bincount(owner, share * rough.ravel()) + width**2 * divergence(opened, directions)
+    stiffness = cotan_matrix(opened)
+    part = sparse.csgraph.connected_components(stiffness, directed=False)[1]
+    squared = np.minimum(width**2, WIDEST**2 * np.bincount(part, mass))[part]
+    matrix = sparse.csr_matrix(sparse.diags_array(squared) @ stiffness + sparse.diags_array(mass))
+    pulled = np.bincount(owner, share * rough.ravel()) + squared * divergence(opened, directions)
     at_corners = factorize(matrix).solve(pulled)[opened.corner_vertices]
     return at_corners, slope_error(triangles, at_corners, directions)
 
