@@ -1,8 +1,9 @@
 """Signed distance to curves that bound no region: piecewise-continuous integration (Sec. 7.2, Eq. 15, Eq. 16).
 
-In every face φ is linear with gradient exactly Y, so it is known up to one constant per face. Where Y is integrable,
-the constants make φ continuous across edges; elsewhere φ jumps, and the weighted L1 norm of Eq. 16 concentrates the
-jumps on a cut that is short and runs where Y is not integrable.
+In Eq. 16 φ is linear in every face with gradient exactly Y, so it is known up to one constant per face. Where Y is
+integrable, the constants make φ continuous across edges; elsewhere φ jumps, and the weighted L1 norm concentrates the
+jumps on a cut that is short and runs where Y is not integrable. The cut is then made clean (`cut_lines`), and φ smooth
+beside it (`piecewise_slopes.smoothed`).
 """
 
 from __future__ import annotations
