@@ -11,6 +11,7 @@ stays in proportion to the number of faces.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -19,6 +20,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ..intrinsic_mesh import IntrinsicMesh
+from .delaunay_sources import in_delaunay_triangles
 from .initial_windows import MADE, WANTED, Faces, Search
 from .propagation_kernels import ROUND, continue_search, start_search
 from .sources import GeodesicSources, PlacedSegments, zero_line
@@ -26,6 +28,10 @@ from .sources import GeodesicSources, PlacedSegments, zero_line
 WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 100, 4_000_000, 1000
 """A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual. Small meshes
 of many sheets take more, which is little in all."""
+
+MANY_PER_EDGE, MANY_WINDOWS = 30, 50_000
+"""A search that makes more windows than this goes on in Delaunay triangles: through the long edges of slivers every
+segment of a curve is seen."""
 
 Report: TypeAlias = Callable[[], None]
 """Called every tenth of a second or so; an exception that it raises ends the search."""
@@ -78,11 +84,16 @@ def distance_to_segments(
     >>> distance_to_segments(triangles, [PlacedSegments.of(triangles, [point])])[0].tolist()
     [4.0, 0.0, 5.0]
     """
-    each = [part.sources(triangles) for part in placed]
-    sources = GeodesicSources(*(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
-    pseudosources = is_pseudosource(triangles)
-    pseudosources[sources.vertices] = True
-    return _distances(triangles, pseudosources, sources, tolerance, report)
+    limit = window_limit(triangles)
+    many = min(MANY_PER_EDGE * triangles.n_edges + MANY_WINDOWS, limit)
+    search = PausedSearch.start(triangles, placed, tolerance).until(many, report)
+    better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
+    if better is not None:
+        other = PausedSearch.start(*better, tolerance).until(limit, report)
+        search = other if other.has_ended else search
+    search = search.until(limit, report)
+    windows = min(search.windows, limit - 1) if search.has_ended else limit
+    return search.distance()[: triangles.n_vertices], windows
 
 
 def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float) -> NDArray[np.float64]:
@@ -112,33 +123,70 @@ def window_limit(triangles: IntrinsicMesh) -> int:
     return min(ON_SMALL * 3 * triangles.n_faces, WINDOWS_PER_EDGE * triangles.n_edges + FEW_WINDOWS)
 
 
-def _distances(
-    triangles: IntrinsicMesh,
-    pseudosources: NDArray[np.bool_],
-    sources: GeodesicSources,
-    tolerance: float,
-    report: Report | None,
-) -> tuple[NDArray[np.float64], int]:
-    """Distances from sources, and the number of windows; in short calls of kernels, between which it can be ended."""
-    faces, slack, limit = Faces.of(triangles), ROUND + 2.0 * tolerance, window_limit(triangles)
-    search = Search.start(triangles.n_faces, pseudosources, room=1024)
-    start_search(faces, sources, search, slack)
-    while search.counts[WANTED]:
-        search = Search.start(triangles.n_faces, pseudosources, room=2 * len(search.windows))
-        start_search(faces, sources, search, slack)
-    while search.queue.size[0] > 0 and search.counts[MADE] < limit:
-        if report is not None:
-            report()
-        if search.counts[WANTED]:
-            search = search.larger()
-            search.counts[WANTED] = 0
-        continue_search(faces, search, slack, tolerance, min(search.counts[MADE] + _CHUNK, limit))
-    if search.queue.size[0] > 0:
-        return _along_edges(triangles, search.distance), limit
-    distance, missed = search.distance, np.isinf(search.distance)
-    if missed.any():  # on other parts, or past edges so short that windows on them are lost in rounding
-        distance[missed] = _along_edges(triangles, distance)[missed]
-    return distance, min(int(search.counts[MADE]), limit - 1)
+@dataclass(frozen=True, eq=False)
+class PausedSearch:
+    """A search on some triangles, in short calls of kernels between which it can be ended.
+
+    Attributes
+    ----------
+    triangles : IntrinsicMesh
+        The surface.
+    known : Search
+        What it has found; going on changes it.
+    tolerance : float
+        See `distance_to_zero_line`.
+    """
+
+    triangles: IntrinsicMesh
+    known: Search
+    tolerance: float
+
+    @classmethod
+    def start(cls, triangles: IntrinsicMesh, placed: Sequence[PlacedSegments], tolerance: float) -> PausedSearch:
+        """With the windows that leave the sources."""
+        each = [part.sources(triangles) for part in placed]
+        sources = GeodesicSources(*(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
+        pseudosources = is_pseudosource(triangles)
+        pseudosources[sources.vertices] = True
+        faces, room = Faces.of(triangles), 1024
+        while True:
+            known = Search.start(triangles.n_faces, pseudosources, room)
+            start_search(faces, sources, known, ROUND + 2.0 * tolerance)
+            if not known.counts[WANTED]:
+                return cls(triangles, known, tolerance)
+            room *= 2
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether no window is left that could go on."""
+        return bool(self.known.queue.size[0] == 0)
+
+    @property
+    def windows(self) -> int:
+        """How many it has made."""
+        return int(self.known.counts[MADE])
+
+    def until(self, limit: int, report: Report | None) -> PausedSearch:
+        """Go on to the end, or until so many windows have been made."""
+        faces, known, slack = Faces.of(self.triangles), self.known, ROUND + 2.0 * self.tolerance
+        while known.queue.size[0] > 0 and known.counts[MADE] < limit:
+            if report is not None:
+                report()
+            if known.counts[WANTED]:
+                known = known.larger()
+                known.counts[WANTED] = 0
+            continue_search(faces, known, slack, self.tolerance, min(known.counts[MADE] + _CHUNK, limit))
+        return replace(self, known=known)
+
+    def distance(self) -> NDArray[np.float64]:
+        """(n,) of every vertex; along edges from what was reached, where it was not."""
+        distance = self.known.distance
+        if not self.has_ended:
+            return _along_edges(self.triangles, distance)
+        missed = np.isinf(distance)
+        if missed.any():  # on other parts, or past edges so short that windows on them are lost in rounding
+            distance[missed] = _along_edges(self.triangles, distance)[missed]
+        return distance
 
 
 def _along_edges(triangles: IntrinsicMesh, distance: NDArray[np.float64]) -> NDArray[np.float64]:
