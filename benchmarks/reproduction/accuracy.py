@@ -174,14 +174,14 @@ def convergence(page: Page) -> None:
     extrapolation leaves of h²/t shows on the finest mesh. Longer times there would cost more elsewhere: where
     directions turn back, at equal distance from two parts of the source, a longer time smooths more.
 
-    The paper's own way, meshes of 1,250 vertices decimated from scans and level sets of the three lowest eigenfunctions, is
-    `benchmarks/convergence.py MESH ...`. On eleven scans ε of the default falls at every level for all 33 sources, from
-    0.72 to 0.059 % in the median, with orders from 0.60 to 1.06, median 0.88, 15 of them at least 0.9; that of one time
-    falls for 26, to 0.15 %, with orders from 0.18 to 0.78, median 0.55. `sh.curve_distance` is exact (10⁻⁴ %) at every
-    level. What is left lies within some ten edges of where directions turn back; that part falls like h to the power 2/3 at
-    best, as its place comes from comparing heat that has fallen along two paths, and each other way to find it that was
-    tried (shorter times there, directions carried on from where they are sure, φ's own slopes, less weight) helps some
-    shapes and harms others.
+    The paper's own way, meshes of 1,250 vertices decimated from scans and level sets of the three lowest
+    eigenfunctions, is `benchmarks/convergence.py MESH ...`. On eleven scans ε of the default falls at every level for
+    all 33 sources, from 0.72 to 0.059 % in the median, with orders from 0.60 to 1.06, median 0.88, 15 of them at least
+    0.9; that of one time falls for 26, to 0.15 %, with orders from 0.18 to 0.78, median 0.55. `sh.curve_distance` is
+    exact (10⁻⁴ %) at every level. What is left lies within some ten edges of where directions turn back; that part
+    falls like h to the power 2/3 at best, as its place comes from comparing heat that has fallen along two paths, and
+    each other way to find it that was tried (shorter times there, directions carried on from where they are sure, φ's
+    own slopes, less weight) helps some shapes and harms others.
     """
     ways: dict[str, Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]] = {
         "default": lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
