@@ -10,8 +10,9 @@ import pytest
 import signedheat as sh
 from signedheat.discretization import discretize
 from signedheat.geometry.geodesics import exact
-from signedheat.geometry.geodesics.delaunay_sources import as_curve, in_delaunay_triangles, share_to_flip
+from signedheat.geometry.geodesics.delaunay_sources import in_delaunay_triangles, share_to_flip
 from signedheat.geometry.geodesics.sources import PlacedSegments, zero_line
+from signedheat.geometry.geodesics.through_vertices import as_curve
 from signedheat.samples import sphere, torus
 
 
@@ -75,6 +76,22 @@ def test_segments_as_a_curve_are_placed_alike(kind):
     assert sorted(zip(after.faces, after.along_edge, strict=True)) == sorted(
         zip(before.faces, before.along_edge, strict=True)
     )
+
+
+@pytest.mark.parametrize("seed", [112, 126])
+def test_lines_through_vertices_of_awful_triangles(seed):
+    """Lines that passed vertices at 10⁻⁷ edges lost windows: some distances were too long by 2 % of the largest."""
+    rng = np.random.default_rng(seed)
+    mesh = torus(rng.uniform(6, 30), rng.uniform(4, 12))
+    points = mesh.vertices * rng.uniform(0.05, 3, size=3)
+    points = points + rng.choice([0, 0.02, 0.1]) * np.ptp(points) * rng.normal(size=points.shape)
+    triangles = discretize(sh.TriangleMesh(points, mesh.faces)).triangles
+    values = rng.integers(-1, 2, size=len(points)).astype(float)
+    distance, _ = exact.distance_to_zero_line(triangles, values, 0.0)
+    moved = exact.cleared(triangles, values, 1e-7 * triangles.lengths_of_edges.mean())
+    flipped = exact.PausedSearch.start(*in_delaunay_triangles(triangles, [zero_line(triangles, moved)]), 0.0)
+    bound = flipped.until(10**7, None).distance()[: len(points)]
+    assert np.abs(distance - bound).max() < 1e-7 * distance.max()
 
 
 def test_slivers_are_not_cut_short():

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..curve_segments import CurveSegments
 from ..intrinsic.conforming_refinement import FaceCutter, MergedSources, affected_elements, flip_new_faces
 from ..intrinsic_mesh import IntrinsicMesh
 from .sources import PlacedSegments
+from .through_vertices import as_curve
 
 FLIPPED = 0.05
 """Share of the edges that are not Delaunay from which other triangles are worth their making."""
@@ -26,7 +26,9 @@ def in_delaunay_triangles(
     if not triangles.agree_on_lengths or share_to_flip(triangles) < FLIPPED:
         return None
     parts = [as_curve(triangles, each) for each in placed]
-    finer, merged = triangles, MergedSources.of(parts)
+    if any(part is None for part in parts):
+        return None
+    finer, merged = triangles, MergedSources.of([part for part in parts if part is not None])
     faces, edges = affected_elements(triangles, merged, [True] * len(parts))
     if faces or edges:
         finer, merged, _ = FaceCutter(triangles, merged, faces, edges).assemble()
@@ -39,17 +41,3 @@ def share_to_flip(triangles: IntrinsicMesh) -> float:
     opposite = np.roll(triangles.corner_cotangents, 1, axis=1)  # the corner facing edge k is k + 2
     sums = np.bincount(triangles.edges.face_edges.ravel(), opposite.ravel(), triangles.n_edges)
     return float(((sums < -1e-9) & (triangles.edges.face_counts == 2)).mean())
-
-
-def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments:
-    """Placed segments as a curve without sides, each segment once."""
-    first = np.unique(placed.given, return_index=True)[1]
-    faces, along = placed.faces[first], placed.along_edge[first]
-    starts, stops = placed.positions[first].T
-    corners, sides = triangles.corner_positions[faces], triangles.edge_vectors[faces]
-    off = sum(np.abs((np.conj(sides) * (ends[:, None] - corners)).imag) for ends in (starts, stops))
-    lengths = np.abs(sides)
-    nearest = np.where(lengths > 0, off / np.where(lengths > 0, lengths, 1.0), np.inf).argmin(axis=1)
-    edges = np.where(along, triangles.edges.face_edges[faces, nearest], -1)
-    normals = 1j * np.where(along, np.abs(stops - starts), stops - starts)  # in the frame of the edge, or of the face
-    return CurveSegments(placed.nodes, placed.ends[first], faces, edges, normals, False)

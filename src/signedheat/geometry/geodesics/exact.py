@@ -24,6 +24,7 @@ from .delaunay_sources import in_delaunay_triangles
 from .initial_windows import MADE, WANTED, Faces, Search
 from .propagation_kernels import ROUND, continue_search, start_search
 from .sources import GeodesicSources, PlacedSegments, zero_line
+from .through_vertices import through_vertices
 
 WINDOWS_PER_EDGE, FEW_WINDOWS, ON_SMALL = 100, 4_000_000, 1000
 """A search that makes more windows than this, on average, is cut short; on smooth surfaces ten are usual. Small meshes
@@ -85,6 +86,7 @@ def distance_to_segments(
     [4.0, 0.0, 5.0]
     """
     limit = window_limit(triangles)
+    placed = [through_vertices(triangles, each) for each in placed]
     many = min(MANY_PER_EDGE * triangles.n_edges + MANY_WINDOWS, limit)
     search = PausedSearch.start(triangles, placed, tolerance).until(many, report)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
