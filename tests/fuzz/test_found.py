@@ -47,7 +47,7 @@ FOUND = [
     # paths through edges that are a rounding shorter than none
     ("surface use", 202, 43), ("surface curves", 300, 4876),
     # curves across triangles as thin as rounding, which turn them
-    ("surface curves", 7003, 1478), ("surface triangulation", 7007, 684),
+    ("surface curves", 7003, 1478), ("surface triangulation", 7007, 684), ("surface curves", 1311, 2478),
     # geodesics past edges so short that windows on them are lost
     ("surface curves", 7009, 1312),
     # an image in space whose origin is one of the plane

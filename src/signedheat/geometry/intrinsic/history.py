@@ -168,8 +168,9 @@ def straight_lines(
 
 
 def turned_lines(triangles: IntrinsicMesh, lines: Lines, lengths: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Lines that have become longer than they were on their way: triangles as thin as rounding have turned them."""
+    """Lines that became longer than they were on their way, or lost it: triangles as thin as rounding turned them."""
     along, corners = lines.vectors[:, 0], triangles.corner_positions[lines.faces]
     with np.errstate(all="ignore"):  # they may have overflowed
         found, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
-    return np.unique(lines.owners[~(found <= 2 * lengths[lines.owners] + rounding)])
+    known = np.isfinite(lines.starts).all(axis=1) & np.isfinite(lines.ends).all(axis=1)
+    return np.unique(lines.owners[~(known & (found <= 2 * lengths[lines.owners] + rounding))])
