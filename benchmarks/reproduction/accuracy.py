@@ -175,14 +175,14 @@ def convergence(page: Page) -> None:
     directions turn back, at equal distance from two parts of the source, a longer time smooths more.
 
     The paper's own way, meshes of 1,250 vertices decimated from scans and level sets of the three lowest
-    eigenfunctions, is `benchmarks/convergence.py MESH ...`. On eleven scans ε of the default falls at every level for
-    all 33 sources, from 0.72 to 0.059 % in the median, with orders from 0.60 to 1.06, median 0.88, 15 of them at least
-    0.9; that of one time falls for 26, to 0.15 %, with orders from 0.18 to 0.78, median 0.55. `sh.curve_distance` is
-    exact (10⁻⁴ %) at every level. What is left lies within some ten edges of where directions turn back: that place
-    comes from comparing heat that has fallen along two paths, which is the less exact the longer they are. Even the
-    best times at each level, chosen by the error, would leave one source on a femur at an order of 0.6; each other way
-    that was tried (shorter times there, directions carried on from where they are sure, φ's own slopes, shorter
-    vectors) helps some shapes and harms others.
+    eigenfunctions, is `python -m benchmarks.convergence MESH ...`. On eleven scans ε of the default falls at every
+    level for all 33 sources, from 0.72 to 0.059 % in the median, with orders from 0.60 to 1.06, median 0.88, 15 of
+    them at least 0.9; that of one time falls for 26, to 0.15 %, with orders from 0.18 to 0.78, median 0.55.
+    `sh.curve_distance` is exact (10⁻⁴ %) at every level. What is left lies within some ten edges of where directions
+    turn back: that place comes from comparing heat that has fallen along two paths, which is the less exact the longer
+    they are. Even the best times at each level, chosen by the error, would leave one source on a femur at an order of
+    0.6; each other way that was tried (shorter times there, directions carried on from where they are sure, φ's own
+    slopes, shorter vectors) helps some shapes and harms others.
     """
     ways: dict[str, Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]] = {
         "default": lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),

@@ -11,7 +11,7 @@ stays in proportion to the number of faces.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -169,16 +169,15 @@ class PausedSearch:
         return int(self.known.counts[MADE])
 
     def until(self, limit: int, report: Report | None) -> PausedSearch:
-        """Go on to the end, or until so many windows have been made."""
+        """Go on to the end, or until so many windows have been made; returns the same search."""
         faces, known, slack = Faces.of(self.triangles), self.known, ROUND + 2.0 * self.tolerance
         while known.queue.size[0] > 0 and known.counts[MADE] < limit:
             if report is not None:
                 report()
             if known.counts[WANTED]:
-                known = known.larger()
-                known.counts[WANTED] = 0
+                known.larger().counts[WANTED] = 0
             continue_search(faces, known, slack, self.tolerance, min(known.counts[MADE] + _CHUNK, limit))
-        return replace(self, known=known)
+        return self
 
     def distance(self) -> NDArray[np.float64]:
         """(n,) of every vertex; along edges from what was reached, where it was not."""
