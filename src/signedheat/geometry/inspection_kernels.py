@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 
 
-@compiled(nogil=True)
+@compiled
 def inspect_faces(
     vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
 ) -> tuple[float, int, NDArray[np.float64]]:
@@ -48,7 +48,7 @@ def inspect_faces(
     return total, degenerate, box
 
 
-@compiled(nogil=True)
+@compiled
 def find_root(parents: NDArray[np.integer], node: int) -> int:
     """The root of a node's tree; paths are halved on the way."""
     while parents[node] != node:
@@ -57,7 +57,7 @@ def find_root(parents: NDArray[np.integer], node: int) -> int:
     return node
 
 
-@compiled(nogil=True)
+@compiled
 def count_components(
     n_vertices: int, tails: NDArray[np.int64], heads: NDArray[np.int64], chosen: NDArray[np.bool_]
 ) -> int:
@@ -77,7 +77,7 @@ def count_components(
     return count
 
 
-@compiled(nogil=True)
+@compiled
 def count_nonmanifold_vertices(
     n_vertices: int,
     tails: NDArray[np.int64],
@@ -113,7 +113,7 @@ def count_nonmanifold_vertices(
     return total
 
 
-@compiled(nogil=True)
+@compiled
 def count_edges(
     tails: NDArray[np.int64],
     edges: NDArray[np.int32],

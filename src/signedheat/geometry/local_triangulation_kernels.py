@@ -11,7 +11,7 @@ MAX_SIDES = 64
 TOUCHING = 1e-7  # radians by which the sectors of two triangles at a corner may overlap
 
 
-@compiled(nogil=True)
+@compiled
 def voronoi_fans(
     x: NDArray[np.float64], y: NDArray[np.float64], reach: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -115,15 +115,3 @@ def accept_apart(
                 taken[v, count[v], 0], taken[v, count[v], 1] = starts[f, k], widths[f, k]
                 count[v] += 1
     return accepted
-
-
-@compiled
-def signs_from_parents(
-    order: NDArray[np.int64], parents: NDArray[np.int64], relative: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """(n,) sign of each node: the sign of its parent, which is earlier in the order, times its sign relative to it."""
-    signs = np.ones(len(parents), dtype=np.int64)
-    for node in order:
-        if parents[node] >= 0:
-            signs[node] = signs[parents[node]] * relative[node]
-    return signs

@@ -10,7 +10,7 @@ from ..compiled import compiled
 Floats = NDArray[np.float64]
 
 
-@compiled(nogil=True)
+@compiled
 def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float, axis: Floats) -> float:
     """Write the unit eigenvector of the least eigenvalue of a symmetric 3×3 matrix; return that eigenvalue.
 
@@ -56,7 +56,7 @@ def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz:
     return value
 
 
-@compiled(nogil=True)
+@compiled
 def weighted_plane(offsets: Floats, weights: Floats, count: int, axis: Floats, center: Floats) -> float:
     """Write normal and weighted mean of the first `count` points; return their mean squared height."""
     total = x = y = z = 0.0
@@ -77,7 +77,7 @@ def weighted_plane(offsets: Floats, weights: Floats, count: int, axis: Floats, c
     return square
 
 
-@compiled(nogil=True)
+@compiled
 def plane_through(a: Floats, b: Floats, axis: Floats) -> bool:
     """Write the normal of the plane spanned by two vectors; return whether they span one."""
     u, v, w = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -89,7 +89,7 @@ def plane_through(a: Floats, b: Floats, axis: Floats) -> bool:
     return True
 
 
-@compiled(nogil=True)
+@compiled
 def weigh_by_height(offsets: Floats, near: Floats, axis: Floats, base: Floats, height: float, weights: Floats) -> float:
     """Write Tukey's biweight of the heights over a plane through `base`, times `near`; return the sum."""
     total = 0.0
@@ -101,7 +101,7 @@ def weigh_by_height(offsets: Floats, near: Floats, axis: Floats, base: Floats, h
     return total
 
 
-@compiled(nogil=True)
+@compiled
 def robust_planes(
     points: Floats,
     neighbors: NDArray[np.int64],

@@ -118,7 +118,7 @@ def add_fluxes(corners, positions, directions, n):
     return sums
 
 
-@compiled(nogil=True)
+@compiled
 def areas_and_volumes(
     vertices: NDArray[np.float64], triangles: NDArray[np.int64], center: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

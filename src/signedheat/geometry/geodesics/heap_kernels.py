@@ -33,13 +33,13 @@ class Queue(NamedTuple):
         return cls(np.empty(n_items, np.int64), np.full(n_items, -1), np.empty(n_items), np.zeros(1, np.int64))
 
 
-@compiled(nogil=True)
+@compiled
 def before(keys: NDArray[np.float64], a: int, b: int) -> bool:
     """Whether item a leaves the queue before item b; equal keys go by number, so results are the same each time."""
     return bool(keys[a] < keys[b] or (keys[a] == keys[b] and a < b))
 
 
-@compiled(nogil=True)
+@compiled
 def push(queue: Queue, item: int, key: float) -> None:
     """Put an item into the queue, or move it forward if its key has become smaller."""
     items, places, keys, size = queue
@@ -59,7 +59,7 @@ def push(queue: Queue, item: int, key: float) -> None:
     items[place], places[item] = item, place
 
 
-@compiled(nogil=True)
+@compiled
 def pop(queue: Queue) -> int:
     """Take out the item with the smallest key."""
     items, places, keys, size = queue

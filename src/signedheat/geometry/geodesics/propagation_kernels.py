@@ -36,7 +36,7 @@ MANY = 4
 """Windows on a halfedge, the comparing of which with each other counts as the making of one."""
 
 
-@compiled(nogil=True)
+@compiled
 def _reach(
     distance: NDArray[np.float64], pseudosources: NDArray[np.bool_], queue: Queue, first: int, v: int, length: float
 ) -> None:
@@ -47,7 +47,7 @@ def _reach(
             push(queue, first + v, length)
 
 
-@compiled(nogil=True)
+@compiled
 def _collect(
     search: Search, halfedge: int, at_tail: float, at_head: float, length: float, slack: float, tolerance: float
 ) -> tuple[NDArray[np.float64], int]:
@@ -96,7 +96,7 @@ def _collect(
     return chosen, kept
 
 
-@compiled(nogil=True)
+@compiled
 def _left(
     windows: NDArray[np.float64], following: NDArray[np.int64], row: int, w: NDArray[np.float64], length: float
 ) -> bool:
@@ -109,7 +109,7 @@ def _left(
     return True
 
 
-@compiled(nogil=True)
+@compiled
 def _settle(search: Search, halfedge: int, chosen: NDArray[np.float64], count: int) -> None:
     """Add windows to those that have crossed a halfedge, instead of the ones that they outdo."""
     _, _, _, _, settled, windows, following, counts = search
@@ -134,7 +134,7 @@ def _settle(search: Search, halfedge: int, chosen: NDArray[np.float64], count: i
         settled[halfedge] = row
 
 
-@compiled(nogil=True)
+@compiled
 def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: float) -> None:
     """Distances at the sources, and the first windows, as far as there is room."""
     initial_windows(faces, sources, search, slack)
@@ -143,7 +143,7 @@ def start_search(faces: Faces, sources: GeodesicSources, search: Search, slack: 
             push(search.queue, len(search.queued) + v, search.distance[v])
 
 
-@compiled(nogil=True)
+@compiled
 def _most_windows(faces: Faces, queued: NDArray[np.int64], following: NDArray[np.int64], item: int) -> int:
     """The most windows that one item of the queue can make."""
     most, n_halfedges = 0, len(queued)
@@ -164,7 +164,7 @@ def _most_windows(faces: Faces, queued: NDArray[np.int64], following: NDArray[np
     return most * beyond
 
 
-@compiled(nogil=True)
+@compiled
 def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, limit: int) -> None:
     """Propagate in order of distance until nothing is queued, room is wanted, or `limit` windows have been made."""
     distance, pseudosources, queue, queued, _, windows, following, counts = search
