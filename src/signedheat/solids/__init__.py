@@ -1,0 +1,1 @@
+"""Solids: broken shapes in space completed once, and measured anywhere."""

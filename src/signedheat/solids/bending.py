@@ -1,0 +1,186 @@
+"""How a surface bends towards its rim: whether it would go on over the opening."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..geometry.components import connected_components
+from ..geometry.edges import edge_table
+from .lids import Lid, cut_to_pieces, lid_area
+
+REACH = 0.25
+"""Share of an opening's width in which the surface behind its rim is looked at."""
+SHARP = 0.7
+"""Cosine between the normals of two faces below which the edge between them is sharp."""
+SAMPLES = 4
+"""Samples across that strip."""
+MOST = 4096
+"""Samples around a rim at most, or nearly."""
+SMOOTH = 24
+"""Part of a rim over which its zigzags are averaged."""
+NEAR = 0.05
+"""Part of that strip that is nearest to a place of the rim, and tells its normal."""
+STIFF = 0.1
+"""Depth, over that strip's, of a wall whose bending is believed by half."""
+AGREEMENT = 0.5
+"""Ratio of how far a surface bends and how far it would have to, from which on it is believed to go on: 1 on a ball."""
+FREE = 0.01
+"""How far a rim is held at most where the lid is as good as flat."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Places on faces near a rim: (k, 3) positions, (k, 3) unit normals, (k,) areas and smooth patches they are of."""
+
+    positions: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    areas: NDArray[np.float64]
+    patches: NDArray[np.int64]
+
+
+def width_of(lid: Lid) -> float:
+    """Four areas over the length of the rim, the diameter of a circle; zigzags of the rim do not count."""
+    pieces = cut_to_pieces(lid.vertices[: lid.n_rim])
+    half = len(pieces) // (2 * SMOOTH)
+    smooth = np.stack([_smooth(column, np.ones(2 * half + 1) / (2 * half + 1)) for column in pieces.T], axis=1)
+    length = np.linalg.norm(np.roll(smooth, -1, axis=0) - smooth, axis=1).sum()
+    return 4.0 * lid_area(lid) / float(length)
+
+
+def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m,) which faces hang together across edges that are not sharp."""
+    table = edge_table(ids)
+    a, b, c = triangles.transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    order = np.argsort(table.face_edges.ravel(), kind="stable")
+    edges, faces = table.face_edges.ravel()[order], order // 3
+    pairs = np.flatnonzero((edges[1:] == edges[:-1]) & (table.face_counts[edges[1:]] == 2))
+    one, other = faces[pairs], faces[pairs + 1]
+    smooth = (normals[one] * normals[other]).sum(axis=1) > SHARP
+    return connected_components(len(ids), one[smooth], other[smooth])
+
+
+def samples_near(
+    triangles: NDArray[np.float64], patches: NDArray[np.int64], rim: scipy.spatial.cKDTree, reach: float
+) -> Samples:
+    """Samples of triangles that are within reach of a rim, at most reach / `SAMPLES` apart."""
+    size = reach / SAMPLES
+    near, labels = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)]
+    while len(triangles):
+        centres = triangles.mean(axis=1)
+        radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
+        away = rim.query(centres)[0]
+        triangles, patches, radii, away = (each[away < reach + radii] for each in (triangles, patches, radii, away))
+        fine = radii <= size
+        chosen = fine & (away < reach)
+        near.append(triangles[chosen])
+        labels.append(patches[chosen])
+        a, b, c = triangles[~fine].transpose(1, 0, 2)
+        d, e, f = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
+        patches = np.tile(patches[~fine], 4)
+    found = np.concatenate(near)
+    a, b, c = found.transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    doubled = np.linalg.norm(normals, axis=1)
+    proper = np.flatnonzero(doubled > 0)
+    proper = proper[:: max(1, len(proper) // MOST)]
+    normals = normals[proper] / doubled[proper, None]
+    return Samples(found.mean(axis=1)[proper], normals, doubled[proper] / 2, np.concatenate(labels)[proper])
+
+
+def continuation(
+    lid: Lid, samples: Samples, patches: NDArray[np.int64], width: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where the surface would go on over a rim, and how far that is to be believed.
+
+    Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
+    circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.
+
+    Parameters
+    ----------
+    lid : Lid
+        The flat one.
+    samples : Samples
+        Of the surface behind it.
+    patches : (n,) int
+        Smooth patch that ends at each place of the rim.
+    width : float
+        Of the opening.
+
+    Returns
+    -------
+    normals : (n, 3) float
+        Unit normals of the surface at the rim.
+    held : (n,) float
+        1 where the surface bends as it must, 0 where it does not.
+    """
+    n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
+    at_rim, held = np.zeros((n, 3)), np.zeros(n)
+    reach = REACH * width
+    steps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    m = max(1, min(n // 4, round(reach / steps.mean())))
+    along = np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+    outside = lid_normals(lid, n)
+    if not len(samples.positions):
+        return at_rim, held
+    tree = scipy.spatial.cKDTree(samples.positions)
+    for i, near in enumerate(tree.query_ball_point(loop, reach)):
+        near = np.array(near)[samples.patches[near] == patches[i]] if near else near
+        if len(near) < 3:
+            continue
+        x, normals, areas = samples.positions[near] - loop[i], samples.normals[near], samples.areas[near]
+        lengths = np.linalg.norm(x, axis=1)
+        close = areas / (lengths**2 + (NEAR * reach) ** 2) ** 1.5
+        normal = close @ normals
+        length = np.linalg.norm(normal)
+        if length == 0.0:
+            continue
+        way = np.cross(normal / length, along[i])
+        if (size := np.linalg.norm(way)) < 1e-6:
+            continue
+        way /= size
+        weights = areas / areas.sum()
+        at = x @ np.stack([way, np.cross(normal / length, way)], axis=1)
+        mean, middle = weights @ at, weights @ normals
+        at = at - mean
+        spread = (at * weights[:, None]).T @ at + (STIFF * reach) ** 2 * np.eye(2)
+        slopes = np.linalg.solve(spread, (at * weights[:, None]).T @ (normals - middle))
+        slope = slopes[0]
+        normal = middle - mean @ slopes  # at the rim
+        normal /= max(np.linalg.norm(normal), 1e-300)
+        way = np.cross(normal, along[i])
+        way /= max(np.linalg.norm(way), 1e-300)
+        bends, must = width * (slope @ way), 2.0 * (way @ outside[i])
+        at_rim[i], held[i] = normal, _agreement(bends, must)
+    window = np.ones(2 * m + 1) / (2 * m + 1)
+    return at_rim, np.where(at_rim.any(axis=1), _smooth(held, window), 0.0)
+
+
+def _agreement(one: float, other: float) -> float:
+    """1 where two numbers are alike within a factor of 1 / `AGREEMENT`, 0 where they differ by its square."""
+    low, high = sorted((one, other), key=abs)
+    ratio = low / high if high != 0.0 else 1.0
+    return float(np.clip((ratio - AGREEMENT**2) / (AGREEMENT - AGREEMENT**2), 0.0, 1.0))
+
+
+def _smooth(values: NDArray[np.float64], window: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values along a loop, averaged."""
+    half = len(window) // 2
+    return np.convolve(np.concatenate([values[-half:], values, values[:half]]), window, mode="valid")
+
+
+def lid_normals(lid: Lid, n: int) -> NDArray[np.float64]:
+    """(n, 3) unit normals of a lid at its rim."""
+    a, b, c = lid.vertices[lid.faces].transpose(1, 0, 2)
+    areas = np.cross(b - a, c - a)
+    sums = np.stack([np.bincount(lid.faces.ravel(), np.repeat(areas[:, k], 3), len(lid.vertices)) for k in range(3)], 1)
+    sums = sums[:n]
+    normals: NDArray[np.float64] = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
+    return normals

@@ -1,0 +1,385 @@
+"""Complete a broken shape, once: what bounds it, and what closes it where it is open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..constraints import Constraint
+from ..diagnostics import BoundsNothing, CompletedArea, Diagnostics, FacesRestored, LeftOut, Note, OrientedPoints
+from ..domains.kinds import ShapeLike
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import SignedHeatError, SourceError
+from ..extensions.joining import Shape, joined_shape
+from ..extensions.orientation import orientation
+from ..extensions.point_orientation import orient_points
+from ..geometry.face_features import FaceFeatures
+from ..geometry.face_tree import FaceTree
+from ..geometry.lost_faces import lost_faces
+from ..geometry.welding import roundoff, welded
+from ..memory import refuse_beyond_memory
+from ..operators.grid.fitted_points import mean_gap
+from ..progress import Progress, Stopwatch
+from . import parts
+from .bounding import pieces_of
+from .closing import lids_of
+from .heat import Heat, heat_surface
+from .loose import bound_together, clusters_of, scatter_of, without_copies
+from .solid import Solid
+from .winding import Windings
+
+STEPS = 2
+"""Steps that are timed."""
+BYTES_PER_FACE = 1300
+"""Measured peak for each face of meshes of 330,000, closed or open; points take less."""
+BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
+"""The same for loose triangles; and of the grid that they and points are completed on."""
+DOUBT = 0.05
+"""Distance from what was given, over its diagonal, at which confidence in the completion has fallen to a half."""
+CELLS = 2.0
+"""Cells between neighbouring points of a cloud."""
+SEAM = 0.75
+"""Cells from faces within which the zero set of φ stands for what they are."""
+
+
+def complete(
+    shape: ShapeLike | Sequence[ShapeLike],
+    *,
+    completion: Literal["lids", "heat"] = "lids",
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> Solid:
+    """The solid that a shape is, or is a broken picture of.
+
+    Faces are turned to agree and to face outwards. Parts that bound something are closed by lids: thin plates that go
+    on over their rims where the surface bends towards them, and are flat elsewhere. Points, and loose triangles that
+    scatter around a surface, are completed by the signed heat method. Bodies that overlap are united. Sheets bound
+    nothing: distance to them is positive on both sides. None of this depends on where anybody asks, nor on rotation,
+    position and scale.
+
+    Parameters
+    ----------
+    shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh; or several meshes
+        Broken or not; points with normals or without. Objects of trimesh, PyVista, meshio and Open3D and pairs
+        (vertices, faces) are taken wherever a shape is.
+    completion : {"lids", "heat"}
+        What closes meshes: lids, or the zero set of φ where no face is, as in the paper (Feng & Crane 2024).
+    as_oriented : bool
+        Take faces and normals as they are, whichever way they face.
+    keep_overlaps : bool
+        Count what lies inside other bodies as surface.
+    constraint, diffusion : Constraint, float
+        Of the signed heat method, where that completes.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; what it raises cancels.
+
+    Returns
+    -------
+    Solid
+        Its ``diagnostics.notes`` say what was turned, left out and completed.
+
+    Raises
+    ------
+    SourceError
+        If no face has an area, or points have no normals and none are to be fitted.
+    MemoryLimitError
+        If it cannot fit in memory; nothing has been allocated then.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> ball = samples.without_patches(samples.sphere(3), 3, 0.4)
+    >>> solid = complete(ball)
+    >>> solid.distance([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).round(1).tolist()
+    [-1.0, 1.0]
+    """
+    if completion not in ("lids", "heat"):
+        raise SignedHeatError(f'completion must be "lids" or "heat", not {completion!r}', element="completion")
+    joined = joined_shape(shape)
+    refuse_what_does_not_fit(joined)
+    method = Heat(constraint, diffusion)
+    stopwatch = Stopwatch(progress, STEPS)
+    with stopwatch("orient"):
+        found = orientation(joined) if not (as_oriented or isinstance(joined, PointCloud)) else None
+        turned, notes = (joined, ()) if as_oriented else (found.shape, (found.note,)) if found else oriented(joined)
+    with stopwatch("complete"):
+        if isinstance(turned, PointCloud):
+            solid = _from_points(turned, method)
+        else:
+            solid = completed(turned.triangulation, completion, keep_overlaps, method)
+    names = None
+    if isinstance(turned, TriangleMesh | PolygonMesh):
+        names = _owners(turned) if found is None else found.faces[_owners(turned)]
+    source = joined if isinstance(joined, TriangleMesh) else None
+    return _noting(solid, notes, stopwatch, names, source)
+
+
+def refuse_what_does_not_fit(shape: Shape) -> None:
+    """Raise `MemoryLimitError`, before anything is allocated, if completing a shape would not fit in memory."""
+    count = shape.n_points if isinstance(shape, PointCloud) else shape.triangulation.n_faces
+    refuse_beyond_memory(
+        f"completing a shape of {count} faces",
+        count,
+        lambda n: bytes_to_complete(shape, n),
+        lambda n: f"simplify it to {n} faces, or free memory",
+    )
+
+
+def bytes_to_complete(shape: Shape, count: int) -> float:
+    """Peak memory of completing a shape that is like this one but has so many faces."""
+    if isinstance(shape, PointCloud):
+        return BYTES_OF_HEAT + BYTES_PER_FACE * count
+    mesh = shape.triangulation
+    if mesh.n_vertices == 3 * mesh.n_faces and mesh.n_faces > 1:
+        return BYTES_OF_HEAT + BYTES_IF_LOOSE * count
+    return BYTES_PER_FACE * count
+
+
+def oriented(shape: Shape) -> tuple[Shape, tuple[Note, ...]]:
+    """A shape whose faces or normals point outwards, and what was done for it."""
+    if isinstance(shape, PointCloud):
+        points = orient_points(shape)
+        return points.cloud, (OrientedPoints(points.n_fitted, points.n_turned),)
+    found = orientation(shape)
+    return found.shape, (found.note,)
+
+
+def _owners(shape: TriangleMesh | PolygonMesh) -> NDArray[np.int64]:
+    """(m,) face that each triangle of a mesh is part of."""
+    return shape.refinement.face_polygons if isinstance(shape, PolygonMesh) else np.arange(shape.n_faces)
+
+
+def _noting(
+    solid: Solid,
+    notes: Sequence[Note],
+    stopwatch: Stopwatch,
+    faces: NDArray[np.int64] | None,
+    source: TriangleMesh | None,
+) -> Solid:
+    """A solid that names faces as the shape that was given does, with the notes of all steps."""
+    origins = solid.origins if faces is None else np.where(solid.origins >= 0, faces[solid.origins], -1)
+    diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
+    return Solid(solid.triangles, origins, solid.confidence, solid.windings, source, diagnostics)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles of one kind.
+
+    Attributes
+    ----------
+    triangles : (m, 3, 3) float
+        Corners.
+    ids : (m, 3) int
+        Vertices, one number for each position.
+    origins : (m,) int
+        Face that was given, or −1.
+    closing : bool
+        Whether they count in the winding number.
+    """
+
+    triangles: NDArray[np.float64]
+    ids: NDArray[np.int64]
+    origins: NDArray[np.int64]
+    closing: bool
+
+
+def completed(mesh: TriangleMesh, completion: Literal["lids", "heat"], keep_overlaps: bool, method: Heat) -> Solid:
+    """The solid that oriented triangles are; its origins are theirs."""
+    vertices = mesh.vertices
+    ids = welded(vertices, roundoff(vertices))[mesh.faces]
+    a, b, c = ids.T
+    proper = np.flatnonzero((a != b) & (b != c) & (c != a))
+    given = Surface(vertices[mesh.faces[proper]], ids[proper], proper, True)
+    if not parts.face_areas(given.triangles).any():
+        raise SourceError("no face of the shape has an area", element="shape")
+    if completion == "heat":
+        return united(_by_heat(given, method), keep_overlaps)
+    lost = lost_faces(vertices, given.ids)
+    surfaces = _by_lids(given, lost, vertices, method)
+    restored = float(parts.face_areas(vertices[lost]).sum() / parts.face_areas(given.triangles).sum())
+    notes = [FacesRestored(len(lost), restored / (1 + restored))] if len(lost) else []
+    return united(surfaces, keep_overlaps, notes)
+
+
+def _by_lids(given: Surface, lost: NDArray[np.int64], vertices: NDArray[np.float64], method: Heat) -> list[Surface]:
+    """Bodies, with the faces that they lost between their vertices, and their lids; sheets; what loose pieces are."""
+    whole = Surface(
+        np.concatenate([given.triangles, vertices[lost]]),
+        np.concatenate([given.ids, lost]),
+        np.concatenate([given.origins, np.full(len(lost), -1)]),
+        True,
+    )
+    labels, is_body = parts.bodies(whole.triangles, whole.ids)
+    bodies = _some(whole, is_body[labels], True)
+    lids = lids_of(bodies.triangles, bodies.ids, labels[is_body[labels]], vertices)
+    surfaces = [bodies, *(Surface(lid, _new_ids(lid), np.full(len(lid), -1), True) for lid in lids)]
+    loose = _some(whole, ~is_body[labels], False)
+    if not len(loose.triangles):
+        return surfaces
+    labels = np.unique(labels[~is_body[labels]], return_inverse=True)[1]
+    kept = without_copies(loose.triangles, labels, bodies.triangles)
+    loose, labels = _some(loose, kept, False), labels[kept]
+    for chosen in clusters_of(loose.triangles, labels):
+        surfaces += _loose(_some(loose, chosen, False), labels[chosen], method)
+    return surfaces
+
+
+def _loose(pieces: Surface, labels: NDArray[np.int64], method: Heat) -> list[Surface]:
+    """Pieces near each other: the surface that they scatter around; or what closes them; or sheets."""
+    if not bound_together(pieces.triangles, labels):
+        return [pieces]
+    if scatter := scatter_of(pieces.triangles, labels):
+        made = _heat_of(pieces, method, scatter)
+        return [pieces] if made is None else [made]
+    return _by_heat(pieces, method)
+
+
+def _by_heat(given: Surface, method: Heat) -> list[Surface]:
+    """Triangles, and the zero set of φ where they are not."""
+    made = _heat_of(given, method)
+    if made is None:
+        return [_some(given, np.ones(len(given.ids), dtype=bool), False)]
+    corners = given.triangles.reshape(-1, 3)
+    tree = FaceTree.of(FaceFeatures.of(corners, np.arange(len(corners)).reshape(-1, 3)))
+    cell = float(np.median(np.linalg.norm(made.triangles[:, 1] - made.triangles[:, 0], axis=1)))
+    away = tree.distances(made.triangles.mean(axis=1)) > SEAM * cell
+    return [_some(given, np.ones(len(given.ids), dtype=bool), True), _some(made, away, True)]
+
+
+def _heat_of(pieces: Surface, method: Heat, cell: float = 0.0) -> Surface | None:
+    names, faces = np.unique(pieces.triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    made = heat_surface(TriangleMesh(names, faces.reshape(-1, 3)), method, cell)
+    if made is None:
+        return None
+    triangles = made[0][made[1]]
+    return Surface(triangles, _new_ids(triangles), np.full(len(triangles), -1), True)
+
+
+def _from_points(cloud: PointCloud, method: Heat) -> Solid:
+    """The solid that oriented points are samples of; where they bound nothing, small triangles stand for them."""
+    if cloud.normals is None:
+        raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
+    made = heat_surface(cloud, method, mean_gap(np.asarray(cloud.points)) / CELLS)
+    if made is not None:
+        triangles = made[0][made[1]]
+        return united(
+            [Surface(triangles, _new_ids(triangles), np.full(len(triangles), -1), True)], True, (), cloud.points
+        )
+    size = 0.25 * mean_gap(np.asarray(cloud.points))
+    first = np.cross(cloud.normals, np.eye(3)[np.abs(cloud.normals).argmin(axis=1)])
+    first /= np.maximum(np.linalg.norm(first, axis=1), 1e-300)[:, None]
+    second = np.cross(cloud.normals, first)
+    turns = np.stack([np.cos(2 * np.pi * np.arange(3) / 3), np.sin(2 * np.pi * np.arange(3) / 3)], axis=1)
+    triangles = cloud.points[:, None] + size * (turns[:, :1] * first[:, None] + turns[:, 1:] * second[:, None])
+    return united([Surface(triangles, _new_ids(triangles), np.full(len(triangles), -1), False)], True, (), cloud.points)
+
+
+def united(
+    surfaces: list[Surface],
+    keep_overlaps: bool,
+    notes: Sequence[Note] = (),
+    points: NDArray[np.float64] | None = None,
+) -> Solid:
+    """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
+    whole = _joined(surfaces)
+    closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
+    windings = Windings((whole.triangles[closing],), (1.0,))
+    pieces = pieces_of(whole.triangles, whole.ids, closing, windings)
+    origins = whole.origins[pieces.origins]
+    given = origins >= 0
+    buried = pieces.behind & pieces.ahead
+    bounds = pieces.behind != pieces.ahead
+    kept = np.where(given, ~buried | keep_overlaps, bounds | ~closing[pieces.origins])
+    if not kept.any():
+        kept[:] = True
+    areas = parts.face_areas(pieces.triangles)
+    confidence = _confidence(pieces.triangles[kept], given[kept], whole, points)
+    found = _notes(pieces.triangles, areas, origins, kept, buried & ~kept, bounds)
+    diagnostics = Diagnostics(notes=(*notes, *found))
+    return Solid(pieces.triangles[kept], origins[kept], confidence, windings, None, diagnostics)
+
+
+def _notes(
+    triangles: NDArray[np.float64],
+    areas: NDArray[np.float64],
+    origins: NDArray[np.int64],
+    kept: NDArray[np.bool_],
+    buried: NDArray[np.bool_],
+    bounds: NDArray[np.bool_],
+) -> list[Note]:
+    notes: list[Note] = []
+    given = origins >= 0
+    total = max(float(areas[given].sum()), np.finfo(float).tiny)
+    covered = buried & given
+    if covered.any():
+        faces, others = np.unique(origins[covered]), np.unique(origins[given & kept])
+        cut = int(np.isin(faces, others).sum())
+        notes.append(LeftOut(len(faces), float(areas[covered].sum()) / total, cut))
+    made = kept & ~given
+    if made.any():
+        area = float(areas[made].sum())
+        corners = triangles[made].reshape(-1, 3)
+        notes.append(
+            CompletedArea(
+                area, area / float(areas[kept].sum()), np.stack([corners.min(axis=0), corners.max(axis=0)])[None]
+            )
+        )
+    idle = given & kept & ~bounds
+    if float(areas[idle].sum()) > 1e-6 * total:
+        notes.append(BoundsNothing(float(areas[idle].sum()) / total))
+    return notes
+
+
+def _confidence(
+    triangles: NDArray[np.float64], given: NDArray[np.bool_], whole: Surface, points: NDArray[np.float64] | None
+) -> NDArray[np.float32]:
+    """(m,) 1 where surface was given; where it was completed less, the farther from what was given."""
+    confidence = np.ones(len(triangles), dtype=np.float32)
+    if points is None:
+        points = whole.triangles[whole.origins >= 0].reshape(-1, 3)
+    if given.all():
+        return confidence
+    if not len(points):
+        confidence[~given] = 0.5
+        return confidence
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    away = scipy.spatial.cKDTree(points).query(triangles[~given].mean(axis=1), workers=-1)[0]
+    trust = DOUBT * diagonal / np.maximum(DOUBT * diagonal + away, np.finfo(float).tiny)
+    confidence[~given] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
+    return confidence
+
+
+def _joined(surfaces: list[Surface]) -> Surface:
+    """Several surfaces as one; numbers of vertices that are new, which are negative, stay apart."""
+    ids, lowest = [], 0
+    for each in surfaces:
+        own = np.where(each.ids < 0, each.ids + lowest, each.ids)
+        lowest = min(lowest, int(own.min(initial=0)))
+        ids.append(own)
+    joined = np.concatenate(ids)
+    return Surface(
+        np.concatenate([each.triangles for each in surfaces]),
+        np.unique(joined, return_inverse=True)[1].reshape(joined.shape),
+        np.concatenate([each.origins for each in surfaces]),
+        True,
+    )
+
+
+def _some(surface: Surface, chosen: NDArray[np.bool_] | NDArray[np.int64], closing: bool) -> Surface:
+    return Surface(surface.triangles[chosen], surface.ids[chosen], surface.origins[chosen], closing)
+
+
+def _new_ids(triangles: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(m, 3) negative numbers, one for each position."""
+    return -1 - np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)

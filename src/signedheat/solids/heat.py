@@ -1,0 +1,84 @@
+"""The surface that the signed heat method makes of points, and of loose triangles that scatter around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..constraints import Constraint, ZeroSet
+from ..discretization import discretize
+from ..domains.grid import Grid
+from ..domains.point_cloud import PointCloud
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import OutsideError
+from ..geometry.marching import closed_surface
+from ..lowering.area_elements import sample_on_grid
+from ..lowering.grid.source import GridSource
+from ..method import diffuse, integrate, normalize
+from ..operators.grid.face_values import values_at
+from ..operators.grid.fitted_points import fitted_to_points
+from ..operators.grid.winding import winding_numbers
+from .parts import FRAGMENTS
+
+ROOM = 0.15
+"""Room around the shape, over its longest side: the surface stays within it, whatever room somebody asks for later."""
+NODES = (32, 144)
+"""Least and most nodes along the longest side."""
+NEAR = 2.0
+"""Cells, or gaps between points, within which φ decides the side."""
+SURE = 0.25
+"""How far from 0 and 1 the winding number may be where it decides the side: φ bulges into corners of the box."""
+
+
+@dataclass(frozen=True)
+class Heat:
+    """How the signed heat method is run: what is imposed on φ, `ZeroSet` if None, and τ in ``t = τ h²``."""
+
+    constraint: Constraint | None = None
+    diffusion: float = 1.0
+
+
+def heat_surface(
+    shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0
+) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    """Vertices and faces of the zero set of φ around a shape, closed; None where the shape bounds nothing.
+
+    Cells are as large as noise is wide, or a share of the gaps between points, within bounds; 0 asks for the smallest.
+    Away from the shape, winding numbers over what they are on a shape that is as complete decide the side where they
+    are sure of it.
+    """
+    bounds = shape.bounds
+    side = float(np.ptp(bounds, axis=0).max())
+    nodes = int(np.clip((1 + 2 * ROOM) * side / cell, *NODES)) if cell > 0 else NODES[1]
+    grid = Grid.around(bounds, nodes, ROOM * side)
+    samples = sample_on_grid([shape], grid, 1.0)
+    winding = winding_numbers(samples.nodes, grid.shape, samples.positions, samples.vectors)
+    areas = np.linalg.norm(samples.vectors, axis=1)
+    level = float(np.average(values_at(winding, samples.positions), weights=areas))
+    if level < FRAGMENTS:
+        return None
+    source = GridSource(samples, grid, method.diffusion)
+    discretization = discretize(grid)
+    phi = integrate(
+        discretization,
+        normalize(discretization, diffuse(discretization, source)),
+        source,
+        method.constraint or ZeroSet(),
+    )
+    share = winding / (2 * level)
+    doubtful = ((phi < 0) & (share < SURE)) | ((phi >= 0) & (share > 1 - SURE))
+    if doubtful.any():
+        at = np.argwhere(doubtful)
+        away = scipy.spatial.cKDTree(samples.positions).query(at, workers=-1)[0]
+        far = tuple(at[away > NEAR].T)
+        phi[far] *= -1.0
+    steps = np.array(grid.spacing)
+    if isinstance(shape, PointCloud) and shape.normals is not None:
+        phi = fitted_to_points(phi, steps, shape.points - grid.origin, shape.normals)
+    try:
+        return closed_surface(phi, grid.origin, steps, 0.0)
+    except OutsideError:
+        return None

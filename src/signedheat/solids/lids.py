@@ -1,0 +1,319 @@
+"""Lids: thin plates spanned by rims, clamped where the surface bends towards its rim, and hinged where it does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..compiled import compiled
+
+PIECES = 64
+"""Pieces into which a rim is cut at least. Half or twice as many change the volume under a lid by less than .3 %."""
+GROWTH = 0.35
+"""How fast triangles grow with their distance from the rim, over that distance."""
+ROUNDS = 3
+"""How often a lid is solved for, each time with the lengths of the last."""
+SPLITS = 8
+"""How often edges of a rim are halved at most until all are edges of its triangulation."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lid:
+    """Triangles that close a rim.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float
+        The points of the rim first, in order.
+    faces : (m, 3) int
+        Counterclockwise from outside.
+    n_rim : int
+        How many points the rim has.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    n_rim: int
+
+
+def cut_to_pieces(loop: NDArray[np.float64], pieces: int = PIECES) -> NDArray[np.float64]:
+    """(k, 3) the points of a closed loop, and more on its edges: none is longer than the whole over `pieces`."""
+    ways = np.roll(loop, -1, axis=0) - loop
+    lengths = np.linalg.norm(ways, axis=1)
+    counts = np.maximum(np.ceil(lengths * pieces / lengths.sum() - 1e-9), 1).astype(np.int64)
+    starts = np.repeat(np.arange(len(loop)), counts)
+    along = (np.arange(len(starts)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[starts]
+    cut: NDArray[np.float64] = loop[starts] + along[:, None] * ways[starts]
+    return cut
+
+
+def area_vector(loop: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3,) the area that a closed loop encloses, along its normal."""
+    around = loop - loop.mean(axis=0)
+    vector: NDArray[np.float64] = 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
+    return vector
+
+
+def film(loop: NDArray[np.float64]) -> Lid:
+    """The lid of least area, near enough: a hinged plate, which is a membrane.
+
+    It is triangulated in the plane of the loop's area, or, where the loop's shadow there crosses itself, over a disc;
+    its first shape is harmonic there, and the lengths of each shape give the next (Pinkall & Polthier 1993). No weight
+    is negative, so that the lid stays within the hull of its rim.
+    """
+    rim = cut_to_pieces(loop)
+    shadow = _shadow(rim)
+    found = None if shadow is None else _in_polygon(rim, shadow)
+    rim, plane, faces = _in_disc(rim) if found is None else found
+    n = len(rim)
+    vertices = np.zeros((len(plane), 3))
+    vertices[:n] = rim
+    lid = _membrane(Lid(vertices, faces, n), stiffness(np.c_[plane, np.zeros(len(plane))], faces))
+    if n == len(plane):
+        return lid
+    for _ in range(ROUNDS):
+        lid = _membrane(lid, stiffness(lid.vertices, lid.faces))
+    return lid
+
+
+def _membrane(lid: Lid, matrix: sparse.csr_array) -> Lid:
+    n = lid.n_rim
+    weights = -sparse.triu(matrix, 1).tocoo()
+    weights = sparse.coo_array((np.maximum(weights.data, 1e-6), weights.coords), shape=matrix.shape)
+    weights = (weights + weights.T).tocsr()
+    inner = sparse.diags_array(weights.sum(axis=1)[n:]) - weights[n:, n:]
+    vertices = lid.vertices.copy()
+    if len(vertices) > n:
+        vertices[n:] = sparse.linalg.splu(inner.tocsc()).solve(weights[n:, :n] @ vertices[:n])
+    return Lid(vertices, lid.faces, n)
+
+
+def plate(lid: Lid, normals: NDArray[np.float64], held: NDArray[np.float64]) -> Lid:
+    """A lid bent as a thin plate: ``min Σ c_v |(L x)_v − Σ_e ½ |e| g_e|² / m_v``, with c = 1 but at hinges of the rim.
+
+    L is the cotangent Laplacian, m the areas of vertices, and g_e = e × n / |e × n| the direction across the edge e of
+    the rim in the plane with the normal n: where the surface goes on smoothly, ∂x/∂g = g there.
+
+    Parameters
+    ----------
+    lid : Lid
+        To begin with.
+    normals : (n, 3) float
+        Unit normals of the surface at the rim.
+    held : (n,) float
+        c at the rim: 0 at a hinge, 1 where it is clamped.
+    """
+    n = lid.n_rim
+    rim = lid.vertices[:n]
+    sides = np.roll(rim, -1, axis=0) - rim
+    lengths = np.linalg.norm(sides, axis=1)
+    load = np.zeros((n, 3))
+    for side, length in ((sides, lengths), (np.roll(sides, 1, axis=0), np.roll(lengths, 1))):
+        across = np.cross(side, normals)
+        across *= (0.5 * length / np.maximum(np.linalg.norm(across, axis=1), 1e-300))[:, None]
+        load -= across
+    for _ in range(ROUNDS):
+        matrix = stiffness(lid.vertices, lid.faces)
+        areas = vertex_areas(lid.vertices, lid.faces)
+        weights = 1.0 / np.maximum(areas, 1e-3 * np.median(areas[n:]))
+        weights[:n] *= held
+        given = matrix[:, :n] @ rim
+        given[:n] += load
+        inner = matrix[:, n:]
+        normal = (inner.T @ sparse.diags_array(weights) @ inner).tocsc()
+        vertices = lid.vertices.copy()
+        vertices[n:] = sparse.linalg.splu(normal).solve(-(inner.T @ (weights[:, None] * given)))
+        lid = Lid(vertices, lid.faces, n)
+    return lid
+
+
+def _shadow(rim: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """(n, 2) a loop in the plane of its area, counterclockwise; None if it has none."""
+    normal = area_vector(rim)
+    length = np.linalg.norm(normal)
+    if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
+        return None
+    normal /= length
+    around = rim - rim.mean(axis=0)
+    around -= np.outer(around @ normal, normal)
+    reach = np.linalg.norm(around, axis=1)
+    first = around[np.argmax(reach > (1 - 1e-9) * reach.max())]  # turns with the rim
+    first = first / np.linalg.norm(first)
+    shadow: NDArray[np.float64] = (rim - rim[0]) @ np.stack([first, np.cross(normal, first)], axis=1)
+    return shadow
+
+
+def _in_polygon(
+    rim: NDArray[np.float64], plane: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]] | None:
+    """Delaunay triangles of a polygon with points inside; its edges are halved until they are edges; or None.
+
+    None if the polygon crosses itself.
+    """
+    inner = _points_inside(plane)
+    for _ in range(SPLITS):
+        n = len(plane)
+        points = np.concatenate([plane, inner])
+        faces = scipy.spatial.Delaunay(points).simplices.astype(np.int64)
+        a, b, c = points[faces].transpose(1, 0, 2)
+        area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        faces[area < 0] = faces[area < 0][:, ::-1]
+        faces = faces[np.abs(area) > 1e-12 * np.abs(area).max()]
+        there = _directed(faces, len(points))
+        ahead = np.arange(n), (np.arange(n) + 1) % n
+        missing = ~(
+            np.isin(ahead[0] * len(points) + ahead[1], there) | np.isin(ahead[1] * len(points) + ahead[0], there)
+        )
+        if not missing.any():
+            kept = faces[_inside_polygon(points[faces].mean(axis=1), plane)]
+            left = np.setdiff1d(_directed(kept, len(points)), _directed(kept[:, ::-1], len(points)))
+            if len(left) != n or not np.isin(ahead[0] * len(points) + ahead[1], left).all():
+                return None
+            used = np.unique(np.concatenate([np.arange(n), kept.ravel()]))
+            number = np.zeros(len(points), dtype=np.int64)
+            number[used] = np.arange(len(used))
+            return rim, points[used], number[kept]
+        after = np.flatnonzero(missing)
+        rim = np.insert(rim, after + 1, 0.5 * (rim[after] + rim[(after + 1) % n]), axis=0)
+        plane = np.insert(plane, after + 1, 0.5 * (plane[after] + plane[(after + 1) % n]), axis=0)
+    return None
+
+
+def _directed(faces: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Numbers of the directed edges of triangles."""
+    return (faces * n + np.roll(faces, -1, axis=1)).ravel()
+
+
+def _points_inside(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points within a polygon, as dense as its corners at its rim, and the less dense the farther from it."""
+    steps = np.linalg.norm(np.roll(polygon, -1, axis=0) - polygon, axis=1)
+    size = float(np.quantile(steps, 0.9))
+    low, high = polygon.min(axis=0), polygon.max(axis=0)
+    tree = scipy.spatial.cKDTree(polygon)
+    found: list[NDArray[np.float64]] = []
+    begin = 0.75 * size
+    while begin < 0.5 * float((high - low).max()):
+        step = size if not found else GROWTH * begin + size
+        end = begin + 2.0 * step
+        rows = np.arange(low[1], high[1] + step, step * 0.75**0.5)
+        columns = np.arange(low[0], high[0] + step, step)
+        grid = np.stack(
+            [
+                np.add.outer(0.5 * step * (np.arange(len(rows)) % 2), columns),
+                np.repeat(rows[:, None], len(columns), axis=1),
+            ],
+            axis=2,
+        )
+        points = grid.reshape(-1, 2)
+        away = tree.query(points)[0]
+        points = points[(away >= begin) & (away < end)]
+        found.append(points[_inside_polygon(points, polygon)])
+        begin = end + 0.5 * step
+    return np.concatenate(found) if found else np.zeros((0, 2))
+
+
+def _inside_polygon(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(k,) whether points lie inside a polygon: by the parity of crossings."""
+    inside = np.zeros(len(points), dtype=bool)
+    x, y = points.T
+    for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        crosses = (ay > y) != (by > y)
+        if crosses.any():
+            inside[crosses] ^= x[crosses] < ax + (y[crosses] - ay) * (bx - ax) / (by - ay)
+    return inside
+
+
+def _in_disc(
+    rim: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Triangles of the disc with points of the rim on its boundary, as far apart as they are, and others inside."""
+    lengths = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
+    angles = 2 * np.pi * (np.cumsum(lengths) - lengths) / lengths.sum()
+    n = len(rim)
+    rings, radius, step, turn = [np.stack([np.cos(angles), np.sin(angles)], axis=1)], 1.0, 2 * np.pi / n, 0.0
+    while True:
+        radius -= step * 0.87
+        if radius < step:
+            rings.append(np.zeros((1, 2)))
+            break
+        count = max(int(np.ceil(2 * np.pi * radius / step)), 5)
+        turn += np.pi / count
+        ring = turn + 2 * np.pi * np.arange(count) / count
+        rings.append(radius * np.stack([np.cos(ring), np.sin(ring)], axis=1))
+        step *= 1 + GROWTH
+    points = np.concatenate(rings)
+    faces = scipy.spatial.Delaunay(points).simplices.astype(np.int64)
+    a, b, c = points[faces].transpose(1, 0, 2)
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    faces[area < 0] = faces[area < 0][:, ::-1]
+    return rim, points, faces
+
+
+def stiffness(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> sparse.csr_array:
+    """(n, n) the positive semidefinite cotangent Laplacian; corners of flat triangles are bounded."""
+    corners = vertices[faces]
+    rows, columns, values = [], [], []
+    for k in range(3):
+        u, v = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
+        cosine, sine = (u * v).sum(axis=1), np.linalg.norm(np.cross(u, v), axis=1)
+        weight = 0.5 * np.clip(cosine / np.maximum(sine, 1e-300), -100.0, 100.0)
+        i, j = faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        rows += [i, j, i, j]
+        columns += [j, i, i, j]
+        values += [-weight, -weight, weight, weight]
+    n = len(vertices)
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return sparse.coo_array(entries, shape=(n, n)).tocsr()
+
+
+def vertex_areas(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(n,) a third of the area of the triangles around each vertex."""
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return np.bincount(faces.ravel(), np.repeat(areas / 6, 3), len(vertices)).astype(np.float64)
+
+
+def lid_area(lid: Lid) -> float:
+    """Its area."""
+    a, b, c = lid.vertices[lid.faces].transpose(1, 0, 2)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+@compiled
+def least_triangles(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n − 2, 3) triangles of least total area between (n, 3) points of a loop (Barequet & Sharir 1995).
+
+    Time is cubic in n: it is for small holes.
+    """
+    n = len(points)
+    cost, split = np.zeros((n, n)), np.zeros((n, n), dtype=np.int64)
+    for gap in range(2, n):
+        for i in range(n - gap):
+            k = i + gap
+            best = np.inf
+            for j in range(i + 1, k):
+                ux, uy, uz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+                vx, vy, vz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
+                x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+                total = cost[i, j] + cost[j, k] + np.sqrt(x * x + y * y + z * z)
+                if total < best * (1 - 1e-12):
+                    best, split[i, k] = total, j
+            cost[i, k] = best
+    faces, stack, count, depth = np.empty((n - 2, 3), dtype=np.int64), np.empty((n + 2, 2), dtype=np.int64), 0, 1
+    stack[0, 0], stack[0, 1] = 0, n - 1
+    while depth > 0:
+        depth -= 1
+        i, k = stack[depth, 0], stack[depth, 1]
+        if k - i < 2:
+            continue
+        j = split[i, k]
+        faces[count, 0], faces[count, 1], faces[count, 2] = i, j, k
+        count += 1
+        stack[depth, 0], stack[depth, 1] = i, j
+        stack[depth + 1, 0], stack[depth + 1, 1] = j, k
+        depth += 2
+    return faces

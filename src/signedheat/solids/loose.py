@@ -1,0 +1,97 @@
+"""Loose pieces: parts that bound nothing by themselves, and may be fragments of a body, its noisy copies, or sheets."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..geometry.components import connected_components
+from ..geometry.face_features import FaceFeatures
+from ..geometry.face_tree import FaceTree
+from .parts import FRAGMENTS, face_areas, level
+
+COPY = 0.5
+"""Distance from a body, over the size of a piece, up to which the piece is a copy of what is there."""
+REACH = 1.5
+"""Sum of the radii of two pieces, times this, within which they may belong together."""
+CHANCE = 0.35
+"""Joint level, times √n, up to which n pieces bound nothing: two parallel sheets, each a side of them apart, have .22,
+three sides of a box .22, and six .5."""
+MATCH = (1e-6, 0.75)
+"""Distance of corners over the size of pieces between which they were one corner, before noise moved them."""
+
+
+def without_copies(
+    triangles: NDArray[np.float64], labels: NDArray[np.int64], bodies: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(m,) triangles of pieces that are no copies of a body: pieces that lie on it, nearer than their own size."""
+    if not len(bodies):
+        return np.ones(len(triangles), dtype=bool)
+    corners = bodies.reshape(-1, 3)
+    tree = FaceTree.of(FaceFeatures.of(corners, np.arange(len(corners)).reshape(-1, 3)))
+    found = tree.search(triangles.reshape(-1, 3))
+    away = found.distances.reshape(-1, 3)
+    a, b, c = triangles.transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    facing = np.abs((normals[:, None] * tree.features.face_normals[found.faces].reshape(-1, 3, 3)).sum(axis=2))
+    doubled = np.linalg.norm(normals, axis=1)
+    alike = (facing > 0.7 * doubled[:, None]).any(axis=1)
+    n = int(labels.max()) + 1
+    sizes = np.sqrt(np.bincount(labels, 0.5 * doubled, n))
+    farthest = np.zeros(n)
+    np.maximum.at(farthest, labels, away.max(axis=1))
+    share = np.bincount(labels, alike, n) / np.maximum(np.bincount(labels, minlength=n), 1)
+    copy = (farthest < COPY * sizes) & (share > 0.5)
+    kept: NDArray[np.bool_] = ~copy[labels]
+    return kept
+
+
+def clusters_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Triangles of each cluster of pieces whose distance is comparable to their sizes."""
+    if not len(labels):
+        return []
+    names, labels = np.unique(labels, return_inverse=True)
+    n = len(names)
+    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
+    np.minimum.at(low, labels, triangles.min(axis=1))
+    np.maximum.at(high, labels, triangles.max(axis=1))
+    centres, radii = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
+    octaves = np.floor(np.log2(np.maximum(radii, 1e-300)))
+    one, other = [], []
+    for octave in np.unique(octaves):
+        here, below = np.flatnonzero(octaves == octave), np.flatnonzero(octaves <= octave)
+        pairs = scipy.spatial.cKDTree(centres[here]).sparse_distance_matrix(
+            scipy.spatial.cKDTree(centres[below]), 4 * REACH * 2.0**octave, output_type="coo_matrix"
+        )
+        i, j = here[pairs.row], below[pairs.col]
+        near = pairs.data < REACH * (radii[i] + radii[j])
+        one.append(i[near])
+        other.append(j[near])
+    clusters = connected_components(n, np.concatenate(one), np.concatenate(other))[labels]
+    return np.split(np.argsort(clusters, kind="stable"), np.cumsum(np.bincount(clusters))[:-1])
+
+
+def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> bool:
+    """Whether pieces are fragments of a body: their joint winding number at their faces is no matter of chance.
+
+    That of n pieces anywhere is random, and falls as 1 / √n; n counts pieces of equal area.
+    """
+    areas = np.bincount(labels, face_areas(triangles))
+    n = areas.sum() ** 2 / max(float((areas**2).sum()), np.finfo(float).tiny)
+    return level(triangles) >= max(FRAGMENTS, float(CHANCE / np.sqrt(n)))
+
+
+def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> float:
+    """How far corners that were one have come apart, if pieces are noise around a surface; else 0.
+
+    They are if most of their corners lie near corners of others, but not on them.
+    """
+    points = triangles.reshape(-1, 3)
+    owners = np.repeat(labels, 3)
+    near, which = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
+    others = owners[which] != owners[:, None]
+    nearest = np.where(others, near, np.inf).min(axis=1)
+    sizes = np.repeat(np.sqrt(face_areas(triangles)), 3)
+    moved = (nearest > MATCH[0] * sizes) & (nearest < MATCH[1] * sizes)
+    return float(np.median(nearest[moved])) if moved.mean() > 0.5 else 0.0

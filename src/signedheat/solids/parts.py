@@ -1,0 +1,152 @@
+"""Which parts of an oriented shape bound something: those at whose faces its winding number is high enough.
+
+The winding number jumps by one across a face. The mean of its two sides, here a part's *level*, is ½ on a closed
+surface and 0 on a flat sheet; between, it says how much of a body a part is: half a ball has .31, a quarter .20. Where
+faces are missing everywhere, it is half of the share that is there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+from ..geometry.components import element_components
+from ..geometry.edges import edge_table
+from ..geometry.winding_tree import WindingTree
+from .rims import open_edges
+
+SHEET = 0.15
+"""Level up to which a part is a sheet. Flat and wavy sheets have 0, one folded at a right angle .11, a seventh of a
+ball .16, a quarter .20, three sides of a box .22."""
+UPRIGHT = 0.7
+"""Uprightness of the rims of a part from which on it is a body, however low its walls are: a tray has 1, a sheet folded
+at a right angle .24, a wavy one less."""
+FRAGMENTS = 0.06
+"""The same for parts that bound together: an eighth of the faces of a ball has .0625."""
+PLACES = 4096
+"""Faces of a large part that its level is the mean of."""
+FEW = 256
+"""Faces up to which those of a part are summed one by one."""
+
+
+def parts_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(m,) the part that each face is of: faces that share an edge which two faces have, in opposite directions."""
+    table = edge_table(faces)
+    n = len(table.vertices)
+    balance = np.bincount(table.face_edges.ravel(), np.where(table.forward, 1, -1).ravel(), n)
+    joins = (table.face_counts == 2) & (balance == 0)
+    sides = np.where(joins[table.face_edges], table.face_edges, n + np.arange(3 * len(faces)).reshape(-1, 3))
+    return element_components(sides)
+
+
+def bodies(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """(m,) the part that each face is of, and (p,) whether a part is a body; all others are sheets or fragments.
+
+    A part is a body if it is closed, if its own winding number at its faces is high enough, or its rims are upright.
+    """
+    labels = parts_of(ids)
+    n = int(labels.max(initial=-1)) + 1
+    is_body = np.ones(n, dtype=bool)
+    is_body[open_edges(ids, labels)[1]] = False
+    opened = ~is_body[labels]
+    if opened.any():
+        names, inverse = np.unique(labels[opened], return_inverse=True)
+        some = triangles[opened], ids[opened], inverse
+        is_body[names] = np.abs(own_levels(some[0], inverse)) >= SHEET
+        is_body[names] |= np.abs(uprightness(*some, len(names))) >= UPRIGHT
+    return labels, is_body
+
+
+def own_levels(triangles: NDArray[np.float64], parts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(p,) mean over the faces of each part of its own winding number, between the two sides of a face."""
+    order = np.argsort(parts, kind="stable")
+    counts = np.bincount(parts)
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
+    areas = face_areas(triangles[order])
+    total = np.bincount(parts[order], areas)
+    levels = np.bincount(parts[order], areas * _among_few(corners, starts, FEW)) / np.maximum(
+        total, np.finfo(float).tiny
+    )
+    for part in np.flatnonzero(counts > FEW):
+        levels[part] = level(triangles[order[starts[part] : starts[part + 1]]])
+    return levels
+
+
+def uprightness(
+    triangles: NDArray[np.float64], ids: NDArray[np.int64], parts: NDArray[np.int64], n_parts: int
+) -> NDArray[np.float64]:
+    """(p,) mean over the rims of each part of the cosine between the surface and the normal of its opening.
+
+    1 on a tray, however low its walls are, and on a tube cut open along its length; 0 on sheets, whose rims lie in the
+    plane that they open to, and on tubes, whose ends have opposite normals.
+    """
+    tails, heads = ids.ravel(), np.roll(ids, -1, axis=1).ravel()
+    owners = np.repeat(parts, 3)
+    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
+    order = np.lexsort((high, low, owners))
+    same = (np.diff(owners[order]) == 0) & (np.diff(low[order]) == 0) & (np.diff(high[order]) == 0)
+    alone = np.ones(len(order), dtype=bool)
+    alone[order[1:][same]] = alone[order[:-1][same]] = False
+    corners = triangles.reshape(-1, 3)
+    start, stop = corners[alone], np.roll(triangles, -1, axis=1).reshape(-1, 3)[alone]
+    a, b, c = triangles.transpose(1, 0, 2)
+    normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)[alone]
+    across = np.cross(stop - start, normals)
+    across *= (np.linalg.norm(stop - start, axis=1) / np.maximum(np.linalg.norm(across, axis=1), 1e-300))[:, None]
+    owners = owners[alone]
+    opening = _sums(owners, -0.5 * np.cross(start, stop), n_parts)  # lids run along rims the other way
+    length = np.linalg.norm(opening, axis=1)
+    around = np.bincount(owners, np.linalg.norm(stop - start, axis=1), n_parts)
+    flux = (_sums(owners, across, n_parts) * opening).sum(axis=1)
+    return np.asarray(flux / np.maximum(length * around, 1e-300))
+
+
+def _sums(owners: NDArray[np.int64], vectors: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+    return np.stack([np.bincount(owners, column, n) for column in vectors.T], axis=1)
+
+
+def level(triangles: NDArray[np.float64]) -> float:
+    """The mean over all faces of the winding number, between the two sides of a face."""
+    some = slice(None, None, max(1, len(triangles) // PLACES))
+    areas = face_areas(triangles[some])
+    if not areas.any():
+        return 0.0
+    where = np.arange(len(triangles))[some]
+    behind = WindingTree.of(triangles).behind(where, triangles[some].mean(axis=1))
+    return float(np.average(behind, weights=areas)) - 0.5
+
+
+def face_areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) areas."""
+    a, b, c = triangles.transpose(1, 0, 2)
+    areas: NDArray[np.float64] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return areas
+
+
+@compiled
+def _among_few(corners: NDArray[np.float64], starts: NDArray[np.int64], few: int) -> NDArray[np.float64]:
+    levels = np.zeros(len(corners))
+    for p in range(len(starts) - 1):
+        if starts[p + 1] - starts[p] > few:
+            continue
+        for i in range(starts[p], starts[p + 1]):
+            x = (corners[i, 0] + corners[i, 3] + corners[i, 6]) / 3
+            y = (corners[i, 1] + corners[i, 4] + corners[i, 7]) / 3
+            z = (corners[i, 2] + corners[i, 5] + corners[i, 8]) / 3
+            total = 0.0
+            for j in range(starts[p], starts[p + 1]):
+                if j != i:
+                    ax, ay, az = corners[j, 0] - x, corners[j, 1] - y, corners[j, 2] - z
+                    bx, by, bz = corners[j, 3] - x, corners[j, 4] - y, corners[j, 5] - z
+                    cx, cy, cz = corners[j, 6] - x, corners[j, 7] - y, corners[j, 8] - z
+                    a = np.sqrt(ax * ax + ay * ay + az * az)
+                    b = np.sqrt(bx * bx + by * by + bz * bz)
+                    c = np.sqrt(cx * cx + cy * cy + cz * cz)
+                    volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+                    rest = a * b * c + (ax * bx + ay * by + az * bz) * c
+                    rest += (bx * cx + by * cy + bz * cz) * a + (cx * ax + cy * ay + cz * az) * b
+                    total += 2.0 * np.arctan2(volume, rest)
+            levels[i] = total / (4.0 * np.pi)
+    return levels

@@ -1,0 +1,80 @@
+"""Rims: where oriented faces end, as closed loops."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.edges import edge_table
+
+
+def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Edges that the faces of each part lack, directed as the missing faces would run along them.
+
+    Faces that run along an edge in opposite directions cancel; what is left over occurs as often as it is left over. As
+    many edges leave each vertex as arrive there, whatever the faces are: a boundary has no boundary.
+
+    Parameters
+    ----------
+    faces : (m, 3) int
+        Vertices, one number for each position.
+    parts : (m,) int
+        The part that each face is of.
+
+    Returns
+    -------
+    edges : (k, 2) int
+        Tail and head.
+    owners : (k,) int
+        The part that lacks it; ascending.
+
+    Examples
+    --------
+    >>> open_edges(np.array([[0, 1, 2], [2, 1, 3]]), np.zeros(2, dtype=int))[0].tolist()
+    [[1, 0], [0, 2], [3, 1], [2, 3]]
+    """
+    table = edge_table(faces)
+    n = len(table.vertices)
+    sides, which = np.unique(np.repeat(parts, 3) * n + table.face_edges.ravel(), return_inverse=True)
+    excess = np.bincount(which, np.where(table.forward, 1, -1).ravel(), len(sides)).astype(np.int64)
+    edges = table.vertices[sides % n]
+    missing = np.where(excess[:, None] > 0, edges[:, ::-1], edges)
+    return np.repeat(missing, np.abs(excess), axis=0), np.repeat(sides // n, np.abs(excess))
+
+
+def loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Closed loops of vertices, none of which passes a vertex twice, that run along all directed edges.
+
+    Parameters
+    ----------
+    edges : (k, 2) int
+        Tail and head; as many leave each vertex as arrive there.
+
+    Examples
+    --------
+    >>> [loop.tolist() for loop in loops(np.array([[0, 1], [1, 2], [2, 0], [0, 3], [3, 4], [4, 0]]))]
+    [[0, 1, 2], [0, 3, 4]]
+    """
+    if not len(edges):
+        return []
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    tails, heads = edges[order].T
+    names, first = np.unique(tails, return_index=True)
+    following = {
+        int(v): heads[a:b].tolist()[::-1] for v, a, b in zip(names, first, [*first[1:], len(tails)], strict=True)
+    }
+    found = []
+    for start in names.tolist():
+        path, place = [start], {start: 0}
+        while following[path[-1]]:
+            onward = following[path[-1]].pop()
+            if onward in place:
+                cut = place[onward]
+                found.append(np.array(path[cut:]))
+                for vertex in path[cut + 1 :]:
+                    del place[vertex]
+                del path[cut + 1 :]
+            else:
+                place[onward] = len(path)
+                path.append(onward)
+    return found

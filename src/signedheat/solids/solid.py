@@ -1,0 +1,247 @@
+"""Solids: completed shapes, to which distance is exact anywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..diagnostics import Diagnostics
+from ..domains.grid import Grid
+from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import query_points
+from ..errors import SourceError
+from ..fields.grid_field import GridField
+from ..fields.known_solid import Closest
+from ..frozen import Frozen
+from ..geometry.box_tree import morton_codes
+from ..geometry.face_features import FaceFeatures
+from ..geometry.face_tree import FaceTree
+from ..parallel import in_chunks
+from ..progress import Progress
+from ..reprs import ShortRepr
+from .fields import band_field, dense_field
+from .stores import Scheduler
+from .winding import Windings
+
+MANY = 1 << 18
+"""Points that are put in order together."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solid(Frozen, ShortRepr):
+    """A shape completed: the faces that were given, and what closes them.
+
+    `complete` makes it. Distance is to the nearest of all triangles; inside is where the winding number is above ½.
+
+    Attributes
+    ----------
+    triangles : (m, 3, 3) float
+        Corners of all that distance is measured to, cut where bodies overlap.
+    origins : (m,) int
+        Face of the shape that each is part of; −1 for the completion.
+    confidence : (m,) float
+        Of each triangle.
+    windings : Windings
+        What tells the inside.
+    source : TriangleMesh, optional
+        Triangles of the shape that was given, which barycentric coordinates refer to.
+    diagnostics : Diagnostics
+        Notes on what was turned, left out and completed.
+    """
+
+    triangles: NDArray[np.float64]
+    origins: NDArray[np.int64]
+    confidence: NDArray[np.float32]
+    windings: Windings
+    source: TriangleMesh | None = None
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)
+
+    @cached_property
+    def features(self) -> FaceFeatures:
+        """The triangles, and what lies around each."""
+        count = len(self.triangles)
+        return FaceFeatures.of(self.triangles.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3), self.confidence)
+
+    @cached_property
+    def tree(self) -> FaceTree:
+        """Over the triangles."""
+        return FaceTree.of(self.features)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) corners of the box around all triangles."""
+        points = self.triangles.reshape(-1, 3)
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    @property
+    def faces(self) -> TriangleMesh:
+        """What was given of the surface, cut where bodies overlap."""
+        return _mesh(self.triangles[self.origins >= 0])
+
+    @property
+    def completion(self) -> TriangleMesh:
+        """What closes it."""
+        return _mesh(self.triangles[self.origins < 0])
+
+    @property
+    def boundary(self) -> TriangleMesh:
+        """All that distance is measured to, as one mesh: faces, completion and sheets."""
+        return _mesh(self.triangles)
+
+    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Signed distances of (n, 3) points, negative inside: exact, in time O(n log m) on all threads.
+
+        Raises
+        ------
+        GeometryError
+            If a point is not finite.
+        """
+        places = _checked(points)
+        result = np.empty(len(places))
+        for begin in range(0, len(places), MANY):
+            here = slice(begin, begin + MANY)
+            result[here] = self._in_order(places[here], self._distances)
+        return result
+
+    def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """(n,) whether (n, 3) points are inside."""
+        return self.windings.inside(_checked(points))
+
+    def closest(self, points: ArrayLike) -> Closest:
+        """The nearest place for each of (n, 3) points.
+
+        Raises
+        ------
+        GeometryError
+            If a point is not finite.
+        """
+        places = _checked(points)
+        order = np.argsort(morton_codes(places), kind="stable") if len(places) else np.zeros(0, dtype=np.int64)
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        results = (
+            [part[back] for part in in_chunks(self._closest, places[order])] if len(places) else self._closest(places)
+        )
+        return Closest(*results)
+
+    def field(
+        self,
+        resolution: int = 128,
+        *,
+        spacing: ArrayLike | None = None,
+        padding: float | None = None,
+        grid: Grid | None = None,
+        band: float | None = None,
+        store: str | PathLike[str] | None = None,
+        scheduler: Scheduler = None,
+        progress: Progress | None = None,
+    ) -> GridField:
+        """Signed distance at the nodes of a grid: that of `distance`, found together.
+
+        Parameters
+        ----------
+        resolution : int
+            Nodes along the longest side of a grid around the solid.
+        spacing : float or (3,) float, optional
+            Distance between its nodes, in place of `resolution`.
+        padding : float, optional
+            Room around the solid; by default a fifth of its longest side.
+        grid : Grid, optional
+            Another one, wherever it is.
+        band : float, optional
+            Only the nodes in blocks of 8³ that may be as near to the surface as this, in units of length: for grids
+            that are too fine to be whole.
+        store : str or path, optional
+            Folder for the values of a band, which are mapped into memory as they are used. Run again, what was stopped
+            goes on. Workers must be able to read and write it.
+        scheduler : concurrent.futures.Executor, distributed.Client or str, optional
+            Who computes the tiles of a store: by default threads of this process; a pool, such as a
+            `ProcessPoolExecutor`; or a Dask cluster, by its client or its address, such as ``"tcp://127.0.0.1:8786"``.
+        progress : callable, optional
+            Called as ``progress(fraction, step)``; what it raises cancels.
+
+        Returns
+        -------
+        GridField
+            It knows its solid: calls, closest places and contours are exact.
+
+        Raises
+        ------
+        MemoryLimitError
+            If it cannot fit in memory, or on the disk of the store; nothing has been allocated then.
+        FileFormatError
+            If the store holds something else.
+        SourceError
+            If a store is named without a band.
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> from signedheat.solids.complete import complete
+        >>> field = complete(samples.sphere(3)).field(resolution=32)
+        >>> field.values.shape, field([[0.0, 0.0, 0.9]]).round(2)
+        ((32, 32, 32), array([-0.1]))
+        """
+        where = Grid.around(self.bounds, resolution, padding, spacing) if grid is None else grid
+        if band is not None:
+            return band_field(self, where, band, store, scheduler, progress)
+        if store is not None or scheduler is not None:
+            raise SourceError("only bands are stored tile by tile", remedy="give a band, or save the field")
+        return dense_field(self, where, progress)
+
+    def _in_order(self, points: NDArray[np.float64], function) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+        order = np.argsort(morton_codes(points), kind="stable")
+        result = np.empty(len(points))
+        (result[order],) = in_chunks(function, points[order])
+        return result
+
+    def _distances(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
+        found = self.tree.search(points).distances
+        return (np.where(self.windings.inside(points), -found, found),)
+
+    def _closest(self, points: NDArray[np.float64]) -> tuple[NDArray, ...]:  # type: ignore[type-arg]
+        found = self.tree.search(points)
+        ids = self.features.ids[found.faces]
+        signs = np.where(self.windings.inside(points), -1.0, 1.0)
+        away = points - found.feet
+        lengths = found.distances
+        clear = lengths > 1e-12 * np.abs(points).max(initial=1e-290)
+        normals = self.features.face_normals[found.faces]
+        gradients = np.where(clear[:, None], away * (signs / np.where(clear, lengths, 1.0))[:, None], normals)
+        origins = self.origins[ids]
+        weights = np.full((len(points), 3), np.nan)
+        if self.source is not None:
+            given = origins >= 0
+            weights[given] = _weights(self.source.vertices[self.source.faces[origins[given]]], found.feet[given])
+        return signs * lengths, found.feet, origins, weights, gradients, self.confidence[ids]
+
+
+def _checked(points: ArrayLike) -> NDArray[np.float64]:
+    return query_points(points, 3).reshape(-1, 3)
+
+
+def _mesh(triangles: NDArray[np.float64]) -> TriangleMesh:
+    if not len(triangles):
+        raise SourceError("there is none of it", element="solid")
+    points, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return TriangleMesh(points, corners.reshape(-1, 3))
+
+
+def _weights(corners: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) barycentric coordinates of places in triangles."""
+    a, b, c = corners.transpose(1, 0, 2)
+    u, v, w = b - a, c - a, places - a
+    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
+    wu, wv = (w * u).sum(1), (w * v).sum(1)
+    area = uu * vv - uv * uv
+    flat = ~(area > 1e-14 * uu * vv)
+    area = np.where(flat, 1.0, area)
+    first = np.where(uu >= vv, wu / np.where(uu > 0, uu, 1.0), 0.0)  # along the longer side of a sliver
+    second = np.where(uu >= vv, 0.0, wv / np.where(vv > 0, vv, 1.0))
+    s = np.where(flat, first, (vv * wu - uv * wv) / area)
+    t = np.where(flat, second, (uu * wv - uv * wu) / area)
+    return np.stack([1 - s - t, s, t], axis=1)

@@ -1,0 +1,195 @@
+"""Bands on disk: computed tile by tile by threads, processes or a Dask cluster, so that stopped runs can go on.
+
+A folder holds what tiles are computed from, values and confidence of all blocks in files that are mapped, and for each
+tile whether it is done. Workers write rows of their own: a tile needs nothing of its neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Protocol, TypeAlias
+
+import numpy as np
+from numpy.lib.format import open_memmap
+from numpy.typing import NDArray
+
+from ..cache import fingerprint
+from ..diagnostics import Note
+from ..domains.grid import Grid
+from ..errors import FileFormatError, SignedHeatError
+from ..geometry.face_features import FaceFeatures
+from ..geometry.face_tree import FaceTree
+from ..operators.grid.blocks import SIDE, Blocks
+from ..packages import lazy_module
+from ..parallel import connected, n_threads
+from ..progress import Progress
+from .nodes import solved
+from .winding import Windings
+
+distributed = lazy_module("distributed", "Dask clusters")
+
+RETRIES = 3
+"""How often a tile is given to another worker of a cluster after one has died."""
+
+
+class ClusterClient(Protocol):
+    """What is used of a `distributed.Client`."""
+
+    def submit(self, function: Callable[..., object], /, *args: object, **options: object) -> Future[int]: ...
+
+
+Scheduler: TypeAlias = Executor | ClusterClient | str | None
+"""A pool, a cluster's client or its address; or threads of this process."""
+
+
+@dataclass(frozen=True)
+class TilesComputed(Note):
+    """A band was computed in tiles on disk.
+
+    Attributes
+    ----------
+    tiles, reused : int
+        How many there are, and how many were there already.
+    """
+
+    tiles: int
+    reused: int
+
+    def __str__(self) -> str:
+        return f"{self.tiles} tiles, of which {self.reused} were there already"
+
+
+def in_store(
+    folder: Path,
+    tree: FaceTree,
+    windings: Windings,
+    grid: Grid,
+    blocks: Blocks,
+    tiles: list[NDArray[np.int64]],
+    scheduler: Scheduler,
+    progress: Progress | None,
+) -> tuple[NDArray[np.float32], NDArray[np.float16], TilesComputed]:
+    """Values and confidence of blocks, mapped from files of a folder; rows of `tiles` that are done stay.
+
+    Raises
+    ------
+    FileFormatError
+        If the folder holds tiles of something else.
+    """
+    folder = folder.absolute()
+    plan: dict[str, NDArray[Any]] = {
+        "corners": tree.features.vertices[tree.features.faces],
+        "trusted": tree.features.trusted,
+        "origin": np.array(grid.origin),
+        "spacing": np.array(grid.spacing),
+        "shape": np.array(grid.shape),
+        "places": blocks.places,
+        "rows": np.concatenate(tiles),
+        "starts": np.cumsum([0, *map(len, tiles)]),
+        "weights": np.array(windings.weights),
+        **{f"closing_{at}": triangles for at, triangles in enumerate(windings.sets)},
+    }
+    key = fingerprint(*plan.values()).hex()
+    _begin(folder, key, plan, len(blocks), len(tiles))
+    missing = np.flatnonzero(np.load(folder / "done.npy") == 0).tolist()
+    for count, _ in enumerate(_computed(str(folder), key, missing, scheduler)):
+        if progress is not None:
+            progress((len(tiles) - len(missing) + count + 1) / len(tiles), "tiles")
+    values, confidence = (np.load(folder / f"{name}.npy", mmap_mode="c") for name in ("values", "confidence"))
+    return values, confidence, TilesComputed(len(tiles), len(tiles) - len(missing))
+
+
+def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int, n_tiles: int) -> None:
+    """Make the files of a folder, unless they are there."""
+    name = folder / "key.txt"
+    if name.exists():
+        if name.read_text() != key:
+            raise FileFormatError(
+                "the folder holds tiles of another solid, grid or band",
+                remedy="name another folder, or remove it",
+                path=folder,
+            )
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    np.savez(folder / "plan.npz", allow_pickle=False, **plan)
+    shape = (n_blocks, SIDE, SIDE, SIDE)
+    open_memmap(folder / "values.npy", mode="w+", dtype=np.float32, shape=shape).flush()
+    open_memmap(folder / "confidence.npy", mode="w+", dtype=np.float16, shape=shape).flush()
+    open_memmap(folder / "done.npy", mode="w+", dtype=np.uint8, shape=(n_tiles,)).flush()
+    name.write_text(key)  # last: a folder without it is begun anew
+
+
+@lru_cache(maxsize=1)
+def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, NDArray[np.int64]]]:
+    """What the tiles of a folder are computed from; once in each process."""
+    with np.load(Path(folder) / "plan.npz", allow_pickle=False) as file:
+        plan = dict(file)
+    corners = plan["corners"]
+    features = FaceFeatures.of(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), plan["trusted"])
+    sets = tuple(plan[f"closing_{at}"] for at in range(len(plan["weights"])))
+    windings = Windings(sets, tuple(plan["weights"].tolist()))
+    return FaceTree.of(features), windings, Grid(plan["origin"], plan["spacing"], plan["shape"]), plan
+
+
+def solve_into(folder: str, key: str, number: int) -> int:
+    """Compute a tile of a folder, write it and note that it is done; returns its number."""
+    tree, windings, grid, plan = _plan(folder, key)
+    rows = plan["rows"][plan["starts"][number] : plan["starts"][number + 1]]
+    arrays = solved(tree, windings, grid, plan["places"][rows].astype(np.int64))
+    for name, part in zip(("values", "confidence"), arrays, strict=True):
+        file = open_memmap(Path(folder) / f"{name}.npy", mode="r+")
+        file[rows] = part
+        file.flush()
+    done = open_memmap(Path(folder) / "done.npy", mode="r+")
+    done[number] = 1
+    done.flush()
+    return number
+
+
+def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -> Iterator[int]:
+    """Numbers of tiles, as they are done."""
+    if not missing:
+        return
+    if scheduler is None:
+        _plan(folder, key)
+        with ThreadPoolExecutor(n_threads()) as pool:
+            yield from _on_pool(folder, key, missing, pool)
+    elif isinstance(scheduler, Executor):
+        yield from _on_pool(folder, key, missing, scheduler)
+    elif isinstance(scheduler, str):
+        with connected(scheduler) as client:
+            yield from _on_cluster(folder, key, missing, client)
+    else:
+        yield from _on_cluster(folder, key, missing, scheduler)
+
+
+def _on_pool(folder: str, key: str, missing: list[int], pool: Executor) -> Iterator[int]:
+    jobs = [pool.submit(solve_into, folder, key, number) for number in missing]
+    try:
+        for job in as_completed(jobs):
+            yield job.result()
+    except BrokenProcessPool as error:
+        raise SignedHeatError(
+            "a process of the pool died",
+            remedy="give it more memory, or start it under if __name__ == '__main__'; run again: what is done stays",
+            path=folder,
+        ) from error
+    finally:
+        for job in jobs:
+            job.cancel()
+
+
+def _on_cluster(folder: str, key: str, missing: list[int], client: ClusterClient) -> Iterator[int]:
+    """Tiles that have the same input are different work: `pure` would let the cluster think that they are done."""
+    jobs = [client.submit(solve_into, folder, key, number, pure=False, retries=RETRIES) for number in missing]
+    try:
+        for job in distributed.as_completed(jobs):
+            yield job.result()
+    finally:
+        for job in jobs:
+            job.cancel()

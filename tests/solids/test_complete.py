@@ -1,0 +1,214 @@
+"""What a broken shape is completed to: closed forms, and what must not matter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from signedheat import samples
+
+
+def grid_sheet(origin, one, other, n=8):
+    """A square of 2 n² triangles that faces along ``one × other``."""
+    at = np.linspace(0, 1, n + 1)
+    vertices = np.add(origin, np.add.outer(at, 0 * at)[..., None] * one + np.add.outer(0 * at, at)[..., None] * other)
+    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    faces = np.concatenate(
+        [np.c_[first, first + n + 1, first + n + 2], np.c_[first, first + n + 2, first + 1]],
+    )
+    return vertices.reshape(-1, 3), faces
+
+
+def joined(*meshes):
+    starts = np.cumsum([0, *(len(v) for v, _ in meshes)])
+    return np.concatenate([v for v, _ in meshes]), np.concatenate(
+        [f + s for (_, f), s in zip(meshes, starts, strict=False)]
+    )
+
+
+def box(size=(1.0, 1.0, 1.0), origin=(0.0, 0.0, 0.0), without=(), n=8):
+    """A box whose sides −x, +x, −y, +y, −z, +z may be missing."""
+    o, (x, y, z) = np.array(origin, dtype=float), np.diag(size)
+    sides = [(o, z, y), (o + x, y, z), (o, x, z), (o + y, z, x), (o, y, x), (o + z, x, y)]
+    return joined(*[grid_sheet(*side, n) for k, side in enumerate(sides) if k not in without])
+
+
+def volume(solid):
+    """What the faces and the completion enclose, by the divergence theorem."""
+    a, b, c = np.concatenate(solid.windings.sets).transpose(1, 0, 2)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def ball():
+    mesh = samples.sphere(4)
+    return np.array(mesh.vertices), np.array(mesh.faces)
+
+
+@pytest.mark.parametrize("without", [(5,), (0, 1), (2, 3)])
+def test_sides_of_a_box_close_flat(without):
+    solid = sh.complete(box((1.0, 2.0, 0.5), without=without))
+    assert volume(solid) == pytest.approx(1.0, rel=1e-9)
+    assert solid.completion.face_areas.sum() == pytest.approx({(5,): 2.0, (0, 1): 2.0, (2, 3): 1.0}[without], rel=1e-9)
+    np.testing.assert_allclose(solid.distance([[0.5, 1.0, 0.25], [0.5, 1.0, 1.5]]), [-0.25, 1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("height", [0.3, 0.03, 0.003])
+def test_a_tray_is_a_solid_however_low_its_walls_are(height):
+    solid = sh.complete(box((1.0, 1.0, height), without=(5,)))
+    assert volume(solid) == pytest.approx(height, rel=1e-9)
+
+
+def test_lids_of_a_ball_go_on_as_the_ball_bends():
+    vertices, faces = ball()
+    centres = vertices[faces].mean(axis=1)
+    for least, error in ((0.9, 0.005), (0.5, 0.03), (0.0, 0.25)):
+        solid = sh.complete((vertices, faces[centres[:, 2] < least]))
+        assert volume(solid) == pytest.approx(4 / 3 * np.pi, rel=error)
+
+
+def test_what_is_gone_of_a_ball_shrinks_it_and_never_lets_it_jump():
+    vertices, faces = ball()
+    heights = vertices[faces].mean(axis=1)[:, 2]
+    volumes = [volume(sh.complete((vertices, faces[heights < z]))) for z in np.linspace(0.95, 0.0, 20)]
+    assert np.abs(np.diff(volumes)).max() < 0.06 * volumes[0]
+
+
+@pytest.mark.parametrize("share", [0.3, 0.75])
+def test_faces_missing_at_random_leave_the_ball(share):
+    vertices, faces = ball()
+    kept = faces[np.random.default_rng(1).random(len(faces)) > share]
+    solid = sh.complete((vertices, kept))
+    points = np.random.default_rng(2).uniform(-1.4, 1.4, (4000, 3))
+    radius = np.linalg.norm(points, axis=1)
+    clear = np.abs(radius - 1) > 0.05
+    assert (solid.inside(points[clear]) == (radius[clear] < 1)).all()
+
+
+def test_sheets_bound_nothing_and_keep_their_distance():
+    flat = grid_sheet((-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    wavy = flat[0] + [0, 0, 1] * np.sin(6 * flat[0][:, :1]) * 0.2, flat[1]
+    for sheet in (flat, wavy, joined(flat, (flat[0] + [0, 0, 0.5], flat[1]))):
+        solid = sh.complete(sheet)
+        points = np.random.default_rng(0).uniform(-2, 2, (500, 3))
+        assert not solid.inside(points).any()
+        assert any(type(note).__name__ == "BoundsNothing" for note in solid.diagnostics.notes)
+    assert sh.complete(flat).distance([[0, 0, -0.3]])[0] == pytest.approx(0.3)
+
+
+def test_a_body_beside_a_sheet_is_completed_as_if_alone():
+    ground = grid_sheet((-5, -5, 0), (10, 0, 0), (0, 10, 0))
+    hut = box((1.0, 1.0, 1.0), without=(4,))
+    points = np.random.default_rng(0).uniform((-0.5, -0.5, 0.01), 1.5, (2000, 3))
+    both, alone = sh.complete(joined(ground, hut)), sh.complete(hut)
+    assert (both.inside(points) == alone.inside(points)).all()
+    assert alone.inside(points).any()
+
+
+def test_scale_is_local():
+    """Balls of very different sizes in one scene, each without a cap."""
+    rng = np.random.default_rng(0)
+    vertices, faces = ball()
+    faces = faces[vertices[faces].mean(axis=1)[:, 2] < 0.7]
+    radii = np.array([1.0, 0.3, 0.1, 0.03, 0.01])
+    centres = np.c_[np.arange(5) * 2.5, np.zeros((5, 2))]
+    solid = sh.complete(joined(*[(vertices * r + c, faces) for r, c in zip(radii, centres, strict=True)]))
+    alone = sh.complete((vertices, faces))
+    points = rng.uniform(-1.2, 1.2, (2000, 3))
+    for r, c in zip(radii, centres, strict=True):
+        assert np.mean(solid.inside(points * r + c) != alone.inside(points)) < 2e-3
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-9, -1e-9, 1e-6, 1e-3, 0.3])
+def test_boxes_that_overlap_by_any_depth_are_one(shift):
+    solid = sh.complete(joined(box(n=2), box(origin=(1.0 - shift, 0.0, 0.0), n=3)))
+    points = np.random.default_rng(0).uniform(-0.5, 2.5, (2000, 3))
+    whole = sh.complete(box((2.0 - shift, 1.0, 1.0), n=1))
+    np.testing.assert_allclose(solid.distance(points), whole.distance(points), atol=2e-5)
+
+
+def test_balls_that_overlap_are_cut_where_they_meet():
+    one, other = ball(), ball()
+    solid = sh.complete(joined(one, (other[0] + [1.0, 0, 0], other[1])))
+    exact = 2 * 2 * np.pi * (1 + 0.5)  # two caps of height 1 + ½
+    assert solid.faces.face_areas.sum() == pytest.approx(exact, rel=3e-3)
+    places = solid.closest([[0.5, 0.0, 0.0]])
+    assert places.distances[0] == pytest.approx(-np.sqrt(0.75), abs=3e-3)
+
+
+def test_closed_shapes_are_their_faces():
+    for mesh in (samples.sphere(3), samples.torus(), samples.torus(1.0, 0.1)):
+        solid = sh.complete(mesh)
+        assert len(solid.triangles) == mesh.n_faces
+        assert (np.sort(solid.origins) == np.arange(mesh.n_faces)).all()
+        assert (solid.confidence == 1).all()
+
+
+SHIFT = np.array([30.0, -20.0, 10.0])
+
+
+def moved(name, vertices, faces):
+    """The same shape in other words, and how points go along."""
+    rng = np.random.default_rng(5)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    order = rng.permutation(len(vertices))
+    return {
+        "turned": (vertices @ turn.T, faces, lambda p: p @ turn.T),
+        "shifted": (vertices + SHIFT, faces, lambda p: p + SHIFT),
+        "scaled": (1e-3 * vertices, faces, lambda p: 1e-3 * p),
+        "reordered": (vertices[order], np.roll(np.argsort(order)[faces][::-1], 1, axis=1), lambda p: p),
+        "rounded": (vertices + rng.normal(size=vertices.shape) * 1e-15, faces, lambda p: p),
+    }[name]
+
+
+@pytest.mark.parametrize("name", ["turned", "shifted", "scaled", "reordered", "rounded"])
+def test_what_is_inside_does_not_depend_on_how_the_shape_is_given(name):
+    vertices, faces = ball()
+    centres = vertices[faces].mean(axis=1)
+    shapes = [
+        box(without=(1, 5)),
+        (vertices, faces[centres[:, 2] < 0.3]),
+        (vertices, faces[centres[:, 0] * 2 < centres[:, 2]]),
+    ]
+    points = np.random.default_rng(0).uniform(-1.2, 1.4, (4000, 3))
+    for v, f in shapes:
+        w, g, along = moved(name, v, f)
+        assert np.mean(sh.complete((w, g)).inside(along(points)) != sh.complete((v, f)).inside(points)) < 4e-3
+
+
+def test_points_with_normals_and_noisy_soups_are_completed_by_heat():
+    points = np.random.default_rng(0).uniform(-1.5, 1.5, (3000, 3))
+    truth = np.linalg.norm(points, axis=1) - 1
+    cloud = samples.oriented_points(samples.sphere(4), 3000)
+    soup = samples.soup(samples.sphere(3), 0.02)
+    for shape, error in ((cloud, 0.005), (soup, 0.02)):
+        solid = sh.complete(shape)
+        assert np.sqrt(np.mean((solid.distance(points) - truth) ** 2)) < error
+        assert (solid.origins == -1).all()
+
+
+def test_the_completion_of_the_paper_is_one_word_away():
+    mesh = samples.without_patches(samples.sphere(4), 3, 0.4)
+    lids, heat = sh.complete(mesh), sh.complete(mesh, completion="heat")
+    points = np.random.default_rng(0).uniform(-1.5, 1.5, (3000, 3))
+    assert np.abs(lids.distance(points) - heat.distance(points)).max() < 0.1
+    assert len(heat.completion.faces)
+
+
+def test_closest_names_faces_of_the_shape_and_places_in_them():
+    mesh = samples.without_patches(samples.sphere(3), 1, 0.6)
+    solid = sh.complete(mesh)
+    points = np.random.default_rng(0).normal(size=(500, 3))
+    found = solid.closest(points)
+    given = found.faces >= 0
+    assert given.any() and not given.all()
+    corners = np.array(mesh.vertices)[np.array(mesh.faces)[found.faces[given]]]
+    np.testing.assert_allclose(
+        np.einsum("nk,nkd->nd", found.barycentric[given], corners), found.points[given], atol=1e-9
+    )
+    np.testing.assert_allclose(np.linalg.norm(points - found.points, axis=1), np.abs(found.distances), atol=1e-9)
+    assert np.isnan(found.barycentric[~given]).all()
+    assert (found.confidence[given] == 1).all() and (found.confidence[~given] < 1).all()
+    step = 1e-6 * found.gradients
+    np.testing.assert_allclose(solid.distance(points + step), found.distances + 1e-6, atol=1e-8)
