@@ -73,10 +73,10 @@ def curve_on(surface: sh.PolygonMesh | sh.PointCloud | sh.DigitalSurface) -> sh.
     return surface.path([0, 1])
 
 
-def banded() -> sh.BandField:
+def banded() -> sh.GridField:
     """A band after use: its trees are there."""
     band = sh.solid_distance(samples.without_patches(samples.sphere(2), 2, 0.2), resolution=24, band=0.3)
-    assert band.offset(0.1).n_faces and band.closest_points([[1.2, 0.0, 0.0]]).distances.shape == (1,)
+    assert band.offset(0.1).n_faces and band.closest([[1.2, 0.0, 0.0]]).distances.shape == (1,)
     return band
 
 
@@ -125,6 +125,8 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "solid": lambda: sh.solid_distance(BALL, resolution=16),
     "piecewise field": lambda: sh.piecewise_distance(BALL, BALL.path([0, 5])),
     "orientation": lambda: sh.orientation(BALL),
+    "completed solid": lambda: sh.complete(samples.without_patches(samples.sphere(2), 2, 0.2)),
+    "closest": lambda: sh.complete(samples.sphere(2)).closest([[0.5, 0.0, 0.0]]),
     "band": lambda: banded(),
     "samples": lambda: sh.sample(sh.solid_distance(BALL, resolution=16), 20),
     "curve orientation": lambda: sh.curve_orientation(RING, BALL),

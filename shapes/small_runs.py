@@ -21,11 +21,13 @@ def runs() -> dict[str, np.ndarray]:
     grid = sh.signed_distance(broken, resolution=9)
     found["grid"] = grid.values
     found["sharpened grid"] = sh.sharpen(grid).values
-    found["grid sharpened to its shape"] = sh.sharpen(grid, broken).values
+    found["solid on a grid"] = sh.complete(broken).field(grid=grid.grid).values
     curve = ball.polyline([[1.0, 0.1, 0.2], [0.0, 1.0, -0.1], [-1.0, 0.0, 0.3]])
     surface = sh.SignedHeatSolver(ball).distance(curve)
     found["surface"] = surface.values
     found["sharpened surface"] = sh.sharpen(surface).values
+    lines = [*sh.close_curves(ball, curve), *ball.level_set(ball.vertices[:, 2]), *surface.contour(0.1)]
+    found["lines"] = np.array([line.n_points for line in lines])
     found["refined"] = np.sort(sh.intrinsic_delaunay(ball, refine=True).triangles.edge_lengths, axis=None)
     found["points"] = sh.SignedHeatSolver(sh.PointCloud(ball.vertices)).distance(ball.points_at(3)).values
     tets = sh.tetrahedralize(broken, resolution=5)

@@ -143,7 +143,27 @@ def test_level_sets_through_vertices_and_of_ties():
     peak = np.where(np.arange(81) == 40, 1.0, 0.0)
     assert mesh.level_set(peak, 1.0) == []
     holed = np.where(np.arange(81) == 40, np.nan, mesh.vertices[:, 0])
-    assert sum(c.n_segments for c in mesh.level_set(holed, 0.01)) < curve.n_segments
+    (beside,) = mesh.level_set(mesh.vertices[:, 0], 0.01)
+    assert sum(c.n_segments for c in mesh.level_set(holed, 0.01)) < beside.n_segments
+
+
+@pytest.mark.parametrize("intrinsic", [False, True])
+def test_rounding_changes_no_number_of_points(intrinsic):
+    """Lines through vertices and along edges, of values and places that are off by rounding."""
+    flat = square(9)
+    values, random = flat.vertices[:, 0], np.random.default_rng(0)
+    domain = sh.intrinsic_delaunay(flat) if intrinsic else flat
+    for level in (0.0, 0.25, 0.1):
+        (expected,) = domain.level_set(values, level)
+        for _ in range(20):
+            (found,) = domain.level_set(values + 1e-16 * random.normal(size=len(values)), level)
+            assert found.n_points == expected.n_points
+    strokes = [[[-1, 0.1, 0], [-0.4, 0.1, 0]], [[0.4, 0.1, 0], [1, 0.1, 0]]]
+    completed = set()
+    for _ in range(5):
+        moved = sh.TriangleMesh(flat.vertices + 1e-16 * random.normal(size=flat.vertices.shape), flat.faces)
+        completed.add(sh.close_curves(moved, [moved.polyline(stroke) for stroke in strokes])[0].n_points)
+    assert len(completed) == 1
 
 
 def test_level_sets_boundaries_and_paths_survive_faces_turned_over():

@@ -13,6 +13,7 @@ from shapes.degenerate_meshes import with_caps, with_needles
 from shapes.surface_cases import sphere, square
 from shapes.tet_cases import boxes
 from signedheat import samples
+from signedheat.solids.complete import complete
 
 BALL = samples.sphere(1)
 BOW_TIE = [[0, 1, 2], [0, 3, 4]]
@@ -265,3 +266,39 @@ def test_flags_are_refused_in_one_line(name, value):
     with refused(sh.SignedHeatError, name) as caught:
         mesh.polyline(mesh.vertices[:3], **{name: value})
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("scale", [1e-30, 1e-15, 1e15, 1e30, 3.4e38])
+@pytest.mark.parametrize("whole", [True, False])
+def test_solids_of_any_size_are_the_same_or_refused(scale, whole):
+    """Squares in single precision left its range: wrong distances, and at last a crash."""
+    ball = sphere(2)
+    faces = ball.faces if whole else ball.faces[np.arange(ball.n_faces) % 7 > 0]
+    one = sh.solid_distance(sh.TriangleMesh(ball.vertices, faces), resolution=16)
+    try:
+        other = sh.solid_distance(sh.TriangleMesh(scale * ball.vertices, faces), resolution=16)
+    except sh.GeometryError as error:
+        assert error.remedy and not 1e-15 <= scale <= 1e15
+    else:
+        np.testing.assert_allclose(other.values / scale, one.values, atol=1e-3)
+
+
+@pytest.mark.parametrize("size", [1e-30, 1.0, 1e20])
+@pytest.mark.parametrize("times", [10.0, 1e6, 1e9, 1e15, 1e19])
+def test_the_nearest_place_is_right_however_far_a_point_is(size, times):
+    ball = sphere(2)
+    ways = np.random.default_rng(0).normal(size=(30, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    closest = complete(sh.TriangleMesh(size * ball.vertices, ball.faces)).closest(size * times * ways)
+    np.testing.assert_allclose(np.linalg.norm(closest.points, axis=1) / size, 1, atol=0.1)
+    farthest = (ways @ ball.vertices.T).max(axis=1)
+    np.testing.assert_allclose((closest.points * ways).sum(axis=1) / size, farthest, atol=1e-6 + 0.01 / times)
+    np.testing.assert_allclose(closest.distances / size, times - farthest, rtol=1e-2 if times < 100 else 1e-6)
+
+
+def test_points_whose_squares_cannot_be_computed_are_refused():
+    ball = sphere(2)
+    field = sh.solid_distance(ball, resolution=12)
+    for measure in (complete(ball).closest, complete(ball).distance, field.closest):
+        with pytest.raises(sh.GeometryError):
+            measure([[1e160, 0.0, 0.0]])

@@ -153,7 +153,7 @@ def test_bad_triangles_do_not_matter_any_more(stretch):
     plain = error(mesh, sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, constraint=sh.Free()))
     robust = sh.SignedHeatSolver(mesh, intrinsic=True).distance(curve)
     assert robust.domain is mesh and robust.values.shape == (mesh.n_vertices,)
-    assert "28°" in str(robust.diagnostics.note(IntrinsicTriangles))
+    assert robust.diagnostics.note(IntrinsicTriangles) is not None
     assert error(mesh, robust) < 2e-3
     assert error(mesh, robust) < 0.05 * plain
     usual = sh.SignedHeatSolver(mesh).distance(curve)

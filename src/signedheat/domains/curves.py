@@ -19,8 +19,8 @@ class Curve(Frozen):
     """A polyline on a surface; φ > 0 to its left if it is oriented.
 
     Left is the direction of the curve turned by 90° counter-clockwise, as seen with the face normal towards you. For a
-    segment along an edge it is left in the first face at that edge. Where faces are not consistently oriented, the face
-    of the first segment tells, and that side is kept along the curve. Points on an edge or at a vertex are recognised
+    segment along an edge it is left in the first face at that edge. Where faces are not consistently oriented, those
+    of most of the curve tell, and that side is kept along it. Points on an edge or at a vertex are recognised
     as such whichever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive points
     that share no face are joined by a geodesic path; consecutive points may coincide.
 
@@ -159,6 +159,10 @@ CurveOrPoints: TypeAlias = Curve | SurfacePoints
 
 CurvesAndPoints: TypeAlias = CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
 """One source or several; curves and points in a sequence of their own count as one."""
+
+
+ElementList: TypeAlias = Sequence[tuple[int, Sequence[float]]]
+"""A curve in the format of potpourri3d: vertices (id, []), edges (id, [t]) and faces (id, [u, v]) in order."""
 
 
 def surface_points(

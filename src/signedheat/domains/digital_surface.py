@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..geometry.surfels import Surfels, boundary_surfels, corrected_normals
 from ..operators.surfel_smoothing import smoothed_corners
-from .display import Displayed, to_pyvista
+from .display import Displayed
 from .polygon_mesh import PolygonMesh
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
@@ -149,8 +149,7 @@ class DigitalSurface(Displayed, Surface):
 
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData`: the faces of the voxels."""
-        made: pyvista.PolyData = to_pyvista(self)
-        return made
+        return self.squares.to_pyvista()
 
     def __repr__(self) -> str:
         return f"DigitalSurface({' × '.join(map(str, self.volume.shape))} voxels, radius={self.radius:.3g})"

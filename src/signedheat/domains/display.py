@@ -1,22 +1,31 @@
-"""What shapes and fields look like in a notebook, in a window of PyVista, and in Polyscope."""
+"""What shapes and fields look like in a notebook, and in a window of PyVista."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..slots import Slot
 
 if TYPE_CHECKING:
     import pyvista
 
-to_pyvista: Slot[[object], Any] = Slot("to_pyvista")
-"""An object of PyVista that holds a domain or a field."""
 html_of: Slot[[object], str] = Slot("html_of")
 """HTML with a small picture of a shape or a field."""
 plotter_of: Slot[[object], Any] = Slot("plotter_of")
 """A `pyvista.Plotter` in which a shape or a field is drawn."""
-register_in_polyscope: Slot[[object, str], object] = Slot("register_in_polyscope")
-"""Arguments: a shape or a field, a name. Returns the structure of Polyscope."""
+
+NAME = "signed_distance"
+"""Of the values of a field, in objects of PyVista and in files."""
+
+
+def with_values(thing: Any, values: NDArray[np.floating]) -> Any:
+    """An object of PyVista with the values of a field at its points."""
+    thing.point_data[NAME] = np.array(values)
+    thing.set_active_scalars(NAME)
+    return thing
 
 
 class Displayed:
@@ -31,7 +40,7 @@ class Displayed:
         Raises
         ------
         MissingPackageError
-            If PyVista is not installed (``pip install signedheat[plot]``).
+            If PyVista is not installed (``pip install pyvista``).
         """
         plotter: pyvista.Plotter = plotter_of(self)
         return plotter
@@ -47,31 +56,9 @@ class Displayed:
         Raises
         ------
         MissingPackageError
-            If PyVista is not installed (``pip install signedheat[plot]``).
+            If PyVista is not installed (``pip install pyvista``).
         """
         return self.plotter().show()
-
-    def to_polyscope(self, name: str = "signedheat") -> object:
-        """Register this with Polyscope, which has to be initialised; ``polyscope.show()`` then shows it.
-
-        Parameters
-        ----------
-        name : str
-            What Polyscope calls it. The values of a field are a scalar quantity ``signed distance``.
-
-        Returns
-        -------
-        object
-            The structure of Polyscope, for further settings.
-
-        Raises
-        ------
-        MissingPackageError
-            If Polyscope is not installed (``pip install polyscope``).
-        UnsupportedTypeError
-            If Polyscope has no structure of this kind, such as for fields in the plane.
-        """
-        return register_in_polyscope(self, name)
 
     def _repr_html_(self) -> str:
         return html_of(self)

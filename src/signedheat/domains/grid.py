@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, MemoryLimitError
 from ..frozen import Frozen
+from ..packages import lazy_module
 from ..reprs import short
-from .display import Displayed, to_pyvista
+from .display import Displayed
 from .foreign import ForeignShape, Shape, converted
 from .polyline import Polyline
 from .validation import (
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 else:
     from typing import TypeVar
 
+    pyvista = lazy_module("pyvista", "objects of PyVista")
     Dimension = TypeVar("Dimension", bound=int, covariant=True)
 
 
@@ -213,8 +215,19 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
 
     def to_pyvista(self) -> pyvista.ImageData:
         """As a `pyvista.ImageData`, with boolean point data ``solid`` if nodes are; a grid in the plane has z = 0."""
-        made: pyvista.ImageData = to_pyvista(self)
-        return made
+        if self.dimension not in (2, 3):
+            raise GeometryError(
+                f"PyVista has grids in the plane and in space, and this one has {self.dimension} axes",
+                remedy="take two or three of its axes",
+                element="grid",
+            )
+        flat = (0,) * (3 - self.dimension)
+        image = pyvista.ImageData(
+            dimensions=(*self.shape, *(1 for _ in flat)), spacing=(*self.spacing, *flat), origin=(*self.origin, *flat)
+        )
+        if self.mask is not None:
+            image.point_data["solid"] = self.mask.ravel(order="F")
+        return image
 
     def __repr__(self) -> str:
         solid = "" if self.mask is None else f", {int(self.mask.sum())} solid nodes"

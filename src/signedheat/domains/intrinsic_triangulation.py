@@ -29,9 +29,9 @@ from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.mollification import MARGIN, laid_out
 from ..progress import Progress, Stopwatch
 from .curves import Curve, CurveOrPoints, CurvesAndPoints
-from .display import Displayed, to_pyvista
+from .display import Displayed
 from .foreign import ForeignShape, converted
-from .level_sets import is_consistent, level_set
+from .level_sets import is_consistent, level_set, without_repeats
 from .segments import segments_of, segments_of_each
 from .triangle_mesh import TriangleMesh
 from .validation import finite_rows, frozen
@@ -211,7 +211,8 @@ class IntrinsicTriangulation(Displayed, Frozen):
         if not is_consistent(self.mesh):
             return level_set(self.mesh, values[: self.mesh.n_vertices], level)
         lines = level_lines(self.history, self.refinement, values - level)
-        return [Curve(faces, np.maximum(weights, 0.0), closed=closed) for faces, weights, closed in lines]
+        curves = [Curve(faces, np.maximum(weights, 0.0), closed=closed) for faces, weights, closed in lines]
+        return without_repeats(self.mesh, curves)
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the vertices of the triangles, from values at the vertices of the domain: the same."""
@@ -240,8 +241,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
 
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData` of the mesh."""
-        made: pyvista.PolyData = to_pyvista(self)
-        return made
+        return self.mesh.to_pyvista()
 
     def __repr__(self) -> str:
         return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"

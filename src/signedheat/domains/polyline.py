@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..frozen import Frozen
 from ..geometry.marching import level_lines
-from .display import Displayed, to_pyvista
+from ..packages import lazy_module
+from .display import Displayed
 from .validation import boolean, coordinates, flag, numbers, positive_steps
 
 if TYPE_CHECKING:
     import pyvista
+else:
+    pyvista = lazy_module("pyvista", "objects of PyVista")
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +140,8 @@ class Polyline(Displayed, Frozen):
 
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData`, a line with z = 0."""
-        made: pyvista.PolyData = to_pyvista(self)
+        points = np.column_stack([self.points, np.zeros(self.n_points)])
+        made: pyvista.PolyData = pyvista.lines_from_points(points, close=self.closed)
         return made
 
     def __repr__(self) -> str:

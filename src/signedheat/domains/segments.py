@@ -117,7 +117,7 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
     ahead = np.sign((np.conj(of_edge) * steps).real) * forward
     vectors = np.where(along, 1j * ahead * np.abs(steps), vectors)
     if source.normals is None and not triangles.is_consistently_oriented:
-        vectors = vectors * carried_left(triangles, faces, edges)
+        vectors = vectors * carried_left(triangles, faces, edges, np.abs(steps))
     elif source.normals is not None and source.oriented:
         if positions is None:
             raise SourceError(

@@ -82,6 +82,32 @@ class Surface(Frozen):
         """
         return SurfacePoints(*self._at_vertices(vertices, "point"))
 
+    def positions(self, points: Curve | SurfacePoints) -> NDArray[np.float64]:
+        """(n, 3) positions in space of the points of a curve, or of isolated points.
+
+        Raises
+        ------
+        SourceError
+            If one lies in a face that does not exist.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> mesh.positions(mesh.level_set([0.0, 1.0, 1.0], 0.5)[0]).tolist()
+        [[0.0, 0.5, 0.0], [0.5, 0.0, 0.0]]
+        """
+        triangles = self.triangulation
+        wrong = np.flatnonzero((points.faces < 0) | (points.faces >= triangles.n_faces))
+        if len(wrong):
+            raise SourceError(
+                f"point {wrong[0]} lies in face {points.faces[wrong[0]]}, and there are {triangles.n_faces}",
+                element=f"point {wrong[0]}",
+            )
+        corners = triangles.vertices[triangles.faces[points.faces]]
+        result: NDArray[np.float64] = np.einsum("nk,nkd->nd", points.barycentric, corners)
+        return result
+
     def polyline(
         self, points: ArrayLike, closed: bool = False, oriented: bool = True, max_distance: float | None = None
     ) -> Curve:

@@ -18,6 +18,8 @@ LARGEST = 1e40
 """Of coordinates. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
 SMALLEST = 1e-40
 """Of the extent of a shape."""
+SINGLE = 1e-16, 1e17
+"""Least step and greatest extent of grids on which squares of lengths are computed with single precision."""
 LEAST_STEP = 1e-13
 """Of spacings, relative to coordinates: less would leave nodes few digits apart."""
 _MOST = 2**63
@@ -128,6 +130,32 @@ def refuse_extreme(
             remedy="scale and move the shape, for instance to a size of 1 around the origin",
             element=name,
         )
+
+
+def refuse_beyond_single(steps: NDArray[np.float64], extent: NDArray[np.float64]) -> None:
+    """Refuse a grid on which squares of lengths leave the range of single precision."""
+    least, greatest = SINGLE
+    if steps.min() < least or extent.max() > greatest:
+        raise GeometryError(
+            f"a grid of spacing {steps.min():.3g} over {extent.max():.3g} is beyond what single precision holds",
+            remedy="scale the shape, for instance to a size of 1",
+            element="grid",
+        )
+
+
+def query_points(values: object, columns: int) -> NDArray[np.float64]:
+    """`values` as an array of shape (n, columns), or (columns,), of finite positions within `LARGEST`."""
+    points = contiguous(values, "points")
+    if points.shape[-1:] != (columns,) or not np.isfinite(points).all():
+        raise GeometryError(f"points must be finite, with {columns} coordinates each", element="points")
+    farthest = float(np.abs(points).max(initial=0.0))
+    if farthest > LARGEST:
+        raise GeometryError(
+            f"points reach as far as {farthest:.3g}: the squares of such lengths cannot be computed with",
+            remedy=f"ask at points up to {LARGEST:g}",
+            element="points",
+        )
+    return points
 
 
 def refuse_lost_spacing(steps: NDArray[np.float64], first: NDArray[np.float64], last: NDArray[np.float64]) -> None:

@@ -1,0 +1,281 @@
+"""Which way strokes run, and which of them bound something: the directions of least energy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..domains.curves import Curve, CurveOrPoints
+from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..geometry.components import connected_components
+from ..geometry.curve_segments import CurveSegments, interpolation_at
+from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.synchronization import best_signs, nested_groups
+from ..lowering.surface.discretization import SurfaceDiscretization
+from .strokes import REWARD, Inside, Strokes
+
+AS_GIVEN = 0.5
+"""What turning a stroke costs, beside its length."""
+WEAKLY = 0.01
+"""The same if sides are smooth, beside the energy of a stroke of mean length."""
+UNDECIDED = 0.1
+"""How far a stroke must be explained to be turned by the sides that it lies between."""
+MOST = 0.5
+"""Share of the length of all strokes that bounds nothing where none is left out."""
+EXPLAINED = 0.5
+"""How far a stroke is explained that bounds the inside."""
+STINGY, GENEROUS = 0.7, 1.6
+"""Rewards with which strokes are not explained that otherwise hardly are, and are that otherwise are not."""
+ROUNDS = 20
+"""Most cuts until the directions agree with the sides."""
+GROUPS = 8
+"""Groups of strokes, the longest first, that are turned together."""
+SINGLY = 16
+"""Strokes, the longest first, that are turned one by one where they explain nothing."""
+
+
+FEW = 0.3
+"""Share of the length of all strokes below which whole loops are turned without doubt."""
+NEARLY = 0.06
+"""Cost, beside the length of all strokes, by which a rival may be dearer that is nearly as good."""
+OTHERWISE = 0.03
+"""Share of the area on whose side two ways differ that are not the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Oriented curves on a surface, of which those may be turned that have ends in it.
+
+    Attributes
+    ----------
+    numbers : (k,) int
+        Which of the curves given are oriented.
+    movable : (k,) bool
+        Whether each is a piece: open, and not from boundary to boundary of the surface.
+    strokes : Strokes
+        What they tell.
+    """
+
+    numbers: NDArray[np.int64]
+    movable: NDArray[np.bool_]
+    strokes: Strokes
+
+    @classmethod
+    def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Pieces | None:
+        """The pieces; None if there are none, or no other curves that tell about the one that there is."""
+        listed = {k: c for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented}
+        parts = [part for (part,) in surface.segments([[curve] for curve in listed.values()])]
+        movable = np.array([is_piece(surface.triangles, c, p) for c, p in zip(listed.values(), parts, strict=True)])
+        if len(parts) < 2 or not movable.any():
+            return None
+        return cls(np.array(list(listed), dtype=np.int64), movable, Strokes.of(surface, parts, drawn_edge(surface)))
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """The directions of the pieces of curves.
+
+    Attributes
+    ----------
+    pieces : Pieces
+        The curves.
+    best : Inside
+        The best directions that were found, and what is inside then.
+    rivals : list of Inside
+        Others.
+    """
+
+    pieces: Pieces
+    best: Inside
+    rivals: list[Inside]
+
+    def turned(self, n: int) -> NDArray[np.bool_]:
+        """(n,) which of all curves given are turned."""
+        result = np.zeros(n, dtype=bool)
+        result[self.pieces.numbers] = self.best.signs < 0
+        return result
+
+    @property
+    def loose(self) -> NDArray[np.int64]:
+        """Numbers of the pieces that bound nothing, where others do."""
+        movable, explained = self.pieces.movable, self.best.explained >= EXPLAINED
+        return self.pieces.numbers[movable & ~explained & (movable & explained).any()]
+
+    @property
+    def bounds_nothing(self) -> bool:
+        """Whether most of the length bounds nothing."""
+        return mostly_loose(self.pieces.strokes, self.best)
+
+    @property
+    def all_bound(self) -> bool:
+        """Whether every stroke that is not left out bounds the inside."""
+        kept = ~np.isin(self.pieces.numbers, self.loose)
+        return not self.bounds_nothing and bool((self.best.explained[kept] >= EXPLAINED).all())
+
+    def turned_loops(self) -> NDArray[np.int64]:
+        """Numbers of the pieces that are turned against most of the length of their own loop.
+
+        None if they are few, or if there are complete curves that tell how the others face.
+        """
+        strokes, best = self.pieces.strokes, self.best
+        triangles = strokes.surface.triangles
+        signs = best.sides[triangles.corner_vertices]
+        crossed = triangles.corner_vertices[signs.min(axis=1) != signs.max(axis=1)]
+        loop = connected_components(triangles.n_vertices, *crossed[:, [0, 1, 1, 2]].reshape(-1, 2).T)
+        at_loop = np.zeros(triangles.n_vertices, dtype=bool)
+        at_loop[crossed] = True
+        beside = strokes.means.tocoo()
+        chosen = at_loop[beside.col]
+        at = beside.row[chosen], loop[beside.col[chosen]]
+        count = sparse.csr_matrix((np.ones(len(at[0])), at), shape=(len(best.signs), triangles.n_vertices))
+        own = np.asarray(count.argmax(axis=1)).ravel()
+        explained = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
+        total = np.bincount(own, explained, triangles.n_vertices)
+        turned = np.bincount(own, explained * (best.signs < 0), triangles.n_vertices)
+        wholly = (best.signs < 0) & (explained > 0) & (turned[own] > 0.5 * total[own])
+        complete = (~self.pieces.movable & (explained > 0)).any()
+        few = explained[wholly].sum() < FEW * explained.sum()
+        result: NDArray[np.int64] = self.pieces.numbers[wholly & (not few) & (not complete)]
+        return result
+
+    def doubtful(self) -> NDArray[np.int64]:
+        """Numbers of the curves that bound something else if it is decided in another way that is nearly as good."""
+        strokes, best, areas = self.pieces.strokes, self.best, self.pieces.strokes.areas
+        most = cost(strokes, best) + NEARLY * strokes.lengths.sum()
+        found = np.zeros(len(best.signs), dtype=bool)
+        for rival in self.rivals:
+            differing = areas[rival.sides != best.sides].sum()
+            if cost(strokes, rival) < most and differing > OTHERWISE * areas.sum():
+                found |= np.abs(rival.explained * rival.signs - best.explained * best.signs) > EXPLAINED
+        return self.pieces.numbers[found]
+
+
+def drawn_edge(surface: SurfaceDiscretization) -> float:
+    """Mean length of the edges of the surface as it was given."""
+    domain = surface.domain
+    mesh = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
+    return float(mesh.edge_lengths.mean())
+
+
+def is_piece(triangles: IntrinsicMesh, curve: Curve, part: CurveSegments) -> bool:
+    """Whether an oriented curve has an end away from the boundary of the surface, and from nonmanifold edges."""
+    if curve.closed or part.ends[0, 0] == part.ends[-1, 1]:
+        return False
+    edges = triangles.edges
+    at_boundary = np.zeros(triangles.n_vertices, dtype=bool)
+    at_boundary[edges.vertices[edges.face_counts != 2]] = True  # across three faces no direction goes on to the others
+    ends = interpolation_at(triangles, part.nodes[part.ends[[0, -1], [0, 1]]])
+    return not all(at_boundary[ends[end].indices].all() for end in (0, 1))
+
+
+def decide(pieces: Pieces) -> Decision:
+    """Find the directions of strokes, of which some may be turned, for which the cost of the inside is least.
+
+    A cut gives the sides for directions, and sides give directions: from several starts both are improved in turn, then
+    by turning strokes one by one. Where more of the curves is gone than there is, only ends that are near each other
+    tell anything, and sides are taken to be smooth.
+    """
+    strokes, movable = pieces.strokes, pieces.movable
+    k = len(movable)
+    smooth = np.where(movable, smooth_signs(strokes, movable), 1.0)
+    found = []
+    for start in (np.ones(k), smooth):
+        for reward in (REWARD, GENEROUS):
+            found.append(settled(strokes, settled(strokes, start, movable, reward).signs, movable))
+    best = min(found, key=lambda inside: cost(strokes, inside))
+    while True:
+        tried = [strokes.inside(np.where(movable, -best.signs, best.signs))]
+        tried += [settled(strokes, turned(best, rows), movable) for rows in turnable(strokes, best, movable)]
+        for group in groups_among(strokes, np.flatnonzero(movable & (best.explained < EXPLAINED))):
+            for way in (1, -1):
+                signs = best.signs.copy()
+                signs[group] = way * smooth[group]
+                tried.append(settled(strokes, signs, movable))
+        for group in groups_among(strokes, np.flatnonzero(movable)):
+            tried.append(settled(strokes, turned(best, group), movable))
+        found += tried
+        better = min(tried, key=lambda inside: cost(strokes, inside))
+        if cost(strokes, better) >= cost(strokes, best) - 1e-9 * strokes.lengths.sum():
+            break
+        best = better
+    if mostly_loose(strokes, best):
+        return Decision(pieces, strokes.inside(smooth), [])
+    for rows in loose(strokes, best, movable):
+        rewards = np.full(k, REWARD)
+        rewards[rows] = GENEROUS
+        found += [strokes.inside(best.signs, rewards), strokes.inside(turned(best, rows), rewards)]
+    found.append(strokes.inside(best.signs, STINGY))
+    return Decision(pieces, best, [inside for inside in found if inside is not best])
+
+
+def turned(inside: Inside, rows: list[int] | NDArray[np.int64]) -> NDArray[np.float64]:
+    """(k,) the directions of strokes with some of them turned."""
+    signs: NDArray[np.float64] = inside.signs.copy()
+    signs[rows] *= -1
+    return signs
+
+
+def mostly_loose(strokes: Strokes, inside: Inside) -> bool:
+    """Whether most of the length bounds nothing: more of it is gone than there is."""
+    lengths = strokes.lengths
+    return bool(lengths[inside.explained < EXPLAINED].sum() > MOST * lengths.sum())
+
+
+def cost(strokes: Strokes, inside: Inside) -> float:
+    """The energy, and what turning costs."""
+    return inside.energy + AS_GIVEN * float(strokes.lengths[inside.signs < 0].sum())
+
+
+def loose(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> list[list[int]]:
+    """Strokes that bound nothing: all, and the longest one by one."""
+    found = np.flatnonzero(movable & (inside.explained < EXPLAINED))
+    order = found[np.argsort(-strokes.lengths[found], kind="stable")[:SINGLY]].tolist()
+    return ([found.tolist()] if len(found) > 1 else []) + [[k] for k in order]
+
+
+def groups_among(strokes: Strokes, rows: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Some of the strokes in groups that tell most about each other, the longest ones; not all of them together."""
+    if len(rows) < 2:
+        return []
+    tails, heads = np.triu_indices(len(rows), 1)
+    levels = nested_groups(tails, heads, strokes.agreed[rows[tails], rows[heads]], len(rows))
+    groups = [rows[level == g] for level in levels for g in range(int(level.max()) + 1)]
+    several = {tuple(group.tolist()): group for group in groups if 1 < len(group)}
+    return sorted(several.values(), key=lambda group: -strokes.lengths[group].sum())[:GROUPS]
+
+
+def turnable(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> list[list[int]]:
+    """What may bound more the other way: strokes that bound nothing, and others, which may be why they do not."""
+    found = loose(strokes, inside, movable)
+    if not found:
+        return []
+    others = np.flatnonzero(movable & (inside.explained >= EXPLAINED))
+    order = others[np.argsort(-strokes.lengths[others], kind="stable")[:SINGLY]].tolist()
+    return found + [[k] for k in order]
+
+
+def settled(strokes: Strokes, signs: NDArray[np.float64], movable: NDArray[np.bool_], reward: float = REWARD) -> Inside:
+    """The sides for these directions, the directions for these sides, and so on."""
+    best = inside = strokes.inside(signs, reward)
+    for _ in range(ROUNDS):
+        turn = movable & (inside.explained < -UNDECIDED)
+        if not turn.any():
+            break
+        inside = strokes.inside(np.where(turn, -inside.signs, inside.signs), reward)
+        if cost(strokes, inside) < cost(strokes, best) or reward != REWARD:
+            best = inside
+    return best
+
+
+def smooth_signs(strokes: Strokes, movable: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(k,) directions of least energy if sides are smooth."""
+    agreed, given = strokes.agreed, np.where(movable, WEAKLY, 1e6) * strokes.lengths
+    given = given / strokes.lengths.mean() * np.diag(agreed).mean()
+    weights = np.block([[agreed, given[:, None]], [given[None], np.zeros((1, 1))]])
+    signs = best_signs(weights, np.ones(len(weights)))
+    result: NDArray[np.float64] = signs[:-1] * signs[-1]
+    return result

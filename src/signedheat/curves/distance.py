@@ -1,0 +1,244 @@
+"""Distance to curves on surfaces in one call: exact where they are there, completed by heat where they are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
+from ..diagnostics import Note
+from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
+from ..domains.given_curves import given_curves
+from ..domains.kinds import AnySurface, SurfaceDomain
+from ..domains.level_sets import is_consistent
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import (
+    CancellingNormalsError,
+    ConstraintError,
+    GeometryError,
+    InexactWarning,
+    UnsupportedTypeError,
+    warn_user,
+)
+from ..extensions.sharpening import sharpen
+from ..fields.vertex_field import VertexField
+from ..progress import Progress
+from ..solver import SignedHeatSolver, as_list, distance_unwarned
+from .directions import Decision, Pieces, decide
+from .orientation import with_turned
+from .resolution import are_small, flattened, for_zero_set, surface_of, triangulated_once
+
+if TYPE_CHECKING:
+    from typing_extensions import Never
+
+APART = 0.1
+"""Share of the area on whose side the shortest completion and that by heat differ where neither can be trusted."""
+
+Surface = TypeVar("Surface", bound=SurfaceDomain)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CurvesTaken(Note):
+    """Which of the curves given were turned, and which were left out.
+
+    Attributes
+    ----------
+    turned : (j,) int
+        Curves whose positive side was made negative.
+    left_out : (k,) int
+        Curves that bound nothing together with the others.
+    """
+
+    turned: NDArray[np.int64]
+    left_out: NDArray[np.int64]
+
+    def __str__(self) -> str:
+        told = [
+            f"{name}: {len(which)}, the first of them number {which[0]}"
+            for name, which in (("curves turned", self.turned), ("curves left out", self.left_out))
+            if len(which)
+        ]
+        return "; ".join(told) or "curves are taken as given"
+
+
+def distance_to_pieces(
+    solver: SignedHeatSolver[Surface], curves: CurvesAndPoints, constraint: Constraint | None, every_piece: bool
+) -> tuple[VertexField[Surface], list[CurveOrPoints]]:
+    """Distance to curves that may be pieces of broken ones, and the curves that it was measured to.
+
+    The pieces are turned until they bound something together (`curve_orientation`), and those are left out that do not,
+    unless most of them do not. Where faces look either way, as on surfaces with one side, pieces are taken as they are:
+    left of a curve is another side from face to face.
+
+    There is a warning if it could have been decided in another way that is nearly as good, if nothing is bounded, and
+    if heat completes the curves otherwise than by what is shortest.
+
+    Parameters
+    ----------
+    solver : SignedHeatSolver
+        Of a surface.
+    curves : Curve, SurfacePoints or a sequence of them
+        The pieces.
+    constraint : Constraint, optional
+        As in `SignedHeatSolver.distance`.
+    every_piece : bool
+        Leave none out.
+    """
+    listed = flattened(curves)
+    if isinstance(solver.domain, TriangleMesh) and not is_consistent(solver.domain):
+        return distance_unwarned(solver, listed, constraint), listed
+    surface_of(solver).segments(listed)  # refuses curves that do not fit
+    once = triangulated_once(solver, listed)
+    pieces = Pieces.of(surface_of(once), listed)
+    if pieces is None:
+        return distance_unwarned(solver, listed, constraint), listed
+    decision = decide(pieces)
+    turn = decision.turned(len(listed))
+    left_out = np.empty(0, dtype=np.int64) if every_piece or decision.bounds_nothing else decision.loose
+    taken = [curve for k, curve in enumerate(with_turned(listed, turn)) if k not in set(left_out.tolist())]
+    field = distance_unwarned(once, taken, constraint)
+    turn[left_out] = False
+    if turn.any() or len(left_out):
+        note = CurvesTaken(np.flatnonzero(turn), left_out)
+        field = replace(field, diagnostics=field.diagnostics.noting(note))
+    warn_of_doubt(decision, field, listed)
+    return field, taken
+
+
+def warn_of_doubt(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> None:
+    """Warn if what the pieces bound is a guess."""
+    against = decision.turned_loops()
+    if len(against):
+        warn_user(
+            f"{told(against)} as a whole ran against the others, and was turned: which of them are right is a guess. "
+            "as_oriented=True takes curves as they are",
+            InexactWarning,
+        )
+        return
+    doubtful = decision.doubtful()
+    if len(doubtful):
+        warn_user(
+            f"{told(doubtful)} may as well be left out, or run the other way: what is bounded then is nearly as "
+            "likely. Turn or remove them, or draw more; as_oriented=True takes curves as they are",
+            InexactWarning,
+        )
+    elif not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
+        return  # other curves and points have sides of their own
+    else:
+        surface = decision.pieces.strokes.surface
+        chosen = slice(None) if surface.restriction is None else surface.restriction
+        areas, sides = decision.pieces.strokes.areas[chosen], decision.best.sides[chosen]
+        near = np.abs(field.values) <= surface.triangles.lengths_of_edges.mean()
+        apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
+        if apart > APART:
+            warn_user(
+                f"the gaps of the curves are so wide that completing them in two ways differs on {apart:.0%} of the "
+                "surface. Draw more of them",
+                InexactWarning,
+            )
+
+
+def told(numbers: NDArray[np.int64]) -> str:
+    """The numbers of some curves in words."""
+    some = ", ".join(map(str, numbers[:8].tolist())) + (", …" if len(numbers) > 8 else "")
+    return f"curves number {some}" if len(numbers) > 1 else f"curve number {some}"
+
+
+def curve_distance(
+    domain: AnySurface,
+    curves: CurvesAndPoints | ElementList | Sequence[ElementList],
+    *misplaced: Never,
+    constraint: Free | ZeroSet | Soft | None = None,
+    diffusion: float = 1.0,
+    intrinsic: bool | Literal["auto"] = "auto",
+    as_oriented: bool = False,
+    every_piece: bool = False,
+    progress: Progress | None = None,
+) -> VertexField[AnySurface]:
+    """Signed distance to curves and points on a surface, however broken, however they cross the faces.
+
+    Pieces of broken curves are turned until they bound something together (`orient`), and those are left out that do
+    not. The signed heat method (`SignedHeatSolver`) tells the sides and completes what is
+    missing; then distance is measured along the surface, exactly, to the curves themselves and to what completes them
+    (`sharpen`).
+
+    Parameters
+    ----------
+    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
+        The surface, with triangles of any shape.
+    curves : Curve, SurfacePoints or a sequence of them
+        Also lists of (element, barycentric coordinates), as potpourri3d has them. Curves without length are left out.
+        Oriented curves have a positive side, to their left; unoriented ones and points have none.
+    constraint : Free, ZeroSet or Soft, optional
+        Imposed on φ at the curves by the method; `ZeroSet` by default.
+    diffusion : float
+        τ in ``t = τ h²``: larger values close gaps along rounder lines.
+    intrinsic : "auto", True or False
+        On what triangles the method runs: see `SignedHeatSolver`.
+    as_oriented : bool
+        Turn no curve, and leave none out.
+    every_piece : bool
+        Leave no curve out.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; an exception that it raises cancels.
+
+    Returns
+    -------
+    VertexField
+        φ, with a note `diagnostics.SharpenedToCurves` in its diagnostics: how much was completed. If curves were turned
+        or left out, a note `CurvesTaken` says which. Where that was a close decision, or what is missing is a guess,
+        there is an `InexactWarning`.
+
+    Raises
+    ------
+    SourceError
+        If there is no source, or one does not fit the domain.
+    ConstraintError
+        If the constraint gives curves levels of their own: distance is then not that to all of them.
+
+    Examples
+    --------
+    A square, cut in two triangles, and a line across it that is no level set of a function linear on them.
+
+    >>> import signedheat as sh
+    >>> mesh = sh.TriangleMesh([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> across = mesh.polyline([[1, 0, 0], [1, 4, 0]])
+    >>> sh.curve_distance(mesh, across).values.round(6).tolist()
+    [1.0, -3.0, -3.0, 1.0]
+    """
+    if misplaced:
+        raise UnsupportedTypeError(
+            f"curve_distance takes a surface and curves, not {2 + len(misplaced)} things",
+            remedy="pass vertices and faces as one: curve_distance((vertices, faces), curves)",
+        )
+    if isinstance(constraint, EachComponent | LevelValues):
+        raise ConstraintError(
+            f"distance to curves is zero on all of them, which {constraint!r} denies",
+            remedy="use SignedHeatSolver.distance",
+        )
+    share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
+    solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
+    listed, left_out = given_curves(solver.domain, as_list(curves))
+    mesh = solver.domain if intrinsic == "auto" and isinstance(solver.domain, TriangleMesh) else None
+
+    def measured(by: SignedHeatSolver[Any]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
+        if as_oriented:
+            return distance_unwarned(by, listed, constraint), listed
+        return distance_to_pieces(by, listed, constraint, every_piece)
+
+    try:
+        small = mesh is not None and are_small(solver, listed)
+        field, taken = measured(for_zero_set(mesh, diffusion, share) if mesh is not None and small else solver)
+    except GeometryError:  # too thin to be triangulated anew
+        field, taken = measured(solver)
+    except CancellingNormalsError:  # loops inside single faces
+        if mesh is None:
+            raise
+        field, taken = measured(replace(solver, intrinsic=True))
+    rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
+    sharpened = sharpen(field, taken, progress=rest)
+    return sharpened if left_out is None else replace(sharpened, diagnostics=sharpened.diagnostics.noting(left_out))

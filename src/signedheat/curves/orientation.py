@@ -1,0 +1,109 @@
+"""Orientation of the pieces of broken curves on surfaces: where one ends, another should begin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..discretization import discretize
+from ..domains.curves import Curve, CurveOrPoints
+from ..domains.foreign import ForeignShape, converted
+from ..domains.kinds import SurfaceDomain
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError, UnsupportedTypeError
+from ..frozen import Frozen
+from ..lowering.surface.discretization import SurfaceDiscretization
+from ..reprs import ShortRepr
+from ..solver import SignedHeatSolver
+from .directions import Pieces, decide
+from .resolution import are_small, for_zero_set, surface_of, triangulated_once
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CurveOrientation(Frozen, ShortRepr):
+    """How the pieces of a broken curve were oriented.
+
+    Attributes
+    ----------
+    curves : list of Curve and SurfacePoints
+        All that was given, in order, some curves turned.
+    turned : (k,) bool
+        Which of them were turned.
+    agreement : (k,) float
+        How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious pieces often do; 1
+        for what has no ends of its own.
+    """
+
+    curves: list[CurveOrPoints]
+    turned: NDArray[np.bool_]
+    agreement: NDArray[np.float64]
+
+    def agreeing(self, least: float) -> list[CurveOrPoints]:
+        """The curves that agree with others at least that well."""
+        return [curve for curve, found in zip(self.curves, self.agreement, strict=True) if found >= least]
+
+
+def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape) -> CurveOrientation:
+    """Turn the pieces of broken curves so that together they bound something.
+
+    Of all sets of vertices of the surface and all directions of the pieces those are taken that have the least energy:
+    the length of the boundary of the set where no piece is, less 0.8 times the length of the pieces that bound it the
+    right way round, and a tenth of the length that is turned. For given directions the set is a minimum cut.
+
+    Curves that are closed, those from boundary to boundary of the surface (nonmanifold edges count as boundary),
+    unoriented curves and points stay as they are. Curves that bound nothing together keep the direction that they were
+    given with.
+
+    Parameters
+    ----------
+    curves : sequence of Curve and SurfacePoints
+        The pieces.
+    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
+        The surface that they lie on, its faces consistently oriented, or the curves with normals.
+
+    Raises
+    ------
+    SourceError
+        If a curve does not fit the surface.
+    UnsupportedTypeError
+        If the domain is no surface.
+    """
+    surface = discretize(converted(domain))
+    if not isinstance(surface, SurfaceDiscretization):
+        raise UnsupportedTypeError(
+            f"curves are oriented on surfaces, not on a {type(domain).__name__}", element="domain"
+        )
+    listed = list(curves)
+    turned, agreement = np.zeros(len(listed), dtype=bool), np.ones(len(listed))
+    pieces = Pieces.of(surface_for(surface, listed), listed)
+    if pieces is not None:
+        decision = decide(pieces)
+        turned = decision.turned(len(listed))
+        agreement[pieces.numbers[pieces.movable]] = np.clip(decision.best.explained[pieces.movable], 0.0, 1.0)
+    return CurveOrientation(with_turned(listed, turned), turned, agreement)
+
+
+def with_turned(curves: Sequence[CurveOrPoints], turned: NDArray[np.bool_]) -> list[CurveOrPoints]:
+    """The curves, some with their positive side negative."""
+    return [_turned(curve) if turn else curve for curve, turn in zip(curves, turned, strict=True)]
+
+
+def _turned(curve: CurveOrPoints) -> CurveOrPoints:
+    assert isinstance(curve, Curve)
+    if curve.normals is None:
+        return curve.reversed()
+    return Curve(curve.faces, curve.barycentric, curve.closed, curve.oriented, -curve.normals)
+
+
+def surface_for(surface: SurfaceDiscretization, curves: list[CurveOrPoints]) -> SurfaceDiscretization:
+    """Triangles on which the curves are seen: those that there are, or smaller ones."""
+    mesh = surface.domain
+    if not isinstance(mesh, TriangleMesh) or not are_small(SignedHeatSolver(mesh), curves):
+        return surface
+    try:
+        return surface_of(triangulated_once(for_zero_set(mesh, 1.0), curves))
+    except GeometryError:  # too thin to be triangulated anew
+        return surface

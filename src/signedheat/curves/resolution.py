@@ -1,0 +1,79 @@
+"""Curves that triangles do not resolve, and the triangles that are made for them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import chain
+from typing import Any, TypeVar
+
+from ..discretization import discretize
+from ..domains.curves import CurveOrPoints, CurvesAndPoints
+from ..domains.kinds import SurfaceDomain
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import SourceError
+from ..lowering.surface.curve_groups import CurveGroups
+from ..lowering.surface.discretization import SurfaceDiscretization
+from ..lowering.surface.intrinsic import Retriangulated, RetriangulatedForZeroSet
+from ..progress import Progress
+from ..solver import SignedHeatSolver, as_list
+
+SHORT = 16.0
+"""Length of a curve, or of all its pieces, in h, below which triangles are made for them."""
+
+Surface = TypeVar("Surface", bound=SurfaceDomain)
+
+
+def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
+    """Whether oriented curves, or the pieces of one of them, are so short that triangles do not resolve them."""
+    surface, listed = surface_of(solver), flattened(curves)
+    parts = chain.from_iterable(surface.segments(listed))  # refuses curves that do not fit
+    lengths = [float(part.lengths.sum()) for part in parts if part.oriented]
+    short = SHORT * surface.spacing
+    if isinstance(solver.domain, TriangleMesh) and (CurveGroups.of(solver.domain, listed).lengths < short).any():
+        return True
+    return bool(lengths) and sum(lengths) < short
+
+
+def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveOrPoints]) -> SignedHeatSolver[Surface]:
+    """The solver, on the triangles made for the curves if it makes some, which then do for some of them, too, and
+    whichever way they run.
+    """
+    made = solver.discretization
+    if not isinstance(made, Retriangulated):
+        return solver
+    once = replace(solver)
+    once.__dict__["discretization"] = made.adapt(curves)[0]
+    return once
+
+
+def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
+    """The discretisation that the solver uses for all sources, or else that of its domain.
+
+    Raises
+    ------
+    SourceError
+        If the domain is no surface, so that no curve lies on it.
+    """
+    made = solver.discretization
+    found = made if isinstance(made, SurfaceDiscretization) else discretize(solver.domain)
+    if not isinstance(found, SurfaceDiscretization):
+        kind = type(solver.domain).__name__
+        raise SourceError(f"curves lie on surfaces, not on a {kind}", element="domain", remedy="pass a mesh")
+    return found
+
+
+def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
+    """The curves and points, without the groups that they were given in."""
+    listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
+    return list(chain.from_iterable(c if isinstance(c, Sequence) else [c] for c in listed))
+
+
+def for_zero_set(
+    mesh: TriangleMesh, diffusion: float, progress: Progress | None = None
+) -> SignedHeatSolver[TriangleMesh]:
+    """A solver with ``intrinsic=True``, and with diffusion times that suit the pieces, however small they are."""
+    solver = SignedHeatSolver(mesh, diffusion, progress, intrinsic=True)
+    report = None if progress is None else lambda share, _: progress((1 + share) / 5, "refine")
+    solver.__dict__["discretization"] = RetriangulatedForZeroSet(mesh, report)
+    return solver

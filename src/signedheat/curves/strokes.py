@@ -1,0 +1,216 @@
+"""What strokes tell about the sides of a surface: the energy of an inside, and its least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..geometry.curve_segments import CurveSegments
+from ..geometry.geodesics.sources import PlacedSegments
+from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.minimum_cut import minimum_cut
+from ..lowering.surface.discretization import SurfaceDiscretization
+
+REWARD = 1.0
+"""What explaining a stroke is worth, beside its length: less than 1, since a line round a stroke is as long again. From
+0.8 to 1.0 the table of damaged curves stays as it is."""
+RINGS = 1
+"""Rings of vertices on either side of a stroke that tell at least whether it is explained."""
+EDGES, OF_ALL, OF_ONE = 2.0, 0.01, 0.05
+"""How far from a stroke sides tell whether it is explained, so that strokes that were drawn again beside it are one: in
+edges of the mesh, but no more of the length of all strokes; and of its own."""
+STAIRS = 0.92
+"""Length of a line beside that of the edges' duals that it cuts."""
+LEVEL = 1e-6
+"""Height above a segment, relative to its face, up to which a corner is on it."""
+AHEAD = 0.2
+"""Sine of the angle, seen from the end of a stroke, below which a vertex lies beyond it and on no side."""
+BLOCK = 64
+"""Strokes whose jumps are solved for at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inside:
+    """The best sides for strokes that run in given directions.
+
+    Attributes
+    ----------
+    signs : (k,) float
+        The directions ±1, relative to those that the strokes were given with.
+    sides : (n,) float
+        1 or −1 at every vertex.
+    explained : (k,) float
+        How far each stroke bounds the inside: 1 all along, 0 nowhere, −1 all along but the wrong way round.
+    energy : float
+        The length of the boundary of the inside where no stroke is, less `REWARD` times the strokes' lengths that are
+        explained.
+    """
+
+    signs: NDArray[np.float64]
+    sides: NDArray[np.float64]
+    explained: NDArray[np.float64]
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Oriented curves on a surface, and the energy of sets of vertices that they may bound.
+
+    Attributes
+    ----------
+    surface : SurfaceDiscretization
+        That they lie on.
+    lengths : (k,) float
+        Of the strokes.
+    means : (k, n) sparse
+        Half the mean over the vertices left of a stroke, less that over those right of it.
+    crossed : (k, e) sparse
+        1 where the first vertex of an edge is left of a stroke that crosses it, −1 where the second is.
+    """
+
+    surface: SurfaceDiscretization
+    lengths: NDArray[np.float64]
+    means: sparse.csr_matrix
+    crossed: sparse.csr_matrix
+
+    @classmethod
+    def of(cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float) -> Strokes:
+        """See where the vertices lie from each stroke; `edge` is how far those may be apart that are drawn for one."""
+        triangles = surface.triangles
+        lengths = np.array([part.lengths.sum() for part in parts])
+        seen = sides_seen(triangles, parts)
+        tails, heads = triangles.edges.vertices.T
+        columns = seen.tocsc()
+        tail, head = columns[:, tails].tocsr(), columns[:, heads].tocsr()
+        crossed = sparse.csr_matrix(tail.multiply(head.astype(bool)) - head.multiply(tail.astype(bool)))
+        crossed.data = np.sign(np.rint(crossed.data))
+        crossed.eliminate_zeros()
+        areas = areas_of_vertices(triangles)
+        width = min(EDGES * edge, OF_ALL * float(lengths.sum()))
+        beside = widened(triangles, seen, np.maximum(OF_ONE * lengths, width))
+        left, right = (_means(beside.multiply(beside * side > 0), areas) for side in (1, -1))
+        return cls(surface, lengths, sparse.csr_matrix(0.5 * (left - right)), crossed)
+
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """(n,) area that belongs to each vertex."""
+        return areas_of_vertices(self.surface.triangles)
+
+    @cached_property
+    def costs(self) -> NDArray[np.float64]:
+        """(e,) length of the boundary between the vertices of each edge, if one of them is inside."""
+        triangles = self.surface.triangles
+        corners = triangles.corner_positions
+        middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+        halves = np.abs(corners.mean(axis=1, keepdims=True) - middles)
+        total = np.bincount(triangles.edges.face_edges.ravel(), halves.ravel(), triangles.n_edges)
+        result: NDArray[np.float64] = STAIRS * total.astype(np.float64)
+        return result
+
+    @cached_property
+    def agreed(self) -> NDArray[np.float64]:
+        """(k, k) how much of the jump across one stroke another causes, if sides are smooth elsewhere.
+
+        That is the energy of sides with squares of slopes in place of lengths: strokes that follow each other and those
+        drawn twice agree, lines behind each other that face the same way do not.
+        """
+        rows = sparse.csr_matrix(sparse.diags(self.lengths) @ self.means)
+        k, factor = rows.shape[0], self.surface.integration.factor
+        result = np.empty((k, k))
+        for begin in range(0, k, BLOCK):
+            right = np.asfortranarray(rows[begin : begin + BLOCK].T.toarray())
+            result[:, begin : begin + BLOCK] = rows @ factor.solve(right)
+        symmetric: NDArray[np.float64] = 0.5 * (result + result.T)
+        return symmetric
+
+    def inside(self, signs: NDArray[np.float64], rewards: NDArray[np.float64] | float = REWARD) -> Inside:
+        """The sides of least energy for strokes with these directions: a minimum cut.
+
+        With other rewards, (k,) or one, than those of the energy, the sides of what would be best then.
+        """
+        along = self.crossed.multiply(signs[:, None]).tocsr()
+        free = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
+        falling, rising = (np.where(each, 0.0, self.costs) for each in free)
+        edges = self.surface.triangles.edges.vertices
+        sides = minimum_cut(edges, falling, rising, self.means.T @ (rewards * self.lengths * signs))
+        explained = signs * (self.means @ sides)
+        first, second = sides[edges].T
+        boundary = falling[(first > 0) & (second < 0)].sum() + rising[(first < 0) & (second > 0)].sum()
+        return Inside(signs, sides, explained, float(boundary - REWARD * (self.lengths @ explained)))
+
+
+def areas_of_vertices(triangles: IntrinsicMesh) -> NDArray[np.float64]:
+    """(n,) a third of the area of the faces at each vertex."""
+    thirds = np.repeat(triangles.face_areas / 3, 3)
+    result: NDArray[np.float64] = np.bincount(triangles.corner_vertices.ravel(), thirds, triangles.n_vertices).astype(
+        np.float64
+    )
+    return result
+
+
+def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:
+    """(k, n) sparse: 3 at corners of crossed faces that lie left of a stroke, 1 right of it, 2 on it."""
+    placed = PlacedSegments.of(triangles, parts)
+    owners = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])[placed.given]
+    steps = np.diff(placed.positions, axis=1)
+    rows = np.flatnonzero((placed.sides != 0) & (np.abs(steps[:, 0]) > 0))
+    start, step, faces = placed.positions[rows, :1], steps[rows], placed.faces[rows]
+    corners = triangles.corner_positions[faces] - start
+    share = np.clip((corners * np.conj(step)).real / np.abs(step) ** 2, 0.0, 1.0)
+    gaps = np.abs(corners - share * step)
+    heights = (np.conj(step) * corners).imag / np.abs(step) * placed.sides[rows, None]
+    size = triangles.edge_lengths[faces].max(axis=1, keepdims=True)
+    sines = np.abs(heights) / np.maximum(gaps, 1e-300)
+    steps_away = np.rint(gaps / (LEVEL * size))  # rounding must not tell which of two segments is nearer
+    sides = np.where(np.abs(heights) <= LEVEL * size, 0.0, np.sign(heights))
+    keys = (owners[rows, None] * triangles.n_vertices + triangles.corner_vertices[faces]).ravel()
+    order = np.lexsort((-sines.ravel(), steps_away.ravel(), keys))
+    first = order[np.concatenate([[True], np.diff(keys[order]) > 0])[: len(order)]]
+    on = steps_away.ravel()[first] == 0
+    known = first[on | (sines.ravel()[first] > AHEAD)]
+    values = np.where(steps_away.ravel()[known] == 0, 0.0, sides.ravel()[known]) + 2.0
+    shape = (len(parts), triangles.n_vertices)
+    return sparse.csr_matrix((values, np.divmod(keys[known], triangles.n_vertices)), shape=shape)
+
+
+def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, widths: NDArray[np.float64]) -> sparse.csr_matrix:
+    """(k, n) sparse ±1 at vertices on either side of each stroke: two rings of them, and more up to its width."""
+    n = triangles.n_vertices
+    tails, heads = triangles.edges.vertices.T
+    lengths = np.tile(triangles.lengths_of_edges, 2)
+    neighbors = sparse.csr_matrix(
+        (lengths, (np.concatenate([tails, heads]), np.concatenate([heads, tails]))), shape=(n, n)
+    )
+    found = sparse.coo_matrix(seen)
+    taken = np.sort(found.row.astype(np.int64) * n + found.col)
+    beside = found.data != 2
+    stroke, vertex, side = found.row[beside].astype(np.int64), found.col[beside], found.data[beside] - 2
+    far, chosen, ring = np.zeros(len(stroke)), [(stroke, vertex, side)], 1
+    while len(stroke):
+        count = np.diff(neighbors.indptr)[vertex]
+        which = np.repeat(np.arange(len(vertex)), count)
+        at = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + neighbors.indptr[vertex][which]
+        stroke, vertex, side = stroke[which], neighbors.indices[at].astype(np.int64), side[which]
+        far = far[which] + neighbors.data[at]
+        ring += 1
+        keys = stroke * n + vertex
+        near = ((ring <= RINGS) | (far <= widths[stroke])) & ~np.isin(keys, taken)
+        order = np.flatnonzero(near)[np.lexsort((far[near], keys[near]))]
+        order = order[np.diff(keys[order], prepend=-1) > 0]
+        stroke, vertex, side, far = stroke[order], vertex[order], side[order], far[order]
+        taken = np.union1d(taken, keys[order])
+        chosen.append((stroke, vertex, side))
+    rows, columns, values = (np.concatenate(each) for each in zip(*chosen, strict=True))
+    return sparse.csr_matrix((values, (rows, columns)), shape=seen.shape)
+
+
+def _means(chosen: sparse.csr_matrix, areas: NDArray[np.float64]) -> sparse.csr_matrix:
+    """(k, n) rows that take the mean over the vertices chosen, by area."""
+    weighted = sparse.csr_matrix(chosen.astype(bool).astype(float) @ sparse.diags(areas))
+    total = np.asarray(weighted.sum(axis=1)).ravel()
+    return sparse.csr_matrix(sparse.diags(1 / np.where(total > 0, total, 1.0)) @ weighted)

@@ -1,0 +1,82 @@
+"""Curves as people draw them: right, or told."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes import strokes
+from signedheat.geometry.minimum_cut import minimum_cut
+from signedheat.samples import sphere, with_flipped_faces
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_signs_cost_less_than_the_minimum_cut(seed):
+    random = np.random.default_rng(seed)
+    n = 8
+    edges = np.array(list(itertools.combinations(range(n), 2)))[random.permutation(28)[:14]]
+    falling, rising = random.random((2, 14)) * (random.random((2, 14)) < 0.7)
+    pull = random.normal(size=n)
+
+    def cost(signs):
+        first, second = signs[edges].T
+        return falling[(first > 0) & (second < 0)].sum() + rising[(first < 0) & (second > 0)].sum() - pull @ signs
+
+    found = minimum_cut(edges, falling, rising, pull)
+    assert set(found) <= {-1.0, 1.0}
+    least = min(cost(np.array(signs)) for signs in itertools.product([-1.0, 1.0], repeat=n))
+    assert cost(found) <= least + 1e-6
+
+
+def wrong_share(drawing: strokes.Drawing, values: np.ndarray) -> float:
+    """Share of the area on the wrong side, two edges or more from the curves: they are drawn by hand."""
+    mesh = drawing.mesh
+    exact = np.abs(sh.curve_distance(mesh, drawing.whole, as_oriented=True).values)
+    areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), mesh.n_vertices)
+    wrong = (np.sign(values) != drawing.sides) & (exact > 2 * strokes.edge_length(mesh))
+    return float(areas[wrong].sum() / areas.sum())
+
+
+@pytest.mark.parametrize("damage", ["gap", "pieces", "pieces_turned", "twice", "twice_turned", "overlapping", "bits"])
+@pytest.mark.parametrize("seed", range(3))
+def test_strokes_are_right_without_a_warning(damage, seed):
+    drawing = strokes.drawing(np.random.default_rng(seed), damage, 3)
+    assert wrong_share(drawing, sh.curve_distance(drawing.mesh, drawing.given).values) < 0.03
+
+
+@pytest.mark.parametrize("damage", ["long_strays", "scribbles", "loop_turned"])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_belongs_nowhere_is_left_out_or_told(damage, seed):
+    drawing = strokes.drawing(np.random.default_rng(seed), damage, 3)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        phi = sh.curve_distance(drawing.mesh, drawing.given)
+    assert told or wrong_share(drawing, phi.values) < 0.06
+
+
+def test_the_side_does_not_depend_on_where_a_curve_starts():
+    """A tenth of the faces is turned: left is as most of the faces along the curve see it."""
+    mesh = sphere(3)
+    curve = mesh.level_set(mesh.vertices[:, 2] + 0.2 * np.sin(3 * mesh.vertices[:, 0]), 0.1)[0]
+    torn = with_flipped_faces(mesh, 0.1)
+    for start in range(0, curve.n_points, 7):
+        placed = torn.polyline(np.roll(strokes.positions(mesh, curve)[:-1], -start, axis=0), closed=True)
+        phi = sh.SignedHeatSolver(torn).distance(placed)
+        assert phi.values[mesh.vertices[:, 2].argmax()] > 0.5
+
+
+def test_gaps_of_a_cloud_are_bridged():
+    """Points of one bunny-like sheet, folded so that triangles disagree at the crease: no point stays without."""
+    random = np.random.default_rng(3)
+    points = random.uniform(-1, 1, (900, 3)) * [1, 1, 0]
+    points[:, 2] = 0.5 * np.abs(points[:, 0]) ** 0.5 + 0.03 * random.normal(size=900)
+    cloud = sh.PointCloud(points)
+    line = cloud.polyline([[-0.5, -0.5, 0.35], [-0.5, 0.5, 0.35]])
+    used = np.zeros(900, dtype=bool)
+    used[cloud.triangulation.faces] = True
+    values = sh.SignedHeatSolver(cloud).distance(line).values
+    assert np.isfinite(values[used]).all()
