@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..domains.grid import Grid
 from ..domains.validation import finite_number
 from ..errors import GeometryError, UnsupportedTypeError
+from .arithmetic import Arithmetic, Number
 
 
 class SolidField(Protocol):
@@ -30,12 +31,15 @@ class SolidField(Protocol):
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
         """The field whose values a rule makes of the values of two, wherever these are known."""
 
+    def _mapped(self: Solid, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Solid:
+        """The field with changed values."""
+
 
 Rule = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 Solid = TypeVar("Solid", bound=SolidField)
 
 
-class Combinable:
+class Combinable(Arithmetic):
     """A field that is negative inside a solid or a region: ``a | b``, ``a & b``, ``a - b`` and ``~a`` are fields again.
 
     Where two fields overlap the result has the right sign and zero set, but is a bound of the distance, not distance
@@ -60,8 +64,10 @@ class Combinable:
         """Intersection: inside where both are."""
         return combined(self, other, lambda a, b: a >= b, 0.0)
 
-    def __sub__(self: Solid, other: Solid) -> Solid:
-        """Difference: inside where this is and the other is not."""
+    def __sub__(self: Solid, other: Solid | Number) -> Solid:
+        """Difference: inside where this is and the other is not. Of a number, it is taken from the values."""
+        if isinstance(other, int | float | np.number):
+            return self._mapped(lambda phi: phi - other)
         return combined(self, complement(_checked(self, other)), lambda a, b: a >= b, 0.0)
 
     def __invert__(self: Solid) -> Solid:
@@ -71,6 +77,10 @@ class Combinable:
     def combined_with(self: Solid, other: Solid, rule: Rule) -> Solid:
         """The field whose values a rule makes of those of two fields on one domain."""
         return self.with_values(rule(self.values, other.values))
+
+    def _mapped(self: Solid, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Solid:
+        """The field with changed values, without the diagnostics of this one."""
+        return self.combined_with(self, lambda phi, _: change(phi))
 
 
 def smooth_union(a: Solid, b: Solid, width: float) -> Solid:

@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Generic, Literal, overload
+from typing import TYPE_CHECKING, Any, Generic, Literal, cast, overload
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
-from ..domains.display import Displayed, to_pyvista
+from ..domains.display import Displayed, with_values
 from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import contiguous, finite_number
-from ..errors import GeometryError, OutsideError, UnsupportedTypeError
+from ..domains.validation import contiguous, finite_number, query_points
+from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
 from ..frozen import Frozen
 from ..geometry.edge_flips import flipped_along_creases
 from ..geometry.marching import closed_surface, level_lines
-from ..operators.grid.exact_surface import ExactSurface
+from ..operators.grid.block_contours import Refine, block_contour
+from ..operators.grid.blocks import SIDE, Blocks
+from ..operators.grid.streamed_contours import contour_parts
 from ..parallel import in_chunks
-from .booleans import Combinable
-from .closest_points import ClosestPoints, closest_points
-from .files import save_field
+from .booleans import Combinable, Rule
+from .files import save_field, save_parts
+from .known_solid import Closest, KnownSolid
+from .levels import on_level
 
 if TYPE_CHECKING:
     import pyvista
@@ -48,13 +52,20 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     confidence : (*grid.shape) float, optional
         From 0 to 1: how far the surface that is nearest to each node was there (1), or had to be completed (less, the
         farther from any face), where the field was sharpened to a shape.
-    surface : ExactSurface, optional
-        What the values are distances to, where that is known exactly: contours then lie on it exactly.
+    solid : Solid, optional
+        What the values are distances to: calls are exact then, and contours lie on their level exactly.
+    blocks : Blocks, optional
+        Blocks of 8³ nodes that have values, those of a band around the surface; by default all nodes have. Values and
+        confidence are then (n, 8, 8, 8), in single and half precision, NaN at nodes of the last blocks beyond the grid.
+    coarse : GridField, optional
+        φ on the whole box, which a field in a band has, for what lies beyond the band.
+    width : float
+        Half width of the band: up to which distance all nodes are there.
 
     Raises
     ------
     GeometryError
-        If the values do not have the shape of the grid.
+        If the values do not have the shape of the grid, or that of the blocks.
 
     Examples
     --------
@@ -72,11 +83,17 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     confidence: NDArray[np.float32] | None = field(default=None, repr=False)
-    surface: ExactSurface | None = field(default=None, repr=False)
+    solid: KnownSolid | None = field(default=None, repr=False)
+    blocks: Blocks | None = field(default=None, repr=False)
+    coarse: GridField[Dimension] | None = field(default=None, repr=False)
+    width: float = math.inf
 
     def __post_init__(self) -> None:
         if not isinstance(self.grid, Grid):
             raise UnsupportedTypeError(f"{self.grid!r:.80} is not a Grid", element="grid")
+        if self.blocks is not None:
+            self._check_blocks(self.blocks)
+            return
         values = contiguous(self.values, "values")
         if values.shape != self.grid.shape:
             raise GeometryError(
@@ -91,8 +108,37 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
                 )
             object.__setattr__(self, "confidence", confidence)
 
+    def _check_blocks(self, blocks: Blocks) -> None:
+        if self.values.shape != (len(blocks), SIDE, SIDE, SIDE) or blocks.shape != self.grid.shape:
+            raise GeometryError(
+                f"{len(blocks)} blocks of a grid of {blocks.shape} nodes have values of shape {self.values.shape} on "
+                f"one of {self.grid.shape}",
+                element="values",
+            )
+        if self.coarse is None:
+            raise GeometryError("a field in a band has a coarse one for what lies beyond", element="coarse")
+
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """φ at points in space, by multilinear interpolation between nodes.
+        """φ at points in space: exact where the field knows its solid, else that of `interpolate`.
+
+        Parameters
+        ----------
+        points : (n, d) or (d,) float
+            Positions, in the units of the grid.
+
+        Returns
+        -------
+        (n,) float, or one float
+            Signed distances.
+        """
+        places = self._checked(points)
+        if self.solid is None:
+            return self.interpolate(places)
+        values = self.solid.distance(places.reshape(-1, self.grid.dimension))
+        return values.reshape(places.shape[:-1]) if places.ndim > 1 else values[0]
+
+    def interpolate(self, points: ArrayLike) -> NDArray[np.float64]:
+        """φ at points in space, by multilinear interpolation between nodes; beyond a band between the coarse ones.
 
         Outside the grid φ is extrapolated linearly from the nearest point of the bounding box of the grid, along the
         gradient there. This is continuous, and for a convex shape inside the box a lower bound of the distance.
@@ -112,9 +158,9 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return values.reshape(points.shape[:-1]) if points.ndim > 1 else values[0]
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
-        """∇φ at points in space: central differences of the nodes, interpolated.
+        """∇φ at points in space: exact where the field knows its solid, else central differences, interpolated.
 
-        Outside the grid it is the gradient at the nearest point of the bounding box of the grid.
+        Outside the grid these are the gradient at the nearest point of the bounding box of the grid.
 
         Parameters
         ----------
@@ -127,16 +173,13 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             Gradients; of length about 1, since φ is a distance.
         """
         points = np.atleast_2d(self._checked(points))
+        if self.solid is not None:
+            return self.solid.closest(points).gradients
         (slopes,) = in_chunks(lambda chunk: (self._slopes(self._into_box(chunk)),), points)
         return slopes
 
-    def closest_points(self, points: ArrayLike) -> ClosestPoints:
-        """The nearest place of the surface itself for points in space, and exact distances to it.
-
-        Unlike those of a call, distances are not interpolated between nodes. The surface is that which the field was
-        sharpened to: the faces where they are there, φ's zero set where they are missing. Takes time O(n log m) for n
-        points and m faces, on all threads, and little memory beside that of the result; what it needs to know of the
-        surface is prepared at the first call.
+    def closest(self, points: ArrayLike) -> Closest:
+        """The nearest place of the solid's surface for points in space: `Solid.closest`.
 
         Parameters
         ----------
@@ -145,26 +188,31 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
         Returns
         -------
-        ClosestPoints
-            Places, signed distances, gradients, and whether the place is one that had to be completed.
+        Closest
+            Distances, places, faces and where in them, gradients, confidence.
 
         Raises
         ------
         SourceError
-            If the field does not know its surface: it was read from a file, or not sharpened to a shape.
-        GeometryError
-            If a point is not finite.
-
-        Examples
-        --------
-        >>> from signedheat import TriangleMesh, solid_distance
-        >>> faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
-        >>> field = solid_distance(TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces), resolution=16)
-        >>> closest = field.closest_points([[0.3, 0.2, -0.5]])
-        >>> closest.points.round(6).tolist(), closest.distances.tolist(), closest.gradients.tolist()
-        ([[0.3, 0.2, 0.0]], [0.5], [[0.0, 0.0, -1.0]])
+            If the field does not know its solid: it was read from a file, or computed otherwise.
         """
-        return closest_points(self.surface, np.atleast_2d(self._checked(points)), self)
+        if self.solid is None:
+            raise SourceError(
+                "the field does not know the solid that it is the distance to",
+                remedy="take it from solid_distance or Solid.field, not from a file",
+                element="field",
+            )
+        return self.solid.closest(np.atleast_2d(self._checked(points)))
+
+    @property
+    def whole(self) -> GridField[Dimension]:
+        """A field on the whole box: of one in a band the coarse one, else itself."""
+        return self if self.coarse is None else self.coarse
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes that are there."""
+        return int(self.values.size)
 
     @property
     def domain(self) -> Grid[Dimension]:
@@ -208,10 +256,91 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         if grid.dimension == 2:
             lines = level_lines(self.values, grid.origin, grid.spacing, level)
             return [Polyline(points, closed) for points, closed in lines]
-        surface = self.surface
-        refine = None if surface is None else lambda points: surface.on_level(points, self.values, level)
-        vertices, faces = closed_surface(self.values, grid.origin, grid.spacing, level, refine)
-        return TriangleMesh(vertices, faces if surface is None else flipped_along_creases(vertices, faces))
+        refine = self._refined(level)
+        if self.blocks is None:
+            vertices, faces = closed_surface(self.values, grid.origin, grid.spacing, level, refine)
+        else:
+            self._refuse_beyond_band(level)
+            vertices, faces = block_contour(self.blocks, self.values, grid.spacing, level, self._placed(refine))
+        return TriangleMesh(vertices, faces if refine is None else flipped_along_creases(vertices, faces))
+
+    def _refined(self, level: float) -> Refine | None:
+        """What moves points of a level onto it, where that is known."""
+        solid = self.solid
+        values = self.values if self.blocks is None else _NodeValues(self.blocks, self.values)
+        if solid is not None:
+            return lambda points: on_level(solid, points, values, self.grid, level)
+        return None
+
+    def _placed(self, refine: Refine | None) -> Refine:
+        """From points in cells to places in space, moved onto the level where that is known."""
+
+        def placed(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+            points = self.grid.origin + cells * self.grid.spacing
+            return points if refine is None else refine(points)
+
+        return placed
+
+    def _refuse_beyond_band(self, level: float) -> None:
+        if abs(level) > self.width:
+            raise OutsideError(
+                f"level {level:g} lies outside the band, which reaches to {self.width:g}",
+                remedy=f"use a band of at least {abs(level):g}",
+                element=f"level {level:g}",
+            )
+
+    def save_contour(self, path: str | PathLike[str], level: float = 0.0) -> tuple[int, int]:
+        """Write the level set φ = level in space to a file; that of a band part by part, larger than memory.
+
+        Parameters
+        ----------
+        path : str or path
+            A ``.ply`` file. An existing one survives a failure.
+        level : float
+            See `contour`. Creases of bands are left as the cells cut them.
+
+        Returns
+        -------
+        vertices, faces : int
+            How many there are.
+
+        Raises
+        ------
+        OutsideError
+            As `contour`.
+        FileFormatError
+            If the file is of another kind, or cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import complete, samples
+        >>> ball = complete(samples.sphere(4)).field(spacing=0.02, band=0.1)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     vertices, faces = ball.save_contour(f"{folder}/ball.ply", 0.05)
+        >>> 2 * vertices - faces  # closed, without handles
+        4
+        """
+        level = finite_number(level, "level")
+        if self.blocks is None:
+            surface = cast("TriangleMesh", self.contour(level))
+            return save_parts(iter([(surface.vertices, surface.faces)]), path)
+        self._refuse_beyond_band(level)
+        placed = self._placed(self._refined(level))
+        return save_parts(contour_parts(self.blocks, self.values, self.grid.spacing, level, placed), path)
+
+    def dense(self) -> GridField[Dimension]:
+        """The field at all nodes of its grid, those beyond a band interpolated from the coarse ones."""
+        if self.blocks is None:
+            return self
+        values = np.empty(self.grid.shape)
+        for i, x in enumerate(self.grid.axes[0]):  # plane by plane, in bounded memory
+            plane = np.stack(np.meshgrid([x], *self.grid.axes[1:], indexing="ij"), axis=-1).reshape(-1, 3)
+            values[i] = self.whole.interpolate(plane).reshape(self.grid.shape[1:])
+        for place, block in zip(self.blocks.places.astype(np.int64) * SIDE, self.values, strict=True):
+            part = tuple(slice(p, min(p + SIDE, n)) for p, n in zip(place, self.grid.shape, strict=True))
+            values[part] = block[tuple(slice(0, s.stop - s.start) for s in part)]
+        return GridField(self.grid, values, self.diagnostics, solid=self.solid)
 
     @overload
     def offset(self: GridField[Literal[3]], distance: float) -> TriangleMesh: ...
@@ -253,16 +382,42 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             )
 
     def with_values(self, values: NDArray[np.float64]) -> GridField[Dimension]:
-        """Other values on the same grid, without the diagnostics, confidence and surface of these."""
+        """Other values on the same grid, without the diagnostics, confidence and solid of these."""
         return GridField(self.grid, values)
+
+    def combined_with(self, other: GridField[Dimension], rule: Rule) -> GridField[Dimension]:
+        """The field whose values a rule makes of those of two fields; bands must be the same.
+
+        Raises
+        ------
+        GeometryError
+            If they are not.
+        """
+        if self.blocks is None and other.blocks is None:
+            return self.with_values(rule(self.values, other.values))
+        ours, theirs = (None if each.blocks is None else each.blocks.places for each in (self, other))
+        if ours is None or theirs is None or not np.array_equal(ours, theirs):
+            raise GeometryError(
+                "fields in bands have values at different nodes",
+                remedy="compute both on one whole grid",
+                element="blocks",
+            )
+        coarse = self.whole.combined_with(other.whole, rule)
+        values = np.asarray(rule(self.values, other.values), dtype=self.values.dtype)
+        return GridField(self.grid, values, blocks=self.blocks, coarse=coarse, width=self.width)
 
     def to_pyvista(self) -> pyvista.ImageData:
         """As a `pyvista.ImageData` with point data ``signed_distance``, and ``confidence`` where there is one.
 
-        A field in the plane has z = 0.
+        A field in the plane has z = 0; of one in a band it is the coarse field, and ``dense()`` has all nodes.
         """
-        made: pyvista.ImageData = to_pyvista(self)
-        return made
+        if self.blocks is not None:
+            return self.whole.to_pyvista()
+        image: pyvista.ImageData = self.grid.to_pyvista()
+        if self.confidence is not None:
+            image.point_data["confidence"] = self.confidence.ravel(order="F")
+        with_values(image, self.values.ravel(order="F"))
+        return image
 
     def confidence_at(self, points: ArrayLike) -> NDArray[np.float32]:
         """How far the surface that is nearest was there (1), or had to be completed (less), interpolated.
@@ -277,12 +432,20 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         (n,) float
             From 0 to 1; at points outside the grid, that of the nearest point of its box. 1 if nothing is known of it.
         """
-        inside = self._into_box(np.atleast_2d(self._checked(points)))
+        places = np.atleast_2d(self._checked(points))
         if self.confidence is None:
-            return np.ones(len(inside), dtype=np.float32)
-        index = ((inside - self.grid.origin) / self.grid.spacing).T
-        found = scipy.ndimage.map_coordinates(self.confidence, index, np.float32, order=1, mode="nearest")
-        clipped: NDArray[np.float32] = np.clip(found, 0, 1)
+            return np.ones(len(places), dtype=np.float32)
+        if self.solid is not None:
+            return self.solid.closest(places).confidence
+        inside = self._into_box(places)
+        index = (inside - self.grid.origin) / self.grid.spacing
+        if self.blocks is None:
+            found = scipy.ndimage.map_coordinates(self.confidence, index.T, np.float32, order=1, mode="nearest")
+        else:
+            found = self.blocks.interpolated(self.confidence.astype(np.float32), index)
+            beyond = np.isnan(found)
+            found[beyond] = self.whole.confidence_at(inside[beyond])
+        clipped: NDArray[np.float32] = np.clip(found, 0, 1).astype(np.float32)
         return clipped
 
     @property
@@ -299,17 +462,14 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
     def _wall_range(self) -> tuple[float, float]:
         """Least and greatest φ on the walls of the box."""
-        values = np.concatenate([self._walls(axis).ravel() for axis in range(self.grid.dimension)])
+        values = np.concatenate([self.whole._walls(axis).ravel() for axis in range(self.grid.dimension)])
         return float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
 
     def _walls(self, axis: int) -> NDArray[np.float64]:
         return self.values.take([0, -1], axis=axis)
 
     def _checked(self, points: ArrayLike) -> NDArray[np.float64]:
-        places = contiguous(points, "points")
-        if places.shape[-1:] != (self.grid.dimension,) or not np.isfinite(places).all():
-            raise GeometryError(f"points must be finite, with {self.grid.dimension} coordinates each", element="points")
-        return places
+        return query_points(points, self.grid.dimension)
 
     def _into_box(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.clip(points, self.grid.origin, self.grid.upper)
@@ -327,6 +487,11 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
     def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         index = ((points - self.grid.origin) / self.grid.spacing).T
+        if self.blocks is not None:
+            values = self.blocks.interpolated(self.values, index.T)
+            beyond = np.isnan(values)
+            values[beyond] = self.whole.interpolate(points[beyond])
+            return values
         if self._known is None:
             result: NDArray[np.float64] = scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
             return result
@@ -353,5 +518,22 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return slopes
 
     def __repr__(self) -> str:
+        if self.blocks is not None:
+            return f"GridField({self.grid!r}, {len(self.blocks)} blocks, {self.width:g} on either side)"
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"GridField({self.grid!r}, values from {low:.4g} to {high:.4g})"
+
+
+@dataclass(frozen=True, eq=False)
+class _NodeValues:
+    """The values of blocks, indexed by nodes as those of a grid are."""
+
+    blocks: Blocks
+    values: NDArray[np.floating[Any]]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.blocks.shape
+
+    def __getitem__(self, nodes: tuple[NDArray[np.int64], ...]) -> NDArray[np.float64]:
+        return self.blocks.values_at(self.values, np.stack(nodes, axis=1))

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics
 from ..domains.curves import Curve, SurfacePoints
-from ..domains.display import Displayed, to_pyvista
+from ..domains.display import Displayed
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
@@ -19,6 +20,7 @@ from ..frozen import Frozen
 from ..geometry.face_pairs import FacePairs, face_pairs, split_corners
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import locate_points
+from .arithmetic import Arithmetic
 from .vertex_field import VertexField
 
 if TYPE_CHECKING:
@@ -63,7 +65,7 @@ class Cut(Frozen):
 
 
 @dataclass(frozen=True, eq=False)
-class PiecewiseField(Displayed, Frozen):
+class PiecewiseField(Displayed, Arithmetic, Frozen):
     """Signed distance that is linear in every triangle and may be discontinuous across edges.
 
     Attributes
@@ -88,6 +90,10 @@ class PiecewiseField(Displayed, Frozen):
     triangles: IntrinsicMesh = field(repr=False)
     is_cut: NDArray[np.bool_] = field(repr=False)
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+
+    def _mapped(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> PiecewiseField:
+        """The field with changed values, without the diagnostics of this one."""
+        return PiecewiseField(self.domain, self.surface, change(self.values), self.triangles, self.is_cut)
 
     def gradient(self, points: SurfacePoints) -> NDArray[np.float64]:
         """(n, 3) ∇φ in the triangles that contain the points; see `__call__`."""
@@ -173,8 +179,7 @@ class PiecewiseField(Displayed, Frozen):
 
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData` with point data ``signed_distance`` on `split`, so that the jumps show."""
-        surface: pyvista.PolyData = to_pyvista(self)
-        return surface
+        return self.split().to_pyvista()
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the field on `split`, so that viewers show the jump, in the format given by the extension."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
-from ..domains.display import Displayed, to_pyvista
+from ..domains.display import Displayed, with_values
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import contiguous, finite_number
@@ -193,7 +193,7 @@ class TetField(Displayed, Combinable, Frozen):
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As a `pyvista.UnstructuredGrid` with point data ``signed_distance``."""
-        made: pyvista.UnstructuredGrid = to_pyvista(self)
+        made: pyvista.UnstructuredGrid = with_values(self.mesh.to_pyvista(), self.values)
         return made
 
     def save(self, path: str | PathLike[str]) -> None:

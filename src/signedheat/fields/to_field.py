@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
+from ..domains.point_cloud import PointCloud
 from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
+from ..geometry.neighbor_paths import spread
 from ..lowering.grid.discretization import GridDiscretization
 from ..lowering.grid.masked import MaskedGridDiscretization
 from ..lowering.grid.masked_source import MaskedSource
@@ -77,6 +79,11 @@ def _(
     triangulation, everywhere = discretization.triangulation, values
     if discretization.restriction is not None:
         values = values[discretization.restriction]
+    if isinstance(discretization.domain, PointCloud) and np.isnan(values).any():  # its triangles may have gaps
+        cloud = discretization.domain
+        used = np.zeros(cloud.n_points, dtype=bool)
+        used[cloud.triangulation.faces] = True
+        values = spread(cloud.points, values, used)[cloud.representatives]
     unreached = np.flatnonzero(np.isnan(values))
     if len(unreached):
         warn_user(

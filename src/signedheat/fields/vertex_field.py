@@ -14,12 +14,15 @@ from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
 from ..domains.common_subdivision import common_subdivision
 from ..domains.curves import Curve, SurfacePoints
-from ..domains.display import Displayed, to_pyvista
+from ..domains.display import Displayed, with_values
+from ..domains.foreign import SurfaceShape
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.kinds import EmbeddedSurface, SurfaceDomain
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
 from ..domains.projection import closest_points
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import finite_number, finite_rows
+from ..domains.validation import array_of, finite_number, finite_rows
 from ..errors import OutsideError
 from ..frozen import Frozen
 from .booleans import Combinable, Rule
@@ -74,6 +77,9 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     source: SourceTerm | None = field(default=None, repr=False)
     finer: VertexField[IntrinsicTriangulation] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        array_of(self.values, "values")
 
     def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
         """φ at points of the surface, linear between vertices.
@@ -192,7 +198,8 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
 
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData` with point data ``signed_distance``: triangles, polygons or points."""
-        made: pyvista.PolyData = to_pyvista(self)
+        simple = on_simple_surface(self)
+        made: pyvista.PolyData = with_values(simple.domain.to_pyvista(), simple.values)
         return made
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -271,3 +278,13 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
             return mesh, values, points.faces, points.barycentric
         faces, weights, _ = closest_points(mesh, finite_rows(points, "points", 3))
         return mesh, values, faces, weights
+
+
+def on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
+    """The field on a surface that files support: voxel faces become triangles."""
+    domain = field.domain
+    if isinstance(domain, TriangleMesh | PolygonMesh | PointCloud):
+        return VertexField(domain, field.values)
+    if isinstance(domain, IntrinsicTriangulation):
+        return on_simple_surface(field.restrict())
+    return VertexField(domain.triangulation, domain.on_triangulation(field.values))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ Refine = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 def block_contour(
     blocks: Blocks,
-    values: NDArray[np.float32],
+    values: NDArray[np.floating[Any]],
     spacing: NDArray[np.float64],
     level: float,
     refine: Refine | None = None,
@@ -78,7 +79,7 @@ def no_level(level: float) -> OutsideError:
 
 
 def window_surfaces(
-    blocks: Blocks, values: NDArray[np.float32], spacing: NDArray[np.float64], level: float
+    blocks: Blocks, values: NDArray[np.floating[Any]], spacing: NDArray[np.float64], level: float
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]:
     """The place of each window of `WINDOW` blocks through which the level set goes, in order, with that part of it.
 
@@ -145,7 +146,7 @@ def edges_of(vertices: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[
     return on_edge, ((a << BITS | b) << BITS | c) * 4 + np.where(on_edge, crossed.argmax(axis=1), 3)
 
 
-def _reaches_walls(blocks: Blocks, values: NDArray[np.float32], level: float) -> bool:
+def _reaches_walls(blocks: Blocks, values: NDArray[np.floating[Any]], level: float) -> bool:
     """Whether the level set leaves the grid: nodes on its walls lie on both sides."""
     signs: set[bool] = set()
     for axis, n in enumerate(blocks.shape):

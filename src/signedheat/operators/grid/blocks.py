@@ -95,7 +95,7 @@ class Blocks:
         result[held] = values[row[held], a, b, c]
         return result
 
-    def interpolated(self, values: NDArray[np.float32], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def interpolated(self, values: NDArray[np.floating[Any]], points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k,) linear interpolation at (k, 3) points in cells; NaN where one of the nodes around has no value."""
         result = np.empty(len(points))
         limit = np.array(self.shape, dtype=np.float64) - 1
@@ -103,7 +103,7 @@ class Blocks:
         return result
 
     def window(
-        self, values: NDArray[np.float32], first: NDArray[np.integer], shape: tuple[int, int, int]
+        self, values: NDArray[np.floating[Any]], first: NDArray[np.integer], shape: tuple[int, int, int]
     ) -> NDArray[np.float32]:
         """(*shape) values in a box of nodes from `first` on; NaN where there are none."""
         result = np.full(shape, np.nan, dtype=np.float32)
@@ -126,7 +126,7 @@ def off_grid(values: NDArray[Any], blocks: Blocks, nothing: float) -> None:
             np.moveaxis(values[row], axis, 0)[index[row] >= blocks.shape[axis]] = nothing
 
 
-@compiled(nogil=True)
+@compiled
 def row_of_node(cubes: NDArray[np.int32], rows: NDArray[np.int32], i: int, j: int, k: int) -> np.int32:
     """The block that holds a node; −1 if there is none. The node is on the grid."""
     cube = cubes[i // 128, j // 128, k // 128]
@@ -134,7 +134,7 @@ def row_of_node(cubes: NDArray[np.int32], rows: NDArray[np.int32], i: int, j: in
     return row
 
 
-@compiled(nogil=True)
+@compiled
 def _interpolate(
     cubes: NDArray[np.int32],
     rows: NDArray[np.int32],
@@ -165,7 +165,7 @@ def _interpolate(
         out[p] = total
 
 
-@compiled(nogil=True)
+@compiled
 def _gather(
     cubes: NDArray[np.int32],
     rows: NDArray[np.int32],

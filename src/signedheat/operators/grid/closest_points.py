@@ -68,7 +68,7 @@ def crossed_edges(field: NDArray[np.float64]) -> NDArray[np.int32]:
     return np.concatenate([job.result() for job in jobs])
 
 
-@compiled(nogil=True)
+@compiled
 def _crossed_edges(field, axis, start, stop):
     """Those of the nodes from `start` to `stop` along an axis, to nodes behind them."""
     n0, n1, n2, n3 = field.shape
@@ -102,7 +102,7 @@ def _crossed_edges(field, axis, start, stop):
     return edges[:count]
 
 
-@compiled(nogil=True)
+@compiled
 def _cubic(field, place, weights, gradient):
     """Value of the cubic convolution interpolant (Keys 1981) at a position in cells; writes its `gradient`."""
     base = np.empty(4, dtype=np.int64)
@@ -154,7 +154,7 @@ def _cubic(field, place, weights, gradient):
     return value
 
 
-@compiled(nogil=True)
+@compiled
 def crossings_at(field, edges, steps):
     """(e, 18) position, unit normal and shape operator (symmetric, ten numbers) of the zero set at crossed edges."""
     result = np.zeros((len(edges), 18))
@@ -223,7 +223,7 @@ def crossings_at(field, edges, steps):
     return result
 
 
-@compiled(nogil=True)
+@compiled
 def seed_edge_ends(nearest, squares, edges, points, steps, first):
     """Give both ends of each crossed edge its crossing as a candidate: a point from `first` on."""
     for e in range(len(edges)):
@@ -240,7 +240,7 @@ def seed_edge_ends(nearest, squares, edges, points, steps, first):
                 nearest[i, j, k, m] = p
 
 
-@compiled(nogil=True)
+@compiled
 def nearest_tiles(nearest, squares, points, steps, tiles):
     """Take over nearer crossings from neighbouring lines already visited, and along each line in both directions."""
     n0, n1, n2, n = nearest.shape
@@ -277,7 +277,7 @@ def nearest_tiles(nearest, squares, points, steps, tiles):
                             p = own[m]
 
 
-@compiled(nogil=True)
+@compiled
 def circle_distance(
     crossing: NDArray[np.float64], away: NDArray[np.float64], across: NDArray[np.float64], reach: float
 ) -> float:
@@ -311,7 +311,7 @@ def circle_distance(
     return float(distance)
 
 
-@compiled(nogil=True)
+@compiled
 def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
     """Distance of nodes to the circle that touches at their nearest crossing, with the sign of their values."""
     n0, n1, n2, n = nearest.shape
@@ -327,7 +327,7 @@ def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
                     out[i, j, k, m] = distance if field[i, j, k, m] >= 0 else -distance
 
 
-@compiled(nogil=True)
+@compiled
 def distances_to_crossings(
     points: NDArray[np.float64],
     chosen: NDArray[np.int32],

@@ -37,7 +37,7 @@ def ranges_on_faces(
     return low, high
 
 
-@compiled(nogil=True)
+@compiled
 def _value(function: NDArray[np.float64], x: float, y: float, z: float) -> float:
     """Linear between nodes."""
     n0, n1, n2 = function.shape
@@ -54,7 +54,7 @@ def _value(function: NDArray[np.float64], x: float, y: float, z: float) -> float
     return result
 
 
-@compiled(nogil=True)
+@compiled
 def _values_at(function: NDArray[np.float64], positions: NDArray[np.float64]) -> NDArray[np.float64]:
     result = np.empty(len(positions))
     for s in range(len(positions)):
@@ -62,7 +62,7 @@ def _values_at(function: NDArray[np.float64], positions: NDArray[np.float64]) ->
     return result
 
 
-@compiled(nogil=True)
+@compiled
 def _ranges_on_faces(
     function: NDArray[np.float64],
     corners: NDArray[np.float64],

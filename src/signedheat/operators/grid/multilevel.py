@@ -246,7 +246,7 @@ def collapse(
     return result
 
 
-@compiled(nogil=True)
+@compiled
 def _carry(vectors, inside, factors, power, coarse, counts):
     """Copy vectors to the nodes of both grids, lengths raised to a power; count the known nodes of each stretch."""
     n0, n1, n2, n3 = vectors.shape[:4]
@@ -268,7 +268,7 @@ def _carry(vectors, inside, factors, power, coarse, counts):
                         counts[a, b, c, d // STRETCH] += 1
 
 
-@compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
+@compiled
 def _interpolate(coarse, factors, out, axis, start, stop):
     """Interpolate the values of a coarser grid to all nodes, linearly along every axis that was coarsened."""
     _, n0, n1, n2, n = out.shape

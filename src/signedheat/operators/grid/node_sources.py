@@ -64,7 +64,7 @@ class NodeSources:
         return NodeSources(coarse.places, sums, shape, steps)
 
 
-@compiled(nogil=True)
+@compiled
 def with_room(sums, used, more):
     """`sums`, or a longer copy of it, with room for `more` rows beyond the `used` ones."""
     if used + more <= sums.shape[0]:
@@ -77,7 +77,7 @@ def with_room(sums, used, more):
     return grown
 
 
-@compiled(nogil=True)
+@compiled
 def _scatter(nodes, weights, values, places, sums, n):
     used = sums.shape[0]
     for s in range(nodes.shape[0]):
@@ -95,7 +95,7 @@ def _scatter(nodes, weights, values, places, sums, n):
     return sums[:used]
 
 
-@compiled(nogil=True)
+@compiled
 def _restrict(places, sums, shape, factors, coarse_places, coarse):
     used = coarse.shape[0]
     for i in range(shape[0]):

@@ -9,7 +9,7 @@ from .node_sources import STRETCH
 from .sweeps import TINY
 
 
-@compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
+@compiled
 def unit_vectors(vectors, inside, out, axis, start, stop):
     """The vectors scaled to length one; where they have underflowed, `out` keeps the values of a coarser level."""
     dimension, n0, n1, n2, n = out.shape
@@ -34,7 +34,7 @@ def unit_vectors(vectors, inside, out, axis, start, stop):
                             out[d, i, j, k, m] = factor * line[m, d]
 
 
-@compiled(nogil=True)
+@compiled
 def quotients(vectors, inside, out, axis, start, stop):
     """The second component divided by the first; `out` keeps its values where the first has underflowed."""
     _, n0, n1, n2, n = out.shape

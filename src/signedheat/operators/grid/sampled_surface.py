@@ -195,7 +195,7 @@ def signed_distances(
     return values, confidence
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _nearest_to_samples(
     links: Links,
     owners: NDArray[np.int32],
@@ -239,7 +239,7 @@ def _nearest_to_samples(
                             feet[i, j, k, d] = places[q, d]
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _nearest_to_neighbours(
     links: Links,
     steps: NDArray[np.float64],
@@ -314,7 +314,7 @@ def _nearest_to_neighbours(
                     feet[i, j, k, d] = places[q, d]
 
 
-@compiled(nogil=True)
+@compiled
 def _confidences(
     faces: NDArray[np.float32],
     crossings: NDArray[np.float32],
@@ -329,7 +329,7 @@ def _confidences(
                 confidence[i, j, k] = crossings[-1 - which] if which < 0 else faces[which]
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _signs(
     rows: NDArray[np.float64],
     normals: Normals,
@@ -374,7 +374,7 @@ def _signs(
                     values[i, j, k] = -values[i, j, k]
 
 
-@compiled(nogil=True)
+@compiled
 def _faces_around_cells(
     points: NDArray[np.float64],
     steps: NDArray[np.float64],

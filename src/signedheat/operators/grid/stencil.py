@@ -105,7 +105,7 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
             job.result()
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _divide(values0, values1, values2, values3, transformed, axis, start, stop):
     """Divide by the eigenvalues of C, sums of one-dimensional ones; the quotient is zero where they are zero."""
     n0, n1, n2, n = transformed.shape
@@ -120,7 +120,7 @@ def _divide(values0, values1, values2, values3, transformed, axis, start, stop):
                     line[0] = 0.0
 
 
-@compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
+@compiled
 def _divergence(components, scales, out, axis, start, stop):
     dimension = components.shape[0]
     n0, n1, n2, n = out.shape

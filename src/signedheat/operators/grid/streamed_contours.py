@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ _Seam = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 def contour_parts(
-    blocks: Blocks, values: NDArray[np.float32], spacing: NDArray[np.float64], level: float, refine: Refine
+    blocks: Blocks, values: NDArray[np.floating[Any]], spacing: NDArray[np.float64], level: float, refine: Refine
 ) -> Iterator[Part]:
     """The vertices and faces of `block_contour`, in another order, window by window.
 

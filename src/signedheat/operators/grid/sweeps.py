@@ -80,7 +80,7 @@ def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[
     return table.astype(np.float32)
 
 
-@compiled(nogil=True, fastmath={"contract", "nnan", "nsz"})
+@compiled
 def _sweep_tiles(vectors, sums, places, active, shape, ratios, pivots, tiles):
     """Update the lines of tiles in order, four components at once. Slices of lines help the compiler to vectorise."""
     n0, n1, n2, n = shape

@@ -126,7 +126,7 @@ def _sources(
     return right.reshape(shape)
 
 
-@compiled(nogil=True)
+@compiled
 def _add_divergence(
     stretches: NDArray[np.int64],
     places: NDArray[np.int32],
@@ -173,7 +173,7 @@ def _refined(values: NDArray[np.float64], shape: tuple[int, ...], axis: int) -> 
     return values
 
 
-@compiled(nogil=True)
+@compiled
 def _far_field(
     places: NDArray[np.float64], dipoles: NDArray[np.float64], strengths: NDArray[np.float64], axis: int, core: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

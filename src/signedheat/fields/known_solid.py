@@ -1,0 +1,63 @@
+"""What fields know of the solid that they are the distance to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Closest:
+    """The nearest place of a solid's surface for each of some points.
+
+    Attributes
+    ----------
+    distances : (n,) float
+        Signed distances, negative inside.
+    points : (n, 3) float
+        The nearest places.
+    faces : (n,) int
+        Face of the shape that was given on which each lies; −1 on the completion.
+    barycentric : (n, 3) float
+        Where in it: weights of its corners, for triangles; NaN elsewhere.
+    gradients : (n, 3) float
+        Gradients of the distance, of length 1; on the surface, its normals.
+    confidence : (n,) float
+        1 where surface was given; on the completion less, the farther from its rim.
+    """
+
+    distances: NDArray[np.float64]
+    points: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    barycentric: NDArray[np.float64]
+    gradients: NDArray[np.float64]
+    confidence: NDArray[np.float32]
+
+    @property
+    def completed(self) -> NDArray[np.bool_]:
+        """(n,) whether the place lies on surface that was not there."""
+        result: NDArray[np.bool_] = self.faces < 0
+        return result
+
+    def __repr__(self) -> str:
+        return f"Closest({len(self.points)} points, {int(self.completed.sum())} on the completion)"
+
+
+class KnownSolid(Protocol):
+    """A `Solid`: distance anywhere, exactly."""
+
+    @property
+    def triangles(self) -> NDArray[np.float64]:
+        """(m, 3, 3) corners of all that distance is measured to."""
+
+    def distance(self, points: ArrayLike) -> NDArray[np.float64]:
+        """(n,) signed distances of (n, 3) points, negative inside."""
+
+    def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """(n,) whether points are inside."""
+
+    def closest(self, points: ArrayLike) -> Closest:
+        """The nearest place for each of (n, 3) points."""
