@@ -9,7 +9,7 @@ import pytest
 
 import signedheat as sh
 from shapes.surfaces import disk
-from signedheat.extensions.curve_pieces import CurvesTaken
+from signedheat.curves.distance import CurvesTaken
 from signedheat.samples import sphere
 
 

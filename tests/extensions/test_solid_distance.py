@@ -100,14 +100,14 @@ def test_half_a_sphere_is_carried_on():
     assert told.where[0, 1, 0] > 0.3  # it is where nothing is
 
 
-def test_half_a_bar_is_carried_on_along_it():
+def test_half_a_bar_is_closed_where_it_ends():
     bar = samples.union(box((-1, -0.25, -0.25), (1, 0.25, 0.25)))
     left = only(
         bar, (bar.vertices[bar.faces][:, :, 0] < 0).any(axis=1) & ~(bar.vertices[bar.faces][:, :, 0] > 0).all(1)
     )
     left = TriangleMesh(np.minimum(left.vertices, [0.0, np.inf, np.inf]), left.faces)
     field = solid_distance(left, Grid.around(bar.bounds, 48))
-    assert (field([[0.3, 0, 0], [0.5, 0, 0]]) < 0).all()
+    np.testing.assert_allclose(field([[-0.1, 0, 0], [0.3, 0, 0]]), [-0.1, 0.3], atol=1e-12)
 
 
 def test_patches_are_completed_within_the_surface():
@@ -126,7 +126,7 @@ def test_noise_is_averaged():
     grid = Grid.around(ball.bounds, 48)
     truth = np.linalg.norm(grid.points, axis=-1) - 1
     noisy = samples.soup(ball, jitter=0.02)
-    assert error(solid_distance(noisy, grid), truth) < 1.1 * error(signed_distance(noisy, grid), truth) + 0.1
+    assert error(solid_distance(noisy, grid), truth) < 0.5  # the noise is .02, .8 %
 
 
 def test_a_sheet_has_no_inside():
@@ -151,13 +151,13 @@ def test_furniture():
     boards = [
         sheet([[-1, -0.7, 0], [1, -0.7, 0], [1, 0.7, 0], [-1, 0.7, 0]]),
         turned(sheet([[-1, -0.7, 0.9], [1, -0.7, 0.9], [1, 0.7, 0.9], [-1, 0.7, 0.9]])),
-        sheet([[-1, -0.7, 0], [-1, 0.7, 0], [-1, 0.7, 0.9], [-1, -0.7, 0.9]]),
+        sheet([[-1.2, -0.7, 0], [-1.2, 0.7, 0], [-1.2, 0.7, 0.9], [-1.2, -0.7, 0.9]]),
     ]
     shape = samples.union(*legs, *boards)
     field = solid_distance(shape, resolution=64, padding=0.4)
     assert (field([[x, y, -0.5] for x in (-0.8, 0.8) for y in (-0.5, 0.5)]) < 0).all()
     p = field.grid.points
-    outside = (np.abs(p) > [1, 0.7, 1]).any(axis=-1)
+    outside = (np.abs(p) > [1.2, 0.7, 1]).any(axis=-1)
     assert (field.values[outside] < 0).mean() < 1e-3
     assert offset_is_clear(field, shape, 0.1) < 0.01
 

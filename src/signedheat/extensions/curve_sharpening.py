@@ -133,6 +133,7 @@ def sharpened_to_curves(
             InexactWarning,
         )
     new = np.copysign(distance, np.where(side != 0, side, values))
+    new = np.where(np.isfinite(distance), new, values)  # parts of clouds that no triangles join
     return np.where(np.isnan(values), np.nan, new), (note, told(triangles, *counts))
 
 

@@ -23,7 +23,6 @@ from ..domains.inspection import inspect
 from ..domains.kinds import Shape
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from .orientation import orientation
@@ -33,7 +32,7 @@ TOLD = 0.005
 """Fraction of the surface that may be completed, or bound nothing, without a word."""
 
 
-def told(field: GridField | TetField | BandField) -> list[str]:
+def told(field: GridField | TetField) -> list[str]:
     """What to know about a field before trusting it, a line for each thing."""
     lines = []
     for note in field.diagnostics.notes:
@@ -56,7 +55,7 @@ def told(field: GridField | TetField | BandField) -> list[str]:
 
 def describe(field: Any) -> dict[str, Any]:
     """Key figures of a field, for ``--json``."""
-    if isinstance(field, GridField | BandField):
+    if isinstance(field, GridField):
         note = field.diagnostics.note(SampledSource)
         where = {
             "origin": field.grid.origin.tolist(),
@@ -66,7 +65,7 @@ def describe(field: Any) -> dict[str, Any]:
             "area_cancelled": note.area_cancelled if note else 0.0,
             "confidence": field.surface_confidence,
         }
-        if isinstance(field, BandField):
+        if field.blocks is not None:
             where |= {"band": field.width, "blocks": len(field.blocks), "nodes": field.n_nodes}
     else:
         where = {"n_vertices": len(field.values)}

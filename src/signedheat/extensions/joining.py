@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..domains.foreign import as_shapes
 from ..domains.kinds import ShapeLike
@@ -37,3 +38,13 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
     starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def joined_triangles(
+    parts: Sequence[TriangleMesh | PolygonMesh], origin: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices around `origin` and triangles of meshes."""
+    meshes = [part.triangulation for part in parts]
+    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return np.concatenate([mesh.vertices - origin for mesh in meshes]), np.concatenate(faces)

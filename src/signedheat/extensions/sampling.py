@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.validation import finite_number, whole_number
-from ..errors import OutsideError, SignedHeatError
-from ..fields.band_field import BandField
-from ..fields.closest_points import known_surface
+from ..errors import OutsideError, SignedHeatError, SourceError
 from ..fields.grid_field import GridField
 from ..memory import refuse_beyond_memory
-from ..operators.grid.exact_surface import ExactSurface
 from ..slots import Slot
 
 WIDTHS = (0.05, 0.0158)
@@ -115,7 +112,7 @@ class Samples:
 
 
 def sample(
-    field: GridField | BandField,
+    field: GridField,
     n: int = 250_000,
     *,
     near: float = 0.8,
@@ -125,12 +122,12 @@ def sample(
     """Points with distances and gradients, near the surface of a shape and all around it.
 
     Near the surface: places on it, evenly by area, moved by normal noise along each axis. All around it: evenly spread
-    over the cube around the sphere that holds the shape. Distances are measured anew (`GridField.closest_points`), not
+    over the cube around the sphere that holds the shape. Distances are measured anew (`Solid.closest`), not
     interpolated between the nodes of the field.
 
     Parameters
     ----------
-    field : GridField or BandField
+    field : GridField
         Distance in space, from `solid_distance` or ``sharpen(field, shape)``.
     n : int
         Number of points.
@@ -170,7 +167,12 @@ def sample(
         raise SignedHeatError(f"the share near the surface is {near:g}", remedy="choose it from 0 to 1")
     scales = [finite_number(width, "the width of the noise", least=0) for width in widths]
     n_near = round(near * n) if scales else 0
-    triangles, _ = surface_triangles(field, known_surface(field.surface))
+    if field.solid is None:
+        raise SourceError(
+            "the field does not know the solid that it is the distance to",
+            remedy="take it from solid_distance or Solid.field, not from a file",
+        )
+    triangles = field.solid.triangles
     if not len(triangles):
         raise OutsideError("the field has no zero set to sample", remedy="compute it on a finer grid", element="field")
     lower, upper = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
@@ -183,33 +185,9 @@ def sample(
         places = _on_triangles(triangles, stop - start, random)
         points[start:stop] = places + random.normal(scale=width * radius, size=places.shape)
     points[n_near:] = center + radius * random.uniform(-1.0, 1.0, (n - n_near, 3))
-    found = field.closest_points(points)
+    found = field.solid.closest(points)
     is_near = np.arange(n) < n_near
     return Samples(points, found.distances, found.gradients, is_near, found.completed, center, radius)
-
-
-def surface_triangles(
-    field: GridField | BandField, surface: ExactSurface
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(m, 3, 3) triangles that cover the surface of a field once, and which of them only stand in for missing faces."""
-    faces = surface.features.corners.reshape(-1, 3, 3) + surface.origin
-    restored = surface.features.trusted < 1.0
-    if len(faces) and not len(surface.crossings) and (surface.features.across >= 0).all():  # nothing is missing
-        return faces, restored
-    try:
-        contour = cast("GridField[Literal[3]] | BandField", field).contour(
-            0.0
-        )  # every field with a surface is in space
-    except OutsideError:  # open sheets, which bound nothing
-        return faces, restored
-    triangles = contour.vertices[contour.faces]
-    middles = triangles.mean(axis=1)
-    inside = ((middles > field.grid.origin) & (middles < field.grid.upper)).all(axis=1)  # not the walls of the box
-    triangles = triangles[inside]
-    places = surface.nearest(middles[inside] - surface.origin)
-    beside = (places.sides == 0) & (places.distances > BESIDE * float(surface.steps.max()))
-    triangles = triangles[places.completed | beside]
-    return np.concatenate([faces, triangles]), np.concatenate([restored, np.ones(len(triangles), dtype=bool)])
 
 
 def _on_triangles(triangles: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from functools import singledispatch
 from typing import Protocol, TypeVar, overload, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics, Note, SlopeErrors
 from ..discretization import Discretization, SourceTerm
@@ -22,7 +22,6 @@ from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
-from .shape_sharpening import Fit
 from .sharpening_methods import Geodesic
 
 
@@ -51,10 +50,7 @@ OnSurface = TypeVar("OnSurface", bound=VertexField)
 @overload
 def sharpen(
     field: GridField[Dimension],
-    shape: Shapes | None = None,
     *,
-    fit: Fit = "auto",
-    sides: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> GridField[Dimension]: ...
 @overload
@@ -70,13 +66,8 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
 
     This is Section 7.3 of the paper.
 
-    On grids: the distance of every node to the zero set, second order, with the signs of the field. With a ``shape``:
-    exact distance to the faces of the shape where they are, and to the zero set where it is farther than 1.5 cells from
-    any, since there it stands in for what is missing. Within two cells of a face the face tells the side, where the
-    surface around the nearest place is closed and consistent, so that edges stay sharp and plates thinner than a cell
-    stay thin; elsewhere the field does. Where faces lie in layers that face the same way (scattered faces, sheets given
-    twice), none of them is the surface, and the zero set, which runs in their middle, takes their place. Points are
-    fitted: the zero set is moved onto a smooth surface through them.
+    On grids: the distance of every node to the zero set, second order, with the signs of the field. Distance to a shape
+    itself is that of `complete`.
 
     On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
     smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With
@@ -86,7 +77,7 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
 
     On tets: distance along straight lines in space, which bend around the boundary of the mesh, to the zero set. With a
     ``shape``: to the faces of the shape, exactly, and to the zero set where it is farther than one and a half edges
-    from any; faces tell sides as on grids.
+    from any. Within two edges of a face the face decides the side, where the surface is closed there.
 
     On surfaces and tets ``method=Convex()`` is the method of the paper, which is less accurate but can correct wrong
     signs. On tets it usually increases the error: gradients of length at most one in every tet make the field too
@@ -96,15 +87,10 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     ----------
     field : GridField, VertexField or TetField
         From `signed_distance` or `SignedHeatSolver.distance`.
-    shape : TriangleMesh, PolygonMesh or PointCloud with normals, or a sequence of them, optional
-        On grids in space and on tets: what the field was computed from, oriented, and without parts inside others; no
-        points on tets.
-    fit : "auto", "exact" or "smooth"
-        With a shape: whether to tell layers from shape, to measure to every face, or to the zero set alone.
+    shape : TriangleMesh or PolygonMesh, or a sequence of them, optional
+        On tets: what the field was computed from, oriented, and without parts inside others.
     curves : Curve, SurfacePoints or a sequence of them, optional
         On surfaces: what the field was computed from.
-    sides : (*grid.shape) float, optional
-        With a shape: values whose signs and zero set take the place of the field's.
     method : Geodesic or Convex, optional
         On surfaces and tets only.
     progress : callable, optional
@@ -113,11 +99,10 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     Returns
     -------
     GridField, VertexField or TetField
-        The same kind of field. Sharpened to a shape, it has a `confidence`, contours whose vertices lie on the level
-        exactly, and ``diagnostics`` with a note `diagnostics.SharpenedToShape`; sharpened to curves, a note
-        `diagnostics.SharpenedToCurves`. On surfaces and tets ``diagnostics`` has a note `diagnostics.SlopeErrors`, the
-        root mean squares of ``|∇φ| − 1`` over the domain before and after, and notes of the method. If slopes became
-        clearly worse, an `InexactWarning` is issued, and the note says so.
+        The same kind of field, with a note `diagnostics.SharpenedToShape` or `diagnostics.SharpenedToCurves`. On
+        surfaces and tets ``diagnostics`` has a note `diagnostics.SlopeErrors`, the root mean squares of ``|∇φ| − 1``
+        over the domain before and after, and notes of the method. If slopes became clearly worse, an `InexactWarning`
+        is issued, and the note says so.
 
     Raises
     ------
@@ -138,13 +123,6 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     >>> radius = np.linalg.norm(grid.points, axis=-1)
     >>> sharpened = sharpen(GridField(grid, radius**2 - 0.25))
     >>> bool(np.abs(sharpened.values - (radius - 0.5)).max() < 0.01)
-    True
-
-    >>> from signedheat import TriangleMesh, signed_distance
-    >>> faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
-    >>> tetrahedron = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces)
-    >>> exact = sharpen(signed_distance(tetrahedron, resolution=24), tetrahedron)
-    >>> bool(np.isclose(exact.values[2, 12, 10], -exact.grid.origin[0] - 2 * exact.grid.spacing[0]))
     True
     """
     return sharpen_field(field, *arguments, **options)

@@ -3,8 +3,8 @@
 Unlike lattices, unstructured tets have no preferred directions: at the same size the unsharpened error is half as
 large, or less (``benchmarks/tets.py``).
 
-* TetGen (``pip install signedheat[tetgen]``) is under the AGPL-3 or a commercial licence, whatever its wheel says.
-* fTetWild (``pip install signedheat[tetwild]``) is under the MPL-2.0.
+* TetGen (``pip install tetgen pyvista``) is under the AGPL-3 or a commercial licence, whatever its wheel says.
+* fTetWild (``pip install pytetwild``) is under the MPL-2.0.
 """
 
 from __future__ import annotations

@@ -20,8 +20,11 @@ from ..operators.grid.sampled_surface import NEAR
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
-from .shape_sharpening import FAR, Shape, joined_triangles
+from .joining import Shape, joined_triangles
 from .tet_distance import Surface, distance_around
+
+FAR = 1.5
+"""Mean edges: the zero set farther than that from any face stands for missing surface."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +47,11 @@ class ToShapes:
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
         """Sharpened values at the unknowns of tets; see `Method`."""
         assert isinstance(discretization, TetDiscretization)
-        if any(isinstance(part, PointCloud) for part in self.parts):
+        meshes = [part for part in self.parts if not isinstance(part, PointCloud)]
+        if len(meshes) != len(self.parts):
             raise SourceError("fields on tets are sharpened to faces, and points have none", element="shape")
         center = discretization.planes.center
-        features = FaceFeatures.of(*joined_triangles(self.parts, center))
+        features = FaceFeatures.of(*joined_triangles(meshes, center))
         points = discretization.mesh.vertices[discretization.vertices] - center
         positions, corners, owners = level_triangles(points, discretization.unknowns, values, 0.0)
         n_faces = len(features.rows)

@@ -20,7 +20,7 @@ from ..lowering.tets.discretization import TetDiscretization, lowered_tets
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
-from .shape_sharpening import Shape
+from .joining import Shape
 from .sharpening import Method, sharpen_field, sharpened
 from .sharpening_methods import straight_distance
 from .tet_distance import Surface, distance_around
