@@ -6,6 +6,7 @@ import scipy
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.fields.levels import on_level
 from signedheat.geometry.edge_flips import SHARP, flipped_along_creases
 from signedheat.geometry.edges import edge_table
 from signedheat.geometry.marching import closed_surface
@@ -37,9 +38,11 @@ def field():
 def test_the_crease_between_two_balls_has_no_teeth(field):
     """Around the circle at which the two offsets meet the surface bends by their angle, and teeth bend more."""
     made = field.offset(0.3)
-    grid, surface = field.grid, field.surface
+    grid = field.grid
     toothed = sh.TriangleMesh(
-        *closed_surface(field.values, grid.origin, grid.spacing, 0.3, lambda p: surface.on_level(p, field.values, 0.3))
+        *closed_surface(
+            field.values, grid.origin, grid.spacing, 0.3, lambda p: on_level(field.solid, p, field.values, grid, 0.3)
+        )
     )
     assert np.array_equal(toothed.vertices, made.vertices)
     exact = 2 * np.pi * np.sqrt(1.3**2 - 1.1**2) * 2 * np.arcsin(1.1 / 1.3)

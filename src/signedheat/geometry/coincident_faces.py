@@ -36,7 +36,7 @@ def coincident_faces(
     return first, reverse
 
 
-@compiled(nogil=True)
+@compiled
 def _coincident(
     corners: NDArray[np.int64], offsets: NDArray[np.int64], n_vertices: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
@@ -77,7 +77,7 @@ def _coincident(
     return first, reverse
 
 
-@compiled(nogil=True)
+@compiled
 def _compare(corners: NDArray[np.int64], other: int, other_end: int, least: int, begin: int, size: int) -> int:
     """1 for the same cycle, −1 for the opposite, 0 for another one; `least` is the place of the least corner."""
     if other_end - other != size:

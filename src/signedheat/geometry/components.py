@@ -56,7 +56,7 @@ def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
     return _element_components(np.ascontiguousarray(elements), int(elements.max()) + 1)
 
 
-@compiled(nogil=True)
+@compiled
 def _same_rows(bits):
     count, dimension = bits.shape
     size = 16
@@ -88,7 +88,7 @@ def _same_rows(bits):
     return result
 
 
-@compiled(nogil=True)
+@compiled
 def _element_components(elements, n):
     parent = np.empty(n, dtype=np.int64)
     for i in range(n):

@@ -102,8 +102,10 @@ def given_directions(
     return directions / length
 
 
-def carried_left(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(k,) −1 where the face that tells a segment's left is turned against that of the first segment, else 1.
+def carried_left(
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64], lengths: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(k,) −1 where the face that tells a segment's left is turned against those of most of the curve, else 1.
 
     Faces are compared across the edges around the curve, so left stays on one side of it however faces are turned. On a
     curve along which orientation is lost, left changes sides somewhere.
@@ -114,6 +116,8 @@ def carried_left(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDAr
         The surface.
     faces, edges : (k,) int
         Face of each segment, and the edge that it runs along or −1: there the first face at the edge tells left.
+    lengths : (k,) float
+        Of the segments.
     """
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
@@ -132,7 +136,8 @@ def carried_left(triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDAr
     near = around[one] & around[other]
     votes = agree[near] * pairs.shares[near]
     signs = synchronize_signs(number[one[near]], number[other[near]], votes, int(around.sum()))[number[telling]]
-    relative: NDArray[np.float64] = signs * signs[0]
+    most = float(np.sign(signs @ lengths)) or signs[0]
+    relative: NDArray[np.float64] = signs * most
     return relative
 
 

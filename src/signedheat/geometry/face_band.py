@@ -50,7 +50,7 @@ def nearest_in_band(
     return nearest, squares
 
 
-@compiled(nogil=True)
+@compiled
 def _visit_walls(
     rows: NDArray[np.float64], steps: NDArray[np.float64], nearest: NDArray[np.int32], squares: NDArray[np.float32]
 ) -> None:
@@ -76,7 +76,7 @@ def _visit_walls(
                         nearest[i, j, k] = f
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _visit_nodes(
     rows: NDArray[np.float64],
     steps: NDArray[np.float64],

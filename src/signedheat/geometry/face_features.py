@@ -67,6 +67,8 @@ class FaceFeatures:
         Corners around each vertex, in compressed rows: three times the face, plus 0, 1 or 2.
     trusted : (m,) float
         Confidence in each face: 1 where it was there, less where it was put back.
+    ids : (m,) int
+        Which of the triangles given each is.
     """
 
     corners: NDArray[np.float64]
@@ -84,6 +86,7 @@ class FaceFeatures:
     vertex_starts: NDArray[np.int64]
     vertex_corners: NDArray[np.int32]
     trusted: NDArray[np.float32]
+    ids: NDArray[np.int64]
 
     @property
     def links(self) -> Links:
@@ -127,19 +130,20 @@ class FaceFeatures:
         """
         faces = same_positions(vertices)[faces]
         trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
+        ids = np.arange(len(faces))
         a, b, c = faces.T
         proper = (a != b) & (b != c) & (c != a)
         if not proper.all():
-            faces, trusted = faces[proper], trusted[proper]
+            faces, trusted, ids = faces[proper], trusted[proper], ids[proper]
         if len(faces):  # what is near in space had better be near in memory
             order = np.argsort(morton_codes(vertices[faces].mean(axis=1)), kind="stable")
-            trusted = trusted[order]
+            trusted, ids = trusted[order], ids[order]
             order, faces = _by_first_use(faces[order], len(vertices))
             vertices = vertices[order]
         table = edge_table(faces)
         copies = _copies(faces, table)
         if copies.any():
-            faces, trusted = faces[~copies], trusted[~copies]
+            faces, trusted, ids = faces[~copies], trusted[~copies], ids[~copies]
             table = edge_table(faces)
         corners = np.ascontiguousarray(vertices[faces].reshape(-1, 9))
         starts = np.zeros(len(vertices) + 1, dtype=np.int64)
@@ -163,6 +167,7 @@ class FaceFeatures:
             starts,
             _corners_around(faces, starts),
             trusted,
+            ids,
         )
 
 
@@ -179,7 +184,7 @@ def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
     return copies
 
 
-@compiled(nogil=True)
+@compiled
 def _by_first_use(faces: NDArray[np.int64], n_vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Used vertices in the order in which faces name them first, and the faces with their numbers in that order."""
     number = np.full(n_vertices, -1, dtype=np.int64)
@@ -197,7 +202,7 @@ def _by_first_use(faces: NDArray[np.int64], n_vertices: int) -> tuple[NDArray[np
     return order[:count], result
 
 
-@compiled(nogil=True)
+@compiled
 def _corners_around(faces: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.int32]:
     fill = starts.copy()
     corners = np.empty(3 * len(faces), dtype=np.int32)
@@ -209,7 +214,7 @@ def _corners_around(faces: NDArray[np.int64], starts: NDArray[np.int64]) -> NDAr
     return corners
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _normals(
     corners: NDArray[np.float64],
     faces: NDArray[np.int64],

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +29,9 @@ DISC_LEVELS = 8
 """Levels of the tree, from the leaves up, that have discs."""
 FLAT = 0.5
 """Thickness over radius up to which a disc says more than a box."""
+FAR = 1e7
+"""Sizes of a surface beyond which a point is searched for where it would be at that distance: neither rounding, which
+grows with distance, nor the other angle then moves the nearest place by more than 1e-7 of the size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,26 +67,50 @@ class FaceTree:
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) distance of each of (n, 3) points to the nearest face."""
-        faces, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
+        distances = np.empty(len(points))
 
         def part(start: int) -> None:
             here = slice(start, start + TOGETHER)
-            self._nearest(points[here], faces[here], squares[here])
+            distances[here] = self._distances(points[here])
 
         _on_threads(part, range(0, len(points), TOGETHER))
-        return np.sqrt(squares)
+        return distances
 
     def search(self, points: NDArray[np.float64]) -> NearestFaces:
         """The nearest face of each of (n, 3) points: fast where those that follow each other are near each other.
 
         Each `RUN` of points is searched on its own: what comes before does not matter.
         """
-        faces, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
-        self._nearest(points, faces, squares)
-        return search_from(self.features, points, faces[:, None])
+        nearer = self._brought_near(points)
+        faces, _ = self._nearest(nearer)
+        found = search_from(self.features, nearer, faces[:, None])
+        return found if nearer is points else replace(found, distances=np.linalg.norm(points - found.feet, axis=1))
 
-    def _nearest(self, points: NDArray[np.float64], faces: NDArray[np.int32], squares: NDArray[np.float64]) -> None:
+    def _distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        nearer = self._brought_near(points)
+        if nearer is not points:
+            return self.search(points).distances
+        distances: NDArray[np.float64] = np.sqrt(self._nearest(points)[1])
+        return distances
+
+    def _brought_near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The points; those beyond `FAR` sizes of the surface on the same ray from its middle, at that distance."""
+        lower, upper = self.tree.bounds[1, :3], self.tree.bounds[1, 3:]
+        middle, limit = 0.5 * (lower + upper), FAR * float(np.linalg.norm(upper - lower))
+        away = points - middle
+        distances = np.linalg.norm(away, axis=1)
+        far = (distances > limit) & (limit > 0)
+        if not far.any():
+            return points
+        result: NDArray[np.float64] = points.copy()
+        result[far] = middle + away[far] * (limit / distances[far])[:, None]
+        return result
+
+    def _nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Nearest faces of points, and the squares of their distances."""
+        faces, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
         descend(self.features.rows, self.tree.bounds, self.discs, self.tree.items, points, RUN, faces, squares)
+        return faces, squares
 
 
 def _on_threads(part: Callable[[int], None], starts: range) -> None:
@@ -92,7 +119,7 @@ def _on_threads(part: Callable[[int], None], starts: range) -> None:
             job.result()
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _discs(corners: NDArray[np.float64], bounds: NDArray[np.float64], items: NDArray[np.int64]) -> NDArray[np.float64]:
     """See `FaceTree.discs`; corners of faces stand for them, which is enough, since discs are convex."""
     leaves = len(bounds) // 2

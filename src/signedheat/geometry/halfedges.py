@@ -133,7 +133,7 @@ def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDAr
     return bool(_may_coincide(pairs.counts, pairs.first, pairs.second, tails, following))
 
 
-@compiled(nogil=True)
+@compiled
 def _may_coincide(
     counts: NDArray[np.int32],
     first: NDArray[np.int32],
@@ -159,7 +159,7 @@ def _may_coincide(
     return False
 
 
-@compiled(nogil=True)
+@compiled
 def _pair(
     tails: NDArray[np.int64], heads: NDArray[np.int64], n_vertices: int, used: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
@@ -201,7 +201,7 @@ def _pair(
     return edges, counts[:n_edges].copy(), first[:n_edges].copy(), second[:n_edges].copy()
 
 
-@compiled(nogil=True)
+@compiled
 def _root(parents: NDArray[np.int64], ways: NDArray[np.bool_], face: int) -> tuple[int, bool]:
     """Root of a face's tree, and whether the face is turned against it; paths are halved on the way."""
     way = False
@@ -214,7 +214,7 @@ def _root(parents: NDArray[np.int64], ways: NDArray[np.bool_], face: int) -> tup
     return face, way
 
 
-@compiled(nogil=True)
+@compiled
 def _orient(
     edges: NDArray[np.int32],
     counts: NDArray[np.int32],

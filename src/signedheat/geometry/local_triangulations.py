@@ -14,14 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ..parallel import n_threads
 from .components import connected_components
 from .edges import edge_table
 from .hole_filling import hole_fillings
-from .local_triangulation_kernels import accept_apart, signs_from_parents, voronoi_fans
+from .local_triangulation_kernels import accept_apart, voronoi_fans
+from .synchronization import synchronize_signs
 
+GIVEN = 1.0
+"""Weight of a given normal, beside that of a neighbour in the same plane, of which there are six."""
 _CHUNK = 65536
 _ROWS = 4096  # for a thread at a time
 
@@ -172,29 +174,24 @@ def aligned(
     faces: NDArray[np.int64],
     given: NDArray[np.float64] | None,
 ) -> NDArray[np.int64]:
-    """(n,) signs that make normals consistent along a minimum spanning tree of the edges (Hoppe et al. 1992).
+    """(n,) signs that make normals agree with those of their neighbours, and with given ones.
 
-    Each connected component is then turned to the side to which most of its given normals point, or outward: so that
-    its volume, computed from its centroid, is positive.
+    Where none are given, each connected component is turned outward: so that its volume, computed from its centroid, is
+    positive.
     """
     n = len(points)
     tail, head = edge_table(faces).vertices.T
-    bend = 1.0 - np.abs((normals[tail] * normals[head]).sum(axis=1))
-    graph = sparse.csr_matrix((np.maximum(bend, 0) + 1e-6, (tail, head)), shape=(n, n))
     parts = connected_components(n, tail, head)
-    roots = np.unique(parts, return_index=True)[1]
-    tree = sparse.coo_matrix(sparse.csgraph.minimum_spanning_tree(graph))
-    above = np.full(len(roots), n)  # one node above all roots makes one tree of the forest
-    rows, columns = np.concatenate([tree.row, above]), np.concatenate([tree.col, roots])
-    tree = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(n + 1, n + 1))
-    order, parents = sparse.csgraph.breadth_first_order(tree, n, directed=False)
-    order, parents = order[1:], np.where(parents[:n] == n, -1, parents[:n])
-    relative = np.where((normals * normals[parents]).sum(axis=1) < 0, -1, 1)
-    signs = signs_from_parents(order.astype(np.int64), parents.astype(np.int64), relative)
-
+    across = (normals[tail] * normals[head]).sum(axis=1)
+    tails, heads, weights = tail, head, across * np.abs(across)  # planes at a crease tell little
     if given is not None:
-        outward = signs * np.sign((normals * given).sum(axis=1))
-        preference = np.bincount(parts, outward)
+        own = GIVEN * (normals * given).sum(axis=1)
+        tails, heads = np.concatenate([tail, np.arange(n)]), np.concatenate([head, np.full(n, n)])
+        weights = np.concatenate([weights, own])
+    found = synchronize_signs(tails, heads, weights, n + 1)
+    signs = (found[:n] * found[n]).astype(np.int64)
+    if given is not None:
+        preference = np.bincount(parts, signs * (normals * given).sum(axis=1))
     else:
         normals = normals * signs[:, None]
         faces = facing(points, normals, faces)
@@ -202,7 +199,7 @@ def aligned(
         size = np.bincount(parts)[:, None]
         center = np.stack([np.bincount(parts, column) for column in points.T], axis=1) / size
         flux = (np.cross(b - a, c - a) * (a - center[parts[faces[:, 0]]])).sum(axis=1)
-        preference = np.bincount(parts[faces[:, 0]], flux, len(roots))
+        preference = np.bincount(parts[faces[:, 0]], flux, int(parts.max()) + 1)
     return np.where(preference < 0, -1, 1)[parts] * signs
 
 

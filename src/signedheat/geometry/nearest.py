@@ -32,7 +32,7 @@ def nearest_on_triangles(
     return found.astype(np.int64), _weights(corners, found, points)
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def descend(
     rows: NDArray[np.float64],
     bounds: NDArray[np.float64],
@@ -111,7 +111,7 @@ def descend(
         out_faces[p], out_squares[p] = face, best
 
 
-@compiled(nogil=True)
+@compiled
 def _weights(
     triangles: NDArray[np.float64], faces: NDArray[np.int32], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:

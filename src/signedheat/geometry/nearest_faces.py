@@ -64,7 +64,7 @@ def search_from(
     return NearestFaces(faces, np.sqrt(squares), feet, codes, cosines, regular)
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def nearest_of_candidates(
     links: Links,
     points: NDArray[np.float64],
@@ -130,7 +130,7 @@ def nearest_of_candidates(
         out_feet[p, 0], out_feet[p, 1], out_feet[p, 2] = fx, fy, fz
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def facing(
     normals: Normals,
     points: NDArray[np.float64],
@@ -165,7 +165,7 @@ def facing(
         out_regular[p] = regular
 
 
-@compiled(nogil=True)
+@compiled
 def feet_of_nodes(
     rows: NDArray[np.float64], nearest: NDArray[np.int32], steps: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:

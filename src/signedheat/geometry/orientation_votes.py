@@ -88,7 +88,7 @@ def containers(
     return np.asarray(_containers(starts, parts, entering, bounding))
 
 
-@compiled(nogil=True)
+@compiled
 def _votes(
     starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int
 ) -> tuple[
@@ -135,7 +135,7 @@ def _votes(
     return crossings, seen, seen_votes, own, own_votes, even, even_votes, lines, balanced
 
 
-@compiled(nogil=True)
+@compiled
 def _containers(
     starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], bounding: NDArray[np.bool_]
 ) -> NDArray[np.int64]:

@@ -10,7 +10,7 @@ from ..compiled import compiled
 # Feature codes of a foot: 0 inside the face; 1, 2, 3 on its edges (corner 0–1, 1–2, 2–0); 4, 5, 6 its corners 0, 1, 2.
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def triangle_rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m, 16) what `foot_on_triangle` needs of (m, 9) corners: a corner, two sides, their products and inverses.
 
@@ -36,7 +36,7 @@ def triangle_rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return rows
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def foot_on_triangle(
     rows: NDArray[np.float64], f: int, x: float, y: float, z: float
 ) -> tuple[float, int, float, float, float]:

@@ -63,3 +63,21 @@ def assemble_polylines(
             order, backwards, end = walk(segment, start)
             found.append((np.array(order), np.array(backwards), end == start))
     return found
+
+
+def leaving(points: NDArray[np.float64], closed: bool, room: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Which of (n, d) points of a polyline are left for another place, which is farther than the `room` (n,) of each.
+
+    The end of an open polyline, which is left for nothing, is kept as well.
+
+    Examples
+    --------
+    >>> leaving(np.array([[0.0], [0.0], [1.0], [1.1]]), False, np.full(4, 0.5)).tolist()
+    [1, 3]
+    >>> leaving(np.array([[0.0], [1.0], [2.0], [0.0]]), True, np.zeros(4)).tolist()
+    [0, 1, 2]
+    """
+    moves = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) > room
+    if not closed:
+        moves[-1] = True
+    return np.flatnonzero(moves)

@@ -162,7 +162,7 @@ def line_frames(n: int) -> NDArray[np.float64]:
     return frames
 
 
-@compiled(nogil=True)
+@compiled
 def _draw(
     vertices: NDArray[np.float64],
     triangles: NDArray[np.int64],
@@ -225,7 +225,7 @@ def _draw(
     return ids[:count], entering[:count], places[:count]
 
 
-@compiled(nogil=True)
+@compiled
 def _aim(
     vertices: NDArray[np.float64],
     triangles: NDArray[np.int64],
@@ -280,7 +280,7 @@ def _aim(
     return ids[:count], entering[:count], places[:count]
 
 
-@compiled(nogil=True)
+@compiled
 def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
     """Where a row crosses a side: the same number whichever way round the side is given."""
     if ay > by:
@@ -288,7 +288,7 @@ def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
     return ax + (bx - ax) * ((y - ay) / (by - ay))
 
 
-@compiled(nogil=True)
+@compiled
 def _doubled(
     ids: NDArray[np.int32], entering: NDArray[np.bool_], places: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.float64]]:
@@ -302,7 +302,7 @@ def _doubled(
     return more
 
 
-@compiled(nogil=True)
+@compiled
 def _by_line(
     ids: NDArray[np.int32], order: NDArray[np.int64], n_lines: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -164,7 +164,7 @@ def _contraction(graph: _Graph) -> tuple[NDArray[np.int64], NDArray[np.float64]]
     return np.unique(leader, return_inverse=True)[1].ravel(), sign
 
 
-@compiled(nogil=True)
+@compiled
 def turn_where_better(
     starts: NDArray[np.int64],
     neighbors: NDArray[np.int64],

@@ -30,7 +30,7 @@ def spread_out(points: NDArray[np.float64], radii: NDArray[np.float64]) -> NDArr
     return np.flatnonzero(free)
 
 
-@compiled(nogil=True)
+@compiled
 def _keep_first(
     ids: NDArray[np.int64], ends: NDArray[np.int64], near: NDArray[np.int64], free: NDArray[np.bool_]
 ) -> None:

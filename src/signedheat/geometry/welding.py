@@ -64,7 +64,7 @@ def distinct_rows(rows: NDArray[np.unsignedinteger]) -> tuple[NDArray[np.int64],
     return ids, firsts
 
 
-@compiled(nogil=True)
+@compiled
 def mixed(a: int, b: int, c: int) -> int:
     """Hash of three integers, not negative: halves times odd numbers, so that no product leaves 64 bits."""
     x = ((a & _HALF) * 0x1E3779B1) ^ ((b & _HALF) * 0x2545F491) ^ ((c & _HALF) * 0x165667B1)
@@ -73,7 +73,7 @@ def mixed(a: int, b: int, c: int) -> int:
     return (x ^ (x >> 27)) & 0x7FFFFFFFFFFFFFFF
 
 
-@compiled(nogil=True)
+@compiled
 def _weld(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     n = len(points)
     bits = 4
@@ -107,7 +107,7 @@ def _weld(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     return owner
 
 
-@compiled(nogil=True)
+@compiled
 def _distinct(rows: NDArray[np.unsignedinteger]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     n = len(rows)
     bits = 4

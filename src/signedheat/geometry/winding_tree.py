@@ -77,7 +77,7 @@ class WindingTree:
         return moments_of(self.triangles, self.tree, OPENING)
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _winding(
     corners: NDArray[np.float64], items: NDArray[np.int64], moments: NDArray[np.float64], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -123,7 +123,7 @@ def _winding(
     return result
 
 
-@compiled(nogil=True, error_model="numpy")
+@compiled
 def _solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> tuple[float, float]:
     """Parts of a complex number whose argument is half the signed solid angle of a triangle from a point.
 

@@ -30,7 +30,7 @@ class FacePlanes(NamedTuple):
     signs: NDArray[np.float64]
 
 
-@compiled(nogil=True)
+@compiled
 def _beyond(planes, tet, k, x, y, z):
     """Signed distance by which a point lies outside the face opposite corner k of a tet."""
     f = planes.tet_faces[tet, k]
@@ -38,7 +38,7 @@ def _beyond(planes, tet, k, x, y, z):
     return planes.signs[tet, k] * height
 
 
-@compiled(nogil=True)
+@compiled
 def _seen(planes, points, first_tet, tets_at, v, target, slack):
     """Whether the segment from vertex v to a target in the mesh lies in the mesh."""
     x, y, z = points[v]
@@ -69,7 +69,7 @@ def _seen(planes, points, first_tet, tets_at, v, target, slack):
     return False
 
 
-@compiled(nogil=True)
+@compiled
 def _foot(triangles, triangles_at, first_triangle, corners, near, x, y, z):
     """Nearest point to (x, y, z) on the triangles that share a corner with triangle `near`: triangle and position."""
     best, found, place = np.inf, near, np.zeros(3)
@@ -83,12 +83,12 @@ def _foot(triangles, triangles_at, first_triangle, corners, near, x, y, z):
     return found, place
 
 
-@compiled(nogil=True)
+@compiled
 def _length(point, x, y, z):
     return np.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)
 
 
-@compiled(nogil=True)
+@compiled
 def any_angle_distance(
     planes, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, owners, nearest, slack, queue
 ):

@@ -95,7 +95,7 @@ USED, FREE, MADE, WANTED = range(4)
 """Rows ever used, the first free one of these, windows made so far, and rows that were missing."""
 
 
-@compiled(nogil=True)
+@compiled
 def has_room(counts: NDArray[np.int64], size: int, n: int) -> bool:
     """Whether n more windows fit into an array of so many rows; otherwise notes how many were wanted."""
     if counts[USED] + n <= size:
@@ -104,7 +104,7 @@ def has_room(counts: NDArray[np.int64], size: int, n: int) -> bool:
     return False
 
 
-@compiled(nogil=True)
+@compiled
 def take_row(counts: NDArray[np.int64], following: NDArray[np.int64]) -> int:
     """A row for a window; there must be room."""
     row = counts[FREE]
@@ -116,14 +116,14 @@ def take_row(counts: NDArray[np.int64], following: NDArray[np.int64]) -> int:
     return int(row)
 
 
-@compiled(nogil=True)
+@compiled
 def free_row(counts: NDArray[np.int64], following: NDArray[np.int64], row: int) -> None:
     """Give a row back."""
     following[row] = counts[FREE]
     counts[FREE] = row
 
 
-@compiled(nogil=True)
+@compiled
 def propagate_across(faces, search, face, side, kind, t0, t1, point, normal, sigma, slack):
     """Propagate distance across a side of a face, from within, to the faces beyond; nothing where there is no room.
 
@@ -170,7 +170,7 @@ def propagate_across(faces, search, face, side, kind, t0, t1, point, normal, sig
                 push(queue, halfedge, near + 1.5 * length)
 
 
-@compiled(nogil=True)
+@compiled
 def _reach_corners(faces, distance, face, start, end):
     """Distance of the corners of a face to a segment or a point in it."""
     along = end - start
@@ -181,7 +181,7 @@ def _reach_corners(faces, distance, face, start, end):
         distance[v] = min(distance[v], abs(r - t * along))
 
 
-@compiled(nogil=True)
+@compiled
 def _first_beam(faces, search, face, start, end, slack):
     """Parallel beam from a segment in a face, to the left of it, to the sides of the face that it meets."""
     along = (end - start) / abs(end - start)
@@ -203,7 +203,7 @@ def _first_beam(faces, search, face, start, end, slack):
             )  # fmt: skip
 
 
-@compiled(nogil=True)
+@compiled
 def _first_fan(faces, search, face, point, first, second, slack):
     """Circular waves from a point in a face, in directions of more than 90° from two given ones."""
     for side in range(3):
@@ -218,7 +218,7 @@ def _first_fan(faces, search, face, point, first, second, slack):
             )  # fmt: skip
 
 
-@compiled(nogil=True)
+@compiled
 def initial_windows(faces, sources, search, slack):
     """Set distances at the corners of faces with sources, then make the initial windows."""
     for v in sources.vertices:

@@ -17,14 +17,14 @@ POINT, BEAM, FOCUS = 1.0, 0.0, -1.0
 S0, S1, P, Q, SIGMA, KIND = range(6)
 
 
-@compiled(nogil=True)
+@compiled
 def put(window, rows, k):
     """Write a window to row k, entry by entry: assignments to slices of arrays take long to compile."""
     for i in range(6):
         rows[k, i] = window[i]
 
 
-@compiled(nogil=True)
+@compiled
 def arrival(w, x, y):
     """Distance from the source of a window to a point in the frame of its edge."""
     if w[KIND] == BEAM:
@@ -32,7 +32,7 @@ def arrival(w, x, y):
     return w[SIGMA] + w[KIND] * np.sqrt((x - w[P]) ** 2 + (y - w[Q]) ** 2)
 
 
-@compiled(nogil=True)
+@compiled
 def ray(w, x):
     """Direction of propagation at a point of the edge; of any length."""
     if w[KIND] == BEAM:
@@ -40,7 +40,7 @@ def ray(w, x):
     return w[KIND] * (x - w[P]), -w[KIND] * w[Q]
 
 
-@compiled(nogil=True)
+@compiled
 def outrun(w, at_tail, at_head, length, slack):
     """Whether paths through an end of the edge are shorter everywhere in the window."""
     if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
@@ -48,7 +48,7 @@ def outrun(w, at_tail, at_head, length, slack):
     return at_head + length - w[S0] < arrival(w, w[S0], 0.0) - slack
 
 
-@compiled(nogil=True)
+@compiled
 def trim(a, b):
     """Trim two overlapping windows, of which a begins first, to where each has the smaller distance."""
     if b[S0] >= a[S1]:
@@ -78,7 +78,7 @@ def trim(a, b):
             b[S1] = high
 
 
-@compiled(nogil=True)
+@compiled
 def trim_by(old: NDArray[np.float64], w: NDArray[np.float64], slack: float) -> None:
     """Trim a window to where it is nearer, by more than `slack`, than an older one; from the middle nothing is cut."""
     low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
@@ -109,7 +109,7 @@ def trim_by(old: NDArray[np.float64], w: NDArray[np.float64], slack: float) -> N
         w[S1] = high
 
 
-@compiled(nogil=True)
+@compiled
 def outdoes(w: NDArray[np.float64], old: NDArray[np.float64]) -> bool:
     """Whether a window covers another one and is nearer at its ends and in its middle."""
     if w[S0] > old[S0] or w[S1] < old[S1]:
@@ -121,7 +121,7 @@ def outdoes(w: NDArray[np.float64], old: NDArray[np.float64]) -> bool:
     return True
 
 
-@compiled(nogil=True)
+@compiled
 def merge(a, b, length, tolerance):
     """Merge window b into a, if they are neighbours and one wave approximates both; whether it was done."""
     if abs(a[S1] - b[S0]) > 1e-6 * length:
@@ -159,7 +159,7 @@ def merge(a, b, length, tolerance):
     return True
 
 
-@compiled(nogil=True)
+@compiled
 def straighten(w: NDArray[np.float64]) -> None:
     """Make a wave straight, nowhere nearer at the edge, which would pass its focus in the face ahead."""
     x, y = ray(w, 0.5 * (w[S0] + w[S1]))
@@ -169,7 +169,7 @@ def straighten(w: NDArray[np.float64]) -> None:
     w[SIGMA] = max(begin - w[S0] * w[P], end - w[S1] * w[P])
 
 
-@compiled(nogil=True)
+@compiled
 def clip(s0, s1, at_start, slope):
     """The part of [s0, s1] where ``at_start + slope s ≤ 0``."""
     if slope > 0.0:
@@ -181,7 +181,7 @@ def clip(s0, s1, at_start, slope):
     return s0, s1
 
 
-@compiled(nogil=True)
+@compiled
 def hit(x0, dx, dy, ax, ay, bx, by):
     """Fraction of the way from a to b at which the ray from (x0, 0) along (dx, dy) meets the line through both."""
     ex, ey = bx - ax, by - ay
