@@ -7,7 +7,7 @@ import pytest
 
 from signedheat.cli import main
 from signedheat.cli.completion import commands_of
-from signedheat.cli.usage import parser
+from signedheat.cli.parser import parser
 
 BASH = shutil.which("bash")
 

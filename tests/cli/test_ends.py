@@ -13,8 +13,8 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.cli import info, main
-from signedheat.cli.usage.options import PLANAR
+from signedheat.cli import main, reports
+from signedheat.cli.options import PLANAR
 from signedheat.io import POLYLINE_FORMATS
 
 COMMAND = [sys.executable, "-m", "signedheat"]
@@ -86,7 +86,7 @@ def test_what_nobody_expected_is_called_a_bug(ball, capsys, monkeypatch, error):
     def fail(path):
         raise error
 
-    monkeypatch.setattr(info, "read", fail)
+    monkeypatch.setattr(reports, "read", fail)
     assert main(["info", str(ball)]) == 70
     told = capsys.readouterr().err
     assert_one_line(told)
@@ -101,7 +101,7 @@ def test_what_is_due_to_the_system_is_told(ball, capsys, monkeypatch, error):
     def fail(path):
         raise error
 
-    monkeypatch.setattr(info, "read", fail)
+    monkeypatch.setattr(reports, "read", fail)
     assert main(["info", str(ball)]) == 1
     assert_one_line(capsys.readouterr().err)
 
@@ -115,7 +115,7 @@ def test_signals_stop_with_one_line_whatever_becomes_of_them(ball, capsys, monke
         except BaseException:
             raise ImportError("as some packages do") from None
 
-    monkeypatch.setattr(info, "read", stopped)
+    monkeypatch.setattr(reports, "read", stopped)
     before = signal.getsignal(number)
     assert main(["info", str(ball)]) == 128 + number
     assert_one_line(capsys.readouterr().err)

@@ -46,7 +46,7 @@ def test_fields_of_images_are_contoured_in_the_world(mask, tmp_path, capsys):
 
 
 def test_masks_and_fields_of_images_are_looked_at(mask, tmp_path):
-    for name in ("mask.png", "mask.html"):
+    for name in ("mask.png", "mask.pdf"):
         assert main(["view", str(mask), "-o", str(tmp_path / name)]) == 0
         assert (tmp_path / name).stat().st_size > 3000
 

@@ -34,7 +34,7 @@ def told_by(error):
 @pytest.mark.parametrize(
     ("command", "size", "megabytes"),
     [
-        ("volume ball.ply -o out.npz", "--resolution 700", 40),
+        ("volume ball.ply -o out.npz", "--resolution 700", 95),
         ("volume holes.ply -o out.npz", "--resolution 700", 60),
         ("volume holes.ply -o out.npz --plain", "--spacing 1e-6", 60),
         ("volume holes.ply -o out.vtu --tets", "--resolution 500", 200),
@@ -106,4 +106,4 @@ def test_where_faces_alone_take_all_memory_no_spacing_is_told(folder, monkeypatc
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 2_000_000)
     assert main(["volume", "ball.ply", "-o", "out.npz"]) == 1
     told = capsys.readouterr().err
-    assert "coarsen it" in told and "spacing" not in told
+    assert "simplify it" in told and "spacing" not in told

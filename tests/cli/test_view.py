@@ -11,7 +11,7 @@ from signedheat.cli import main, view
 
 
 @pytest.mark.parametrize("display", ["", ":77", "nonsense", "silent"])
-def test_displays_that_do_not_answer_give_a_page(tmp_path, monkeypatch, capsys, display):
+def test_displays_that_do_not_answer_give_a_picture(tmp_path, monkeypatch, capsys, display):
     """VTK draws nowhere there, with two warnings and success."""
     samples.sphere(1).save(tmp_path / "ball.ply")
     monkeypatch.chdir(tmp_path)
@@ -30,5 +30,5 @@ def test_displays_that_do_not_answer_give_a_page(tmp_path, monkeypatch, capsys, 
         monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
         assert main(["view", "ball.ply"]) == 0
     told = capsys.readouterr()
-    assert told.out == "ball.html\n" and (tmp_path / "ball.html").exists()
+    assert told.out == "ball.png\n" and (tmp_path / "ball.png").exists()
     assert told.err.count("\n") == (1 if display else 0)

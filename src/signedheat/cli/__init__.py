@@ -1,4 +1,4 @@
-"""The command line: `usage` says what it takes, and a command is run by `run(arguments)` in the module of its name.
+"""The command line: a module for each command, which declares what it takes and runs it.
 
 However a command ends, it ends here: with a status, and with one line on standard error if it failed.
 """
@@ -54,13 +54,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     """Everything else is imported here, where all that may go wrong is caught."""
-    arguments = import_module(f"{__name__}.usage").parser().parse_args(argv)
+    arguments = import_module(f"{__name__}.parser").parser().parse_args(argv)
     if arguments.check is not None:
         arguments.check(arguments)
     import_module("signedheat.public")
-    import_module("signedheat.compiled").announce.is_wanted = not (arguments.quiet or arguments.json)
+    import_module("signedheat.progress").Announcement.are_wanted = not (arguments.quiet or arguments.json)
     with import_module(f"{__name__}.standard").standard_files(arguments) as standard:
-        summary, text = import_module(f"{__name__}.{arguments.command}").run(arguments)
+        summary, text = arguments.run(arguments)
     if arguments.json and not standard.takes_output:
         tell(standard.named(json.dumps(summary)))
     elif text and not (arguments.quiet or standard.takes_output):

@@ -4,26 +4,113 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from typing import Any
 
-from ..batches.job import BatchJob, Sampling
-from ..batches.manifest import Outcome
-from ..batches.run import batch, duration
+import signedheat as sh
+
 from ..errors import SourceError
-from .computing import RESOLUTION, Summary, constraint_of
+from .options import (
+    MOST_WORKERS,
+    Summary,
+    add_command,
+    add_method_options,
+    add_room_options,
+    add_sampling_options,
+    add_step_options,
+    finite,
+    positive,
+    whole_number,
+)
+from .parts import batches, computing
 from .progress import ProgressBar
 from .streams import say
+
+
+def add_to(commands: Any) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands,
+        "batch",
+        run,
+        check,
+        help="the same for many shapes",
+        description="Fields, offsets, samples and reports of many shapes, each in a process of its own, with a "
+        "manifest of what came of each. What is done is skipped when the batch is started again.",
+    )
+    parser.usage = "%(prog)s INPUT [INPUT ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]"
+    parser.add_argument(
+        "inputs",
+        metavar="INPUT",
+        nargs="+",
+        help="files, folders with all in them, patterns in quotes; - takes a list from standard input, a line for each",
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="FOLDER", help="results, and manifest.jsonl")
+    wanted = parser.add_argument_group("what is made of each shape, one or more of")
+    wanted.add_argument(
+        "--volume",
+        nargs="?",
+        const="npz",
+        choices=("npz", "vti", "nrrd", "npy", "vdb"),
+        help="the field, as .npz if nothing is said",
+    )
+    wanted.add_argument(
+        "--offset", type=finite, nargs="+", default=[], metavar="D", help="closed surfaces at distances"
+    )
+    wanted.add_argument(
+        "--surface", choices=("stl", "obj", "ply", "off", "vtp"), default="stl", help="their files (stl)"
+    )
+    wanted.add_argument(
+        "--sample", type=whole_number(1), nargs="?", const=250_000, metavar="N", help="points to learn from (250000)"
+    )
+    wanted.add_argument("--info", action="store_true", help="counts and defects, in the manifest")
+    running = parser.add_argument_group("running")
+    running.add_argument(
+        "--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help="processes (one for each processor)"
+    )
+    running.add_argument(
+        "--threads", type=whole_number(1, MOST_WORKERS), default=1, metavar="N", help="threads of each process (1)"
+    )
+    running.add_argument("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
+    running.add_argument("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up")
+    add_sampling_options(parser)
+    add_room_options(parser)
+    add_step_options(parser)
+    add_method_options(parser)
+
+
+def check(arguments: Namespace) -> None:
+    """Reject what asks for nothing, and options that contradict each other."""
+    error = arguments.parser.error
+    if not (arguments.volume or arguments.offset or arguments.sample or arguments.info):
+        error("say what is to be made: --volume, --offset D, --sample or --info")
+    if arguments.plain and arguments.sample:
+        error("--plain does not go with --sample, whose distances are those to the shape itself")
+    if arguments.spacing is not None and len(arguments.spacing) not in (1, 3):
+        error(f"argument --spacing: one number or 3, not {len(arguments.spacing)}")
+    if arguments.spacing is not None and arguments.resolution is not None:
+        error("--resolution does not go with --spacing: give one of them")
+    if arguments.band is not None:
+        if arguments.plain:
+            error("--band does not go with --plain")
+        if arguments.volume not in (None, "npz", "vdb"):
+            error("a band is written as .npz or .vdb")
+        reach = max((abs(distance) for distance in arguments.offset), default=0.0)
+        if reach > arguments.band:
+            error(f"the band reaches to {arguments.band:g}, and the distances to {reach:g}")
+    if arguments.scheduler is not None and arguments.workers is not None:
+        error("--workers does not go with --scheduler, which has workers of its own")
 
 
 def run(arguments: Namespace) -> Summary:
     """Do the job for every shape; a line on standard error for each that is not done."""
     with ProgressBar(arguments.quiet or arguments.json) as progress:
 
-        def report(outcome: Outcome) -> None:
+        def report(outcome: sh.Outcome) -> None:
             if not outcome.is_done:
                 progress.clear()
                 say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
 
-        done = batch(
+        done = sh.batch(
             listed(arguments.inputs),
             arguments.output,
             job_of(arguments),
@@ -48,7 +135,7 @@ def run(arguments: Namespace) -> Summary:
     }
     told = ", ".join(f"{number} {state}" for state, number in counts.items())
     before = f" ({done.skipped} of them before)" if done.skipped else ""
-    return summary, f"{done.manifest}: {len(states)} shapes, {told}{before}, {duration(seconds)} of work"
+    return summary, f"{done.manifest}: {len(states)} shapes, {told}{before}, {batches.run.duration(seconds)} of work"
 
 
 def listed(inputs: list[str]) -> list[str]:
@@ -68,11 +155,11 @@ def listed(inputs: list[str]) -> list[str]:
     return [*inputs[:at], *lines, *(each for each in inputs[at + 1 :] if each != "-")]
 
 
-def job_of(arguments: Namespace) -> BatchJob:
+def job_of(arguments: Namespace) -> sh.BatchJob:
     """The job that the options ask for."""
     sampling = None
     if arguments.sample is not None:
-        sampling = Sampling(
+        sampling = sh.Sampling(
             n=arguments.sample,
             near=arguments.near,
             widths=tuple(arguments.widths),
@@ -81,17 +168,17 @@ def job_of(arguments: Namespace) -> BatchJob:
             layout=arguments.layout,
         )
     spacing = None if arguments.spacing is None else tuple(arguments.spacing)
-    return BatchJob(
+    return sh.BatchJob(
         volume=f".{arguments.volume}" if arguments.volume else None,
         offsets=tuple(arguments.offset),
         surfaces=f".{arguments.surface}",
         samples=sampling,
         info=arguments.info,
-        resolution=arguments.resolution or RESOLUTION,
+        resolution=arguments.resolution or computing.RESOLUTION,
         spacing=spacing[0] if spacing is not None and len(spacing) == 1 else spacing,
         padding=arguments.padding,
         band=arguments.band,
-        constraint=constraint_of(arguments.constraint),
+        constraint=computing.constraint_of(arguments.constraint),
         diffusion=arguments.diffusion,
         as_oriented=arguments.as_oriented,
         keep_overlaps=arguments.keep_overlaps,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 from argparse import Namespace
+from typing import Any
 
-from .computing import Summary
-from .usage import parser
+from .options import Summary, add_command
 
 BASH = """_signedheat() {{
     local word="${{COMP_WORDS[COMP_CWORD]}}" before="${{COMP_WORDS[COMP_CWORD-1]}}" offered=""
@@ -33,15 +33,29 @@ ZSH = """autoload -U +X bashcompinit && bashcompinit
 {bash}"""
 
 
+def add_to(commands: Any) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands,
+        "completion",
+        run,
+        help="completion for bash and zsh",
+        description="Prints what a shell needs to complete commands, options and files: in bash, put "
+        "'eval \"$(signedheat completion bash)\"' into ~/.bashrc; for zsh, the same with zsh into ~/.zshrc, after "
+        "compinit.",
+    )
+    parser.add_argument("shell", metavar="SHELL", choices=("bash", "zsh"), help="bash or zsh")
+
+
 def run(arguments: Namespace) -> Summary:
     """Print the script for a shell."""
-    script = script_for(arguments.shell)
+    script = script_for(arguments.whole, arguments.shell)
     return {"shell": arguments.shell, "script": script}, script.rstrip()
 
 
-def script_for(shell: str) -> str:
-    """The script that makes a shell complete what the parser takes."""
-    commands = commands_of(parser())
+def script_for(whole: argparse.ArgumentParser, shell: str) -> str:
+    """The script that makes a shell complete what the whole parser takes."""
+    commands = commands_of(whole)
     choices, options = [], []
     for name, command in commands.items():
         named = [action for action in command._actions if action.option_strings]

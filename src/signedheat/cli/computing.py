@@ -1,4 +1,4 @@
-"""From options to a field, for the commands `volume`, `offset` and `demo`."""
+"""From options to a field."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from argparse import Namespace
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from typing import Any, TypeAlias, overload
+from typing import Any, overload
 
 from .. import sharpen
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
@@ -18,20 +18,19 @@ from ..errors import SignedHeatError
 from ..extensions.figures import describe as describe
 from ..extensions.figures import told
 from ..extensions.solid_distance import solid_distance
-from ..extensions.tiles import tiled_distance
-from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import read_mask
 from ..lowering.area_elements import bounds_around
-from ..progress import Progress
+from ..progress import Progress, within
+from ..solids.complete import complete
 from ..solver import SignedHeatSolver, as_list
 from .progress import ProgressBar
 from .streams import say
 
-Summary: TypeAlias = tuple[dict[str, Any], str]
-"""The result of a command: a dictionary for ``--json``, and text."""
 RESOLUTION = 128
+COMPLETED = 0.3
+"""Share of the progress of a band that completing the shape is."""
 MOST = 0.9
 """Fraction of the area that may cancel without a warning."""
 
@@ -86,12 +85,12 @@ def constraint_of(word: str) -> Constraint:
 
 
 @overload
-def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField | BandField: ...
+def compute(shape: Any, domain: Grid, arguments: Namespace) -> GridField: ...
 @overload
 def compute(shape: Any, domain: TetMesh, arguments: Namespace) -> TetField: ...
-def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField | BandField:
+def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridField | TetField:
     """Distance to a solid in space, to polylines in the plane; what matters about it goes to standard error."""
-    field: GridField | TetField | BandField
+    field: GridField | TetField
     with ProgressBar(arguments.quiet or arguments.json) as progress:
         if isinstance(domain, Grid) and arguments.band is not None:
             field = in_band(shape, domain, arguments, progress)
@@ -114,24 +113,23 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
     return field
 
 
-def in_band(shape: Any, grid: Grid, arguments: Namespace, progress: Progress) -> BandField:
+def in_band(shape: Any, grid: Grid, arguments: Namespace, progress: Progress) -> GridField:
     """Distance in a band: all of it in memory, or tile by tile."""
+    shared: dict[str, Any] = {"as_oriented": arguments.as_oriented, "keep_overlaps": arguments.keep_overlaps}
+    shared |= {"constraint": constraint_of(arguments.constraint), "diffusion": arguments.diffusion}
+    solid = complete(shape, **shared, progress=within(progress, 0.0, COMPLETED))
     options: dict[str, Any] = {
+        "grid": grid,
         "band": arguments.band,
-        "constraint": constraint_of(arguments.constraint),
-        "diffusion": arguments.diffusion,
-        "as_oriented": arguments.as_oriented,
-        "keep_overlaps": arguments.keep_overlaps,
-        "progress": progress,
+        "store": getattr(arguments, "tiles", None),
+        "progress": within(progress, COMPLETED, 1.0),
     }
-    folder = getattr(arguments, "tiles", None)
-    if folder is None:
-        field: BandField = solid_distance(shape, grid, **options)
-        return field
+    if options["store"] is None:
+        return solid.field(**options)
     if arguments.workers is None:
-        return tiled_distance(shape, folder, grid, scheduler=arguments.scheduler, **options)
+        return solid.field(scheduler=arguments.scheduler, **options)
     with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
-        return tiled_distance(shape, folder, grid, scheduler=pool, **options)
+        return solid.field(scheduler=pool, **options)
 
 
 def planar_distance(lines: Any, grid: Grid, arguments: Namespace, progress: Progress) -> GridField:
@@ -146,12 +144,7 @@ def planar_distance(lines: Any, grid: Grid, arguments: Namespace, progress: Prog
     return sharpen(field)
 
 
-def drawable(field: GridField | BandField) -> GridField:
-    """The field, or of one in a band the coarse one: slices are drawn through the whole box."""
-    return field.coarse if isinstance(field, BandField) else field
-
-
-def hint(field: GridField | BandField) -> str:
+def hint(field: GridField) -> str:
     """A further line of output about sources that may have been given twice, or nothing."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0

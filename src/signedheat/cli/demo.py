@@ -6,14 +6,12 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from ..domains.grid import Grid
-from ..domains.inspection import inspect
-from ..errors import FileFormatError
-from ..io import ensure_writable, save
-from ..io.files import PathLike, replacing
-from ..samples import broken_duck
-from ..visualization import draw_shape, draw_slices, ensure_picture_writable, new_figure
-from .computing import Summary, compute, describe
+import signedheat as sh
+
+from ..errors import FileFormatError, MissingPackageError
+from .options import Summary, add_command, whole_number
+from .parts import computing, inspection, io, samples, view
+from .streams import say
 
 DISTANCE = 0.15
 
@@ -26,6 +24,21 @@ DEFAULTS = {
     "diffusion": 1.0,
 }
 """What `compute` reads, where the demo has no options."""
+
+
+def add_to(commands: Any) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands,
+        "demo",
+        run,
+        help="try it on a broken duck that comes along",
+        description="Make a broken shape, its distance field, an offset surface and a picture.",
+    )
+    parser.add_argument("-o", "--output", default="demo", metavar="FOLDER", help="where to (demo)")
+    parser.add_argument(
+        "--resolution", type=whole_number(8), default=128, metavar="N", help="nodes along the longest side"
+    )
 
 
 def run(arguments: Namespace) -> Summary:
@@ -41,43 +54,51 @@ def run(arguments: Namespace) -> Summary:
         ) from error
     files = {name: folder / name for name in ("duck.stl", "distance.vti", "offset.stl", "picture.png")}
     for path in files.values():
-        ensure_writable(path, {path.suffix}, "a file")
-    ensure_picture_writable(files["picture.png"])
-    shape = broken_duck()
-    save(shape, files["duck.stl"])
-    grid = Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)
+        io.ensure_writable(path, {path.suffix}, "a file")
+    try:
+        view.ensure_picture_writable(files["picture.png"])
+    except MissingPackageError as error:  # the rest is worth having
+        del files["picture.png"]
+        if not arguments.quiet:
+            say(f"signedheat: no picture is made: {error}")
+    shape = samples.broken_duck()
+    io.save(shape, files["duck.stl"])
+    grid = sh.Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)
     options = Namespace(**vars(arguments), **DEFAULTS)
-    field = compute(shape, grid, options)
+    field = computing.compute(shape, grid, options)
     surface = field.offset(DISTANCE)
     field.save(files["distance.vti"])
-    save(surface, files["offset.stl"])
-    draw_story(shape, field, surface, files["picture.png"])
-    broken, whole = inspect(shape), inspect(surface)
-    text = "\n".join(
-        [
-            f"{files['duck.stl']}: the input: {broken.open_edges} open edges, {broken.nonmanifold_edges} nonmanifold, "
-            f"{broken.inconsistent_edges} inconsistent",
-            f"{files['distance.vti']}: its signed distance at {' × '.join(map(str, grid.shape))} nodes",
-            f"{files['offset.stl']}: the surface {DISTANCE:g} outside: {whole.open_edges} open edges, "
-            f"{whole.nonmanifold_edges} nonmanifold, {whole.inconsistent_edges} inconsistent",
-            f"{files['picture.png']}: a picture of them",
-        ]
-    )
-    summary = {"files": [str(path) for path in files.values()], "distance": DISTANCE, "field": describe(field)}
-    return summary, text
+    io.save(surface, files["offset.stl"])
+    broken, whole = inspection.inspect(shape), inspection.inspect(surface)
+    lines = [
+        f"{files['duck.stl']}: the input: {broken.open_edges} open edges, {broken.nonmanifold_edges} nonmanifold, "
+        f"{broken.inconsistent_edges} inconsistent",
+        f"{files['distance.vti']}: its signed distance at {' × '.join(map(str, grid.shape))} nodes",
+        f"{files['offset.stl']}: the surface {DISTANCE:g} outside: {whole.open_edges} open edges, "
+        f"{whole.nonmanifold_edges} nonmanifold, {whole.inconsistent_edges} inconsistent",
+    ]
+    if "picture.png" in files:
+        draw_story(shape, field, surface, files["picture.png"])
+        lines.append(f"{files['picture.png']}: a picture of them")
+    summary = {
+        "files": [str(path) for path in files.values()],
+        "distance": DISTANCE,
+        "field": computing.describe(field),
+    }
+    return summary, "\n".join(lines)
 
 
-def draw_story(shape: Any, field: Any, surface: Any, path: PathLike) -> None:
+def draw_story(shape: Any, field: Any, surface: Any, path: Path) -> None:
     """Draw the broken shape, a slice of its distance, and the closed offset surface."""
-    figure = new_figure(13.5, 4.6)
+    figure = view.new_figure(13.5, 4.6)
     before = figure.add_subplot(1, 3, 1)
-    draw_shape(shape, before)
+    view.draw_shape(shape, before)
     before.set_title("in: holes, noise, flipped and\nduplicate faces", fontsize=11)
     middle = figure.add_subplot(1, 3, 2)
-    draw_slices(field, [middle], shape, [DISTANCE], across=(1,))
+    view.draw_slices(field, [middle], shape, [DISTANCE], across=(1,))
     middle.set_title("its signed distance", fontsize=11)
     after = figure.add_subplot(1, 3, 3)
-    draw_shape(surface, after)
+    view.draw_shape(surface, after)
     after.set_title(f"out: the closed surface at +{DISTANCE:g}", fontsize=11)
-    with replacing(path) as temporary:
+    with io.files.replacing(path) as temporary:
         figure.savefig(temporary, dpi=110)

@@ -3,42 +3,65 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
-from ..domains.grid import Grid
-from ..domains.inspection import inspect
-from ..domains.polygon_mesh import PolygonMesh
-from ..domains.triangle_mesh import TriangleMesh
-from ..errors import SignedHeatError, SourceError
-from ..extensions.joining import joined_shape
-from ..extensions.orientation import Orientation, orientation
-from ..extensions.solid_memory import most_memory
-from ..extensions.steps import Steps
-from ..extensions.thickness import Thickness, thickness
-from ..io import read, read_curves, read_polylines
-from ..io.files import extension
-from ..io.labels import LabelImage
-from ..io.obj import read_obj_lines
-from ..io.three_mf import unit_of
-from ..lowering.area_elements import bounds_around
-from ..lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
-from ..memory import available_memory
-from .computing import Summary, describe
-from .curve_report import as_text, curve_reports
-from .images import field_or_image, image_report
+from ..errors import SignedHeatError
+from .options import Summary, add_command, whole_number
+from .parts import reports
 from .streams import say
-from .usage.options import is_planar
+
+CURVES = (".txt", ".json")
+"""Extensions of files that have curves, and nothing else."""
+
+
+def add_to(commands: Any) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands,
+        "info",
+        run,
+        check,
+        help="what a file holds and what is wrong with it",
+        description="Counts, open, nonmanifold and inconsistent edges, degenerate and duplicate elements, bounds; "
+        "which way the parts of a mesh face, doubled walls, bodies within others, sheets, the thinnest wall and gap; "
+        "the memory that grids around a shape take. Of a field: its grid and range.",
+    )
+    parser.usage = "%(prog)s FILE [FILE ...] [--curves CURVES] [options]"
+    parser.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="shapes, polylines in the plane or fields; a .txt or .json file after a shape has curves on it",
+    )
+    parser.add_argument("--curves", metavar="CURVES", help="curves on the shape: .txt .json .obj .csv")
+    parser.add_argument(
+        "--resolution",
+        type=whole_number(2),
+        nargs="+",
+        default=[64, 128, 256, 512],
+        metavar="N",
+        help="resolutions at which to estimate memory",
+    )
+
+
+def check(arguments: Namespace) -> None:
+    """Tell curves from files, and reject those of several shapes."""
+    last = Path(arguments.files[-1]).suffix.lower()
+    if len(arguments.files) == 2 and last in CURVES and arguments.curves is None:
+        arguments.curves = arguments.files.pop()
+    if arguments.curves is not None and len(arguments.files) > 1:
+        arguments.parser.error(f"curves lie on one shape, and there are {len(arguments.files)}")
 
 
 def run(arguments: Namespace) -> Summary:
     """Inspect files; of several, those that cannot be read do not stop the others."""
     if len(arguments.files) == 1:
-        return report(arguments.files[0], arguments)
+        return reports.report(arguments.files[0], arguments)
     summaries, texts, failed = [], [], 0
     for file in arguments.files:
         try:
-            summary, text = report(file, arguments)
+            summary, text = reports.report(file, arguments)
         except SignedHeatError as error:
             say(f"signedheat: {' '.join(str(error if error.path else error.at(file)).split())}")
             failed += 1
@@ -46,155 +69,3 @@ def run(arguments: Namespace) -> Summary:
             summaries.append(summary)
             texts.append(text)
     return {"files": summaries, "failed": failed}, "\n\n".join(texts)
-
-
-def report(file: str, arguments: Namespace) -> Summary:
-    """Inspect a shape, a field or an image."""
-    field = field_or_image(file)
-    if isinstance(field, LabelImage):
-        summary = image_report(file, field)
-        return summary, _table(summary)
-    if field is not None:
-        summary = {"file": file, "kind": type(field).__name__, **describe(field)}
-        del summary["seconds"]
-        return summary, _table(summary)
-    if is_planar(file):
-        return lines_report(file)
-    shape = read(file)
-    summary = {"file": file, "kind": type(shape).__name__, **asdict(inspect(shape))}
-    if (unit := unit_of(file)) is not None:
-        summary["units"] = unit
-    if extension(file) == ".obj":
-        summary["line_elements"] = len(read_obj_lines(file)[1])
-    rows = dict(summary)
-    if isinstance(shape, TriangleMesh | PolygonMesh):
-        found = orientation(shape)
-        widths = thickness(found.shape)
-        summary["orientation"] = found.summary
-        summary["thickness"] = {**asdict(widths), "spacing": widths.spacing}
-        rows |= {"orientation": orientation_text(found), **_widths_text(widths)}
-    extra: dict[str, object] = {"memory_bytes": {str(n): _memory(shape, n) for n in arguments.resolution}}
-    extra["least_spacing"] = _least_spacing(shape)
-    summary |= extra
-    text = _table(rows | extra)
-    if arguments.curves:
-        if not hasattr(shape, "triangulation"):
-            raise SourceError(
-                f"curves lie on meshes and point clouds, not a {type(shape).__name__}",
-                element="shape",
-                path=arguments.curves,
-            )
-        summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
-        text += f"\n\n{arguments.curves}\n{as_text(summary['curves'])}"
-    return summary, text
-
-
-def lines_report(file: str) -> Summary:
-    """Inspect polylines in the plane."""
-    lines = read_polylines(file)
-    bounds = bounds_around(lines)
-    summary = {
-        "file": file,
-        "kind": "Polyline",
-        "n_polylines": len(lines),
-        "n_closed": sum(line.closed for line in lines),
-        "n_points": sum(line.n_points for line in lines),
-        "length": float(sum(line.length for line in lines)),
-        "lower": bounds[0].tolist(),
-        "upper": bounds[1].tolist(),
-    }
-    return summary, _table(summary)
-
-
-def orientation_text(found: Orientation) -> str:
-    """Which way a mesh faces, in a line.
-
-    Examples
-    --------
-    >>> from signedheat import samples
-    >>> orientation_text(orientation(samples.with_flipped_faces(samples.sphere(2), 0.1)))
-    '1 part, closed; faces disagree at 89 edges: 33 faces to turn (10.2 % of the area)'
-    """
-    closed = "closed" if found.closed_parts == found.n_parts else f"{found.closed_parts} closed"
-    said = [f"{_count(found.n_parts, 'part')}, {closed}"]
-    if found.inconsistent_edges:
-        edges, faces = _count(found.inconsistent_edges, "edge"), _count(found.turned_faces, "face")
-        said.append(f"faces disagree at {edges}: {faces} to turn ({100 * found.turned_area:.3g} % of the area)")
-    elif found.turned_parts:
-        which = "all" if found.turned_area > 0.9999 else f"{_count(found.turned_parts, 'part')}"
-        said.append(f"{which} facing inwards ({100 * found.turned_area:.3g} % of the area to turn)")
-    elif found.undecided_area < 0.9999:
-        said.append("facing outwards")
-    kinds = (
-        (found.nonorientable_parts, "nonorientable part", "nonorientable parts"),
-        (found.doubled_walls, "doubled wall", "doubled walls"),
-        (found.nested_bodies, "body hidden in another", "bodies hidden in others"),
-        (found.cavities, "cavity", "cavities"),
-    )
-    said += [f"{number} {one if number == 1 else many}" for number, one, many in kinds if number]
-    if found.merged_faces:
-        said.append(f"{_count(found.merged_faces, 'duplicate face')} to merge")
-    if found.undecided_parts:
-        sheets = _count(found.undecided_parts, "sheet")
-        said.append(f"{100 * found.undecided_area:.3g} % of the area in {sheets} without an inside")
-    return "; ".join(said)
-
-
-def _count(number: int, name: str) -> str:
-    return f"{number} {name}" if number == 1 else f"{number} {name}s"
-
-
-def _widths_text(widths: Thickness) -> dict[str, str]:
-    rows = {}
-    for name, least, typical in (
-        ("thinnest wall", widths.wall, widths.typical_wall),
-        ("narrowest gap", widths.gap, widths.typical_gap),
-    ):
-        if least is not None:
-            rows[name] = f"{least:.4g}" + (f" (typical {typical:.4g})" if typical is not None else "")
-    if widths.spacing is not None:
-        rows["spacing they need"] = f"{widths.spacing:.4g}"
-    return rows
-
-
-def _least_spacing(shape: Any) -> float | None:
-    """Spacing of the finest grid around the shape that fits into the memory that is free; None if there is none."""
-    available = available_memory()
-    if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
-        return None
-    grid = Grid.around(shape.bounds, 128)
-    spacing = fitting_spacing(grid, available, *_most(shape))
-    return float(spacing.max()) if (spacing < grid.upper - grid.origin).all() else None
-
-
-def _memory(shape: Any, resolution: int) -> int | None:
-    """Estimate for a grid around the shape; nothing where the shape is a single place."""
-    if not (shape.bounds[1] > shape.bounds[0]).any():
-        return None
-    grid, (per_node, beside, area) = Grid.around(shape.bounds, resolution), _most(shape)
-    return memory_estimate(grid, per_node, beside) + int(bytes_of_area(area, grid.spacing, grid.n_nodes))
-
-
-def _most(shape: Any) -> tuple[float, float, float]:
-    return most_memory(joined_shape(shape), Steps())
-
-
-def _table(summary: dict[str, Any]) -> str:
-    rows = []
-    for key, value in summary.items():
-        if key == "least_spacing":
-            rows.append(("spacing that fits", "–" if value is None else f"{value:.3g}"))
-            continue
-        if key == "memory_bytes":
-            for resolution, size in value.items():
-                rows.append((f"memory at {resolution}", "–" if size is None else f"{size / 1e9:.2f} GB"))
-            continue
-        if isinstance(value, (list, tuple)):
-            value = " ".join(f"{entry:g}" for entry in value)
-        elif isinstance(value, bool):
-            value = "yes" if value else "no"
-        elif isinstance(value, float):
-            value = f"{value:g}"
-        rows.append((key.removeprefix("n_").replace("_", " "), str(value)))
-    width = max(len(name) for name, _ in rows)
-    return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)

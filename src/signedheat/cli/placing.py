@@ -20,7 +20,7 @@ from ..io.three_mf import METRES, unit_of
 from ..lowering.area_elements import bounds_around
 from ..solver import as_list
 from .computing import grid_for, prefix_errors
-from .usage.options import IMAGES, is_planar
+from .options import IMAGES, is_planar
 
 
 def read_source(arguments: Namespace) -> Any:

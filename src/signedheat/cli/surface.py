@@ -3,95 +3,49 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import Any, Literal
+from typing import Any
 
-import numpy as np
-
-from ..constraints import Free, Soft, ZeroSet
-from ..diagnostics import LargeAngles, SharpenedToCurves
-from ..domains.triangle_mesh import TriangleMesh
-from ..errors import SourceError
-from ..extensions.curve_distance import curve_distance
-from ..extensions.curve_pieces import CurvesTaken
-from ..fields.vertex_field import VertexField
-from ..io import ensure_writable, read, read_curves, write_curves
-from ..io.globe import read_globe_curves
-from ..io.surface_fields import VERTEX_FIELD_FORMATS
-from ..lowering.surface.memory import refuse_too_many
-from ..solver import SignedHeatSolver
-from ..visualization import ensure_picture_writable, save_surface
-from .computing import Summary, constraint_of, prefix_errors
-from .progress import ProgressBar
+from .options import Summary, add_command, add_curves, add_format_option, add_up_option, whole_number
+from .parts import curves, io, view
 
 
-def surface_and_curves(arguments: Namespace) -> tuple[Any, Any]:
-    """The surface, and the curves on it."""
-    surface = read_surface(arguments.mesh)
-    if arguments.intrinsic and not isinstance(surface, TriangleMesh):
-        raise SourceError(
-            f"--intrinsic is for triangle meshes; this is a {type(surface).__name__}",
-            remedy="leave it out",
-            path=arguments.mesh,
-        )
-    return surface, curves_of(arguments, surface)
-
-
-def measured(surface: Any, curves: Any, arguments: Namespace) -> VertexField:
-    """The distance."""
-    with prefix_errors(arguments.curves), ProgressBar(arguments.quiet or arguments.json) as progress:
-        constraint = constraint_of(arguments.constraint)
-        intrinsic: bool | Literal["auto"] = True if arguments.intrinsic else "auto"
-        field: VertexField
-        if arguments.plain or not isinstance(constraint, Free | ZeroSet | Soft):
-            field = SignedHeatSolver(surface, arguments.diffusion, progress, intrinsic).distance(curves, constraint)
-        else:
-            field = curve_distance(
-                surface,
-                curves,
-                constraint=constraint,
-                diffusion=arguments.diffusion or 1.0,
-                intrinsic=intrinsic,
-                as_oriented=arguments.as_oriented,
-                every_piece=arguments.every_piece,
-                progress=progress,
-            )
-    return field
-
-
-def curves_of(arguments: Namespace, surface: Any) -> list[Any]:
-    """The curves; on a globe those in longitude and latitude."""
-    if not arguments.globe:
-        return read_curves(arguments.curves, surface)
-    return list(read_globe_curves(arguments.curves, surface))
-
-
-def advice(field: VertexField) -> str:
-    """Advice on options that would make the result more accurate, or nothing."""
-    note = None if field.diagnostics.note(SharpenedToCurves) else field.diagnostics.note(LargeAngles)
-    return f"; {note}: --intrinsic is more accurate" if note else ""
-
-
-def numbered(field: VertexField) -> dict[str, Any]:
-    """Numbers of the curves that were turned, and of those that were left out, for the summary."""
-    note = field.diagnostics.note(CurvesTaken)
-    return {"turned": note.turned.tolist(), "left_out": note.left_out.tolist()} if note else {}
-
-
-def pieces_told(field: VertexField) -> str:
-    """The same in words, or nothing."""
-    note = field.diagnostics.note(CurvesTaken)
-    return f"; {note}" if note else ""
+def add_to(commands: Any) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands,
+        "surface",
+        run,
+        help="signed distance to curves on a surface",
+        description="Signed distance on a mesh, a point cloud or the boundary of a set of voxels to curves, broken or "
+        "not, and to points on it.",
+    )
+    add_curves(parser, "field: .ply .vtp .obj .npz")
+    parser.add_argument(
+        "--contours",
+        type=whole_number(1, 1000),
+        metavar="N",
+        help="write N isolines beside the output, as OUT.contours.obj",
+    )
+    parser.add_argument(
+        "--subdivide",
+        action="store_true",
+        help="write the flat pieces of the surface on which the field is linear, where it was computed on better "
+        "triangles than those of the mesh, whose vertices come first",
+    )
+    parser.add_argument("--preview", metavar="PNG", help="draw the result")
+    add_up_option(parser)
+    add_format_option(parser, "ply")
 
 
 def run(arguments: Namespace) -> Summary:
     """Read, check that the results can be written, compute, write."""
-    ensure_writable(arguments.output, VERTEX_FIELD_FORMATS, "a field on a surface")
+    io.ensure_writable(arguments.output, io.VERTEX_FIELD_FORMATS, "a field on a surface")
     if arguments.preview:
-        ensure_picture_writable(arguments.preview)
-    surface, curves = surface_and_curves(arguments)
-    field = measured(surface, curves, arguments)
+        view.ensure_picture_writable(arguments.preview)
+    surface, sources = curves.surface_and_curves(arguments)
+    field = curves.measured(surface, sources, arguments)
     (field.subdivided() if arguments.subdivide else field).save(arguments.output)
-    low, high = float(np.nanmin(field.values)), float(np.nanmax(field.values))
+    low, high = curves.range_of(field)
     summary = {
         "mesh": arguments.mesh,
         "curves": arguments.curves,
@@ -102,34 +56,18 @@ def run(arguments: Namespace) -> Summary:
         "unreached": len(field.diagnostics.unreached),
         "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
     }
-    note = field.diagnostics.note(SharpenedToCurves)
-    if note:
-        summary["completed"] = note.completed_length
+    completed = curves.completed(field)
+    if completed is not None:
+        summary["completed"] = completed
     if arguments.contours:
         summary["contours"] = f"{arguments.output}.contours.obj"
-        levels = np.linspace(low, high, arguments.contours + 2)[1:-1]
-        lines = [curve for level in levels for curve in field.contour(float(level))]
-        write_curves(summary["contours"], lines, surface)
+        io.write_curves(summary["contours"], curves.isolines(field, arguments.contours), surface)
     if arguments.preview:
-        save_surface(field, arguments.preview, curves, arguments.contours or 20, "xyz".index(arguments.up))
+        up = "xyz".index(arguments.up)
+        view.save_surface(field, arguments.preview, sources, arguments.contours or 20, up)
     text = f"{arguments.output}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
     if summary["unreached"]:
         text += f", {summary['unreached']} vertices without any source"
-    if note and note.completed_length > 0:
-        text += f", {note.completed_length:.1%} of the curve completed"
-    return summary | numbered(field), text + pieces_told(field) + advice(field)
-
-
-def read_surface(path: str) -> Any:
-    """Read a surface domain from a file."""
-    surface = read(path)
-    if not hasattr(surface, "triangulation"):
-        raise SourceError(
-            f"curves lie on meshes, points and voxels, and this is a {type(surface).__name__}",
-            element="surface",
-            path=path,
-        )
-    if isinstance(surface, TriangleMesh):  # before curves are looked for on it
-        with prefix_errors(path):
-            refuse_too_many(surface.n_faces, surface.n_faces, "triangles")
-    return surface
+    if completed:
+        text += f", {completed:.1%} of the curve completed"
+    return summary | curves.numbered(field), text + curves.pieces_told(field) + curves.advice(field)

@@ -17,8 +17,9 @@ from ..io.tets import TET_FIELD_FORMATS
 from ..lowering.tets.discretization import memory_estimate
 from ..memory import refuse_beyond_memory
 from ..packages import require
-from ..visualization import ensure_picture_writable, save_slices
-from .computing import Summary, compute, describe, prefix_errors
+from ..view import ensure_picture_writable, save_slices
+from .computing import compute, describe, prefix_errors
+from .options import Summary
 from .placing import read_source
 
 RESOLUTION = 32

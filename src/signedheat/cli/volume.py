@@ -3,37 +3,90 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from typing import Any
 
-from ..io import ensure_band_writable, ensure_field_writable
-from ..visualization import ensure_picture_writable, save_slices
-from . import tets
-from .computing import Summary, compute, describe, drawable, grid_for, hint, prefix_errors
-from .placing import grid_of_image, image_of, place_of, read_source, save_placed
+from .options import (
+    LINES,
+    Summary,
+    add_command,
+    add_format_option,
+    add_grid_options,
+    add_label_option,
+    add_placing_options,
+    add_shape,
+    add_tile_options,
+    check_grid_options,
+)
+from .parts import computing, io, placing, tets, view
+
+
+def add_to(commands: Any) -> None:
+    """Declare the command."""
+    parser = add_command(
+        commands,
+        "volume",
+        run,
+        check,
+        help="signed distance on a grid",
+        description="Signed distance to a shape, broken or not, at the nodes of a grid in space; or to polylines, "
+        "positive to their left, in the plane.",
+    )
+    parser.usage = "%(prog)s SHAPE -o OUT [options]"
+    add_shape(parser, LINES)
+    parser.add_argument("-o", "--output", required=True, metavar="OUT", help="field: .npz .vti .nrrd .npy .vdb")
+    parser.add_argument(
+        "--tets",
+        nargs="?",
+        const="",
+        metavar="MESH",
+        help="measure on tets, of a .mesh .msh .vtu .vtk .ele file or around the shape; OUT: .vtu .vtk .msh",
+    )
+    add_label_option(parser)
+    add_placing_options(parser)
+    add_grid_options(parser)
+    add_tile_options(parser)
+    add_format_option(parser, "npz")
+
+
+def check(arguments: Namespace) -> None:
+    """Reject options that contradict each other."""
+    if arguments.tets is None:
+        return check_grid_options(arguments)
+    if any(x is not None for x in (arguments.spacing, arguments.origin, arguments.grid_shape, arguments.mask)):
+        arguments.parser.error("--spacing, --origin, --shape and --mask are for grids, and do not go with --tets")
+    if arguments.tets and (arguments.resolution is not None or arguments.padding is not None):
+        arguments.parser.error("--resolution and --padding do not go with a mesh of your own")
 
 
 def run(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, compute, write."""
     if arguments.tets is not None:
         return tets.run(arguments)
-    image = image_of(arguments)
+    image = placing.image_of(arguments)
     if image is not None:
         image.ensure_writable(arguments.output)
-    elif arguments.band is None:
-        ensure_field_writable(arguments.output)
     else:
-        ensure_band_writable(arguments.output)
+        io.ensure_field_writable(arguments.output, in_band=arguments.band is not None)
     if arguments.preview:
-        ensure_picture_writable(arguments.preview)
-    with prefix_errors(arguments.shape):
-        shape = read_source(arguments) if image is None else image.surface(arguments.label)
-        grid = grid_for(shape, arguments) if image is None else grid_of_image(image, shape, arguments)
-        field = compute(shape, grid, arguments)
-    save_placed(field, image, arguments.output)
+        view.ensure_picture_writable(arguments.preview)
+    with computing.prefix_errors(arguments.shape):
+        if image is None:
+            shape = placing.read_source(arguments)
+            grid = computing.grid_for(shape, arguments)
+        else:
+            shape = image.surface(arguments.label)
+            grid = placing.grid_of_image(image, shape, arguments)
+        field = computing.compute(shape, grid, arguments)
+    placing.save_placed(field, image, arguments.output)
     if arguments.preview:
-        save_slices(drawable(field), arguments.preview, shape)
-    summary = {"input": arguments.shape, "output": arguments.output, **describe(field), **place_of(image)}
+        view.save_slices(field.whole, arguments.preview, shape)
+    summary = {
+        "input": arguments.shape,
+        "output": arguments.output,
+        **computing.describe(field),
+        **placing.place_of(image),
+    }
     nodes = " × ".join(map(str, field.grid.shape))
     there = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
     text = f"{arguments.output}: {nodes} nodes{there}, φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}"
-    text += hint(field)
-    return summary, text
+    return summary, text + computing.hint(field)

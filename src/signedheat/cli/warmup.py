@@ -2,137 +2,52 @@
 
 from __future__ import annotations
 
+import os
 import time
 import warnings
 from argparse import Namespace
-from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from typing import Any
 
-import numpy as np
-
-from .. import samples
-from ..domains.common_subdivision import common_subdivision
-from ..domains.digital_surface import DigitalSurface
-from ..domains.grid import Grid
-from ..domains.inspection import inspect
-from ..domains.intrinsic_triangulation import intrinsic_delaunay
-from ..domains.point_cloud import PointCloud
-from ..domains.polyline import Polyline
-from ..extensions.close_curves import close_curves
-from ..extensions.curve_distance import curve_distance
-from ..extensions.orientation import orientation
-from ..extensions.piecewise import piecewise_distance
-from ..extensions.sampling import sample
-from ..extensions.sharpening import sharpen
-from ..extensions.sharpening_methods import Convex, Geodesic
-from ..extensions.solid_distance import solid_distance
-from ..extensions.tetrahedralize import tetrahedralize
-from ..extensions.thickness import thickness
-from ..kernel_cache import folders
-from ..solver import SignedHeatSolver, signed_distance
-from ..visualization import new_figure
-from ..visualization.scenes import draw_shape
-from .computing import Summary
+from ..progress import Announcement
+from .options import Summary, add_command
+from .parts import compiled, kernel_runs, parallel
 from .progress import ProgressBar
 
 
+def add_to(commands: Any) -> None:
+    """Declare the command."""
+    add_command(
+        commands,
+        "warmup",
+        run,
+        help="compile everything now, instead of at its first use",
+        description="Runs everything once on small shapes. What is compiled is kept in the folder that NUMBA_CACHE_DIR "
+        "names, or else in the cache of the user; run it again after an update.",
+    )
+
+
 def run(arguments: Namespace) -> Summary:
-    """Run everything once on small shapes; where the system allows, on one of each kind."""
-    begin, spent = time.perf_counter(), time.process_time()
-    with ProgressBar(arguments.quiet or arguments.json) as progress, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about shapes too small to say anything
-        for number, (name, job) in enumerate(JOBS.items()):
-            progress(number / len(JOBS), f"compile {name}")
-            job()
-    seconds, cpu = time.perf_counter() - begin, time.process_time() - spent
-    folder = str(next(folders()))
+    """Run everything once on small shapes, where the system allows one of each kind, in several processes."""
+    begin, spent = time.perf_counter(), sum(os.times()[:4])
+    with (
+        ProgressBar(arguments.quiet or arguments.json) as progress,
+        ProcessPoolExecutor(parallel.n_threads(), get_context("spawn")) as pool,
+    ):
+        jobs = [pool.submit(_job, name) for name in kernel_runs.JOBS]
+        for number, job in enumerate(as_completed(jobs)):
+            job.result()
+            progress((number + 1) / len(jobs), "compile")
+    seconds, cpu = time.perf_counter() - begin, sum(os.times()[:4]) - spent
+    folder = str(compiled.cache_folder())
     summary = {"seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2), "folder": folder}
     return summary, f"everything is compiled, in {seconds:.0f} s; kept in {folder}"
 
 
-def solids() -> None:
-    """Solids on grids: faces, points without normals, sharpening, samples."""
-    ball = samples.sphere(2)
-    broken = samples.with_flipped_faces(samples.without_faces(samples.union(ball, samples.sphere(2, center=(1, 0, 0))),
-                                                              0.1), 0.1)  # fmt: skip
-    field = solid_distance(broken, Grid.around(broken.bounds, 20))
-    field.offset(0.1)
-    sample(field, 20)
-    fine = Grid.around(ball.bounds, 48)
-    solid_distance(ball, fine, band=3 * float(fine.spacing.max())).offset(0.0)
-    points = PointCloud(ball.vertices)
-    solid_distance(points, Grid.around(ball.bounds, 20))
-    plain = signed_distance(broken, resolution=12)
-    sharpen(plain)
-    sharpen(plain, broken)
-
-
-def reports() -> None:
-    """What `info` and pictures take."""
-    ball = samples.sphere(2)
-    inspect(ball)
-    thickness(orientation(ball).shape)
-    draw_shape(ball, new_figure(1, 1).add_subplot(1, 1, 1))
-
-
-def plane() -> None:
-    """Lines in the plane, with and without walls."""
-    line = Polyline([[0.5, 0.2], [0.2, 7.5]])
-    walls = np.zeros((9, 9), dtype=bool)
-    walls[4, :6] = True
-    signed_distance(line, Grid((0, 0), 1.0, (9, 9), walls))
-    sharpen(signed_distance(line, Grid((0, 0), 1.0, (9, 9)))).contour(0.0)
-    solid_walls = np.zeros((7, 7, 7), dtype=bool)
-    solid_walls[3, :5] = True
-    signed_distance(samples.sphere(1, 2.0, (3, 3, 3)), Grid((0, 0, 0), 1.0, (7, 7, 7), solid_walls))
-
-
-def surfaces() -> None:
-    """Curves on triangles: distance, contours, completion, sharpening, jumps."""
-    ball = samples.sphere(2)
-    curve = ball.polyline([[1.0, 0.1, 0.2], [0.0, 1.0, -0.1], [-1.0, 0.0, 0.3]])
-    field = SignedHeatSolver(ball).distance([curve, ball.points_at(3)])
-    field.contour(0.1)
-    for how in (None, Convex(), Geodesic()):
-        sharpen(field) if how is None else sharpen(field, method=how)
-    curve_distance(ball, curve)
-    close_curves(ball, curve)
-    piecewise_distance(ball, curve)
-
-
-def other_surfaces() -> None:
-    """Points, polygons, voxels."""
-    ball = samples.sphere(2)
-    cloud = PointCloud(ball.vertices)
-    SignedHeatSolver(cloud).distance(cloud.points_at(3))
-    voxels = DigitalSurface(np.ones((2, 2, 2), dtype=bool))
-    for domain in (voxels, voxels.squares):
-        SignedHeatSolver(domain).distance(domain.points_at(3))
-
-
-def intrinsic() -> None:
-    """Intrinsic triangulations."""
-    ball = samples.sphere(1)
-    curve = ball.polyline([[1.0, 0.1, 0.2], [0.0, 1.0, -0.1], [-1.0, 0.0, 0.3]])
-    field = SignedHeatSolver(ball, intrinsic=True).distance(curve)
-    field.restrict().contour(0.1)
-    common_subdivision(intrinsic_delaunay(ball, refine=True))
-
-
-def tets() -> None:
-    """Distance on tets."""
-    ball = samples.sphere(1)
-    field = signed_distance(ball, tetrahedralize(ball, resolution=5))
-    field.contour(0.1)
-    sharpen(field)
-    solid_distance(ball, field.mesh)
-
-
-JOBS: dict[str, Callable[[], None]] = {
-    "solids": solids,
-    "reports": reports,
-    "lines in the plane": plane,
-    "surfaces": surfaces,
-    "points, polygons, voxels": other_surfaces,
-    "intrinsic triangulations": intrinsic,
-    "tets": tets,
-}
+def _job(name: str) -> None:
+    """Run one in a process of its own, which tells nothing."""
+    Announcement.are_wanted = False
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about shapes too small to say anything
+        kernel_runs.JOBS[name]()

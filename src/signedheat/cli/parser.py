@@ -1,12 +1,8 @@
-"""What the command line takes: one module per command, each with `add_to(commands)`.
-
-Nothing here imports NumPy or the rest of the package, so that help and errors of usage come at once. A command is run
-by the module of the same name one folder up.
-"""
+"""The parser of the whole command line. A command is a module: `add_to` declares what it takes, `run` does it."""
 
 from __future__ import annotations
 
-from ... import __version__
+from .. import __version__
 from . import (
     batch,
     close,
@@ -39,16 +35,6 @@ COMMANDS = (
     completion,
     warmup,
 )
-STANDARD = {
-    "volume": "npz",
-    "offset": "stl",
-    "morph": "stl",
-    "sample": "npz",
-    "contour": "stl",
-    "surface": "ply",
-    "close": "json",
-}
-"""Formats of what commands write to standard output, if nothing is said."""
 
 
 def parser() -> Parser:
@@ -59,11 +45,8 @@ def parser() -> Parser:
         "in the units of the file.",
     )
     whole.add_argument("--version", action="version", version=f"signedheat {__version__}")
+    whole.set_defaults(whole=whole)
     commands = whole.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
     for command in COMMANDS:
         command.add_to(commands)
-    for name, ending in STANDARD.items():
-        commands.choices[name].add_argument(
-            "--format", default=ending, metavar="EXT", help=f"of standard output, with -o - ({ending})"
-        )
     return whole

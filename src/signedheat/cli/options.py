@@ -7,10 +7,12 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeAlias
 
-from ..streams import say, tell
+from .streams import say, tell
 
+Summary: TypeAlias = tuple[dict[str, Any], str]
+"""The result of a command: a dictionary for ``--json``, and text."""
 MOST_WORKERS = 1024
 PLANAR = (".csv", ".svg")
 """Extensions of files with polylines in the plane."""
@@ -18,6 +20,8 @@ IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
 """Extensions of files that may have images of labels."""
 UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
 """Units of length."""
+LINES = "; in the plane, polylines: .svg .csv"
+"""What else is a shape, for commands that take lines."""
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component")
 """Names of the constraints that have no number."""
 
@@ -38,13 +42,43 @@ class Parser(argparse.ArgumentParser):
         tell(message.rstrip("\n"))  # help and version, the only messages that are no errors
 
 
-def add_command(commands: Any, name: str, help: str, description: str) -> Parser:
-    """Add a command with the options that all commands have. The module of its name, one folder up, runs it."""
-    parser: Parser = commands.add_parser(name, help=help, description=description)
-    parser.set_defaults(command=name, parser=parser, check=None)
+def add_command(
+    commands: Any,
+    name: str,
+    run: Callable[[argparse.Namespace], Summary],
+    check: Callable[[argparse.Namespace], None] | None = None,
+    **texts: str,
+) -> Parser:
+    """Add a command with the options that all commands have.
+
+    Parameters
+    ----------
+    commands : argparse subparsers
+    name : str
+    run : callable
+        What does it, from the arguments; it returns a summary.
+    check : callable, optional
+        What exits with status 2 where arguments contradict each other.
+    **texts
+        ``help`` and ``description``.
+    """
+    parser: Parser = commands.add_parser(name, **texts)
+    parser.set_defaults(run=run, parser=parser, check=check)
     parser.add_argument("--json", action="store_true", help="print a summary as JSON")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return parser
+
+
+def add_shape(parser: Parser, planar: str = "") -> None:
+    """Add the shape that a command is about, with what it may be `planar`."""
+    parser.add_argument(
+        "shape", metavar="SHAPE", help=f"surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc{planar}"
+    )
+
+
+def add_format_option(parser: Parser, standard: str) -> None:
+    """Add the option for what is written to standard output, last, with the format if nothing is said."""
+    parser.add_argument("--format", default=standard, metavar="EXT", help=f"of standard output, with -o - ({standard})")
 
 
 def add_grid_options(parser: Parser) -> None:
@@ -190,6 +224,74 @@ def add_repair_options(parser: Parser) -> argparse._ArgumentGroup:
     return steps
 
 
+def add_curves(parser: Parser, output: str) -> None:
+    """Add the arguments of a distance to curves on a surface, and of its output."""
+    parser.add_argument(
+        "mesh", metavar="MESH", help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti"
+    )
+    parser.add_argument("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json .csv")
+    parser.add_argument("-o", "--output", required=True, metavar="OUT", help=output)
+    parser.add_argument(
+        "--constraint",
+        type=surface_constraint,
+        default="zero-set",
+        metavar="C",
+        help="free, zero-set (default), hard, each-component, soft, soft:WEIGHT, or levels:V,V,…, one for each curve",
+    )
+    parser.add_argument(
+        "--diffusion",
+        type=positive,
+        metavar="T",
+        help="diffusion time in squared spacings (1; with --plain three, extrapolated, unless curves end); larger "
+        "values close gaps more roundly",
+    )
+    parser.add_argument(
+        "--globe",
+        action="store_true",
+        help="the mesh is a globe, and curves are longitudes and latitudes in degrees, joined along great circles: "
+        ".csv .geojson",
+    )
+    parser.add_argument(
+        "--intrinsic",
+        action="store_true",
+        help="run the method on better triangles of the same surface, along whose edges the curves run; by default on "
+        "better triangles where the mesh has large angles",
+    )
+    parser.add_argument(
+        "--plain",
+        action="store_true",
+        help="the method's own field, of the curves as they are given, not measured to the curves themselves",
+    )
+    parser.add_argument("--as-oriented", action="store_true", help="turn no curve, and leave none out")
+    parser.add_argument(
+        "--every-piece", action="store_true", help="leave out no piece, also if it belongs to none of the others"
+    )
+
+
+def add_sampling_options(parser: Parser) -> None:
+    """Add the options that say where samples are taken and how they are kept."""
+    group = parser.add_argument_group("samples")
+    group.add_argument(
+        "--near", type=fraction, default=0.8, metavar="S", help="share near the surface, from 0 to 1 (.8)"
+    )
+    group.add_argument(
+        "--widths",
+        type=not_negative,
+        nargs="+",
+        default=[0.05, 0.0158],
+        metavar="W",
+        help="standard deviations of the noise, over the radius of the shape; each gets the same share (.05 .0158)",
+    )
+    group.add_argument("--seed", type=whole_number(0), default=0, metavar="K", help="of the random numbers (0)")
+    group.add_argument("--normalize", action="store_true", help="move and scale the shape into the unit sphere")
+    group.add_argument(
+        "--layout",
+        choices=("arrays", "deepsdf"),
+        default="arrays",
+        help="arrays: points, distances, gradients, …; deepsdf: pos and neg, single precision (arrays)",
+    )
+
+
 def constraint(word: str, with_numbers: str = "soft, soft:WEIGHT") -> str:
     """The name of a constraint, with its number if it has one; messages also name those `with_numbers`."""
     name, _, weight = word.partition(":")
@@ -199,6 +301,16 @@ def constraint(word: str, with_numbers: str = "soft, soft:WEIGHT") -> str:
     elif word not in CONSTRAINTS:
         raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(CONSTRAINTS)}, {with_numbers}")
     return word
+
+
+def surface_constraint(word: str) -> str:
+    """The name of a constraint, with its numbers; on surfaces also given levels."""
+    name, _, values = word.partition(":")
+    if name == "levels":
+        for value in values.split(","):
+            finite(value)
+        return word
+    return constraint(word, with_numbers="soft, soft:WEIGHT, levels:V,V,…")
 
 
 def finite(word: str) -> float:

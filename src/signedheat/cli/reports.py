@@ -1,0 +1,227 @@
+"""Contents and defects of a file, and the memory that a grid around it takes, for `info`."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from dataclasses import asdict
+from typing import Any
+
+from ..domains.grid import Grid
+from ..domains.inspection import CloudReport, SurfaceReport, TetReport, inspect
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import SourceError
+from ..extensions.orientation import Orientation, orientation
+from ..extensions.thickness import Thickness, thickness
+from ..io import read, read_curves, read_polylines
+from ..io.files import extension
+from ..io.labels import LabelImage
+from ..io.obj import read_obj_lines
+from ..io.three_mf import unit_of
+from ..lowering.area_elements import bounds_around
+from ..lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
+from ..memory import available_memory
+from ..solids.fields import BYTES_AT_WORK, BYTES_PER_NODE
+from .computing import describe
+from .curve_reports import as_text, curve_reports
+from .images import field_or_image, image_report
+from .options import Summary, is_planar
+
+WHOLE = 0.9999
+"""Share of the area that counts as all of it: the rest is rounding."""
+
+
+def report(file: str, arguments: Namespace) -> Summary:
+    """Inspect a shape, a field or an image."""
+    field = field_or_image(file)
+    if isinstance(field, LabelImage):
+        summary = image_report(file, field)
+        return summary, _table(summary)
+    if field is not None:
+        summary = {"file": file, "kind": type(field).__name__, **describe(field)}
+        del summary["seconds"]
+        return summary, _table(summary)
+    if is_planar(file):
+        return lines_report(file)
+    shape = read(file)
+    counts = inspect(shape)
+    found = orientation(shape) if isinstance(shape, TriangleMesh | PolygonMesh) else None
+    summary = {
+        "verdict": verdict(counts, found),
+        "file": file,
+        "kind": type(shape).__name__,
+        **asdict(counts),
+    }
+    if (unit := unit_of(file)) is not None:
+        summary["units"] = unit
+    if extension(file) == ".obj":
+        summary["line_elements"] = len(read_obj_lines(file)[1])
+    rows = dict(summary)
+    if found is not None:
+        widths = thickness(found.shape)
+        summary["orientation"] = found.summary
+        summary["thickness"] = {**asdict(widths), "spacing": widths.spacing}
+        rows |= {"orientation": orientation_text(found), **_widths_text(widths)}
+    extra: dict[str, object] = {"memory_bytes": {str(n): _memory(shape, n) for n in arguments.resolution}}
+    extra["least_spacing"] = _least_spacing(shape)
+    summary |= extra
+    text = _table(rows | extra)
+    if arguments.curves:
+        if not hasattr(shape, "triangulation"):
+            raise SourceError(
+                f"curves lie on meshes and point clouds, not a {type(shape).__name__}",
+                element="shape",
+                path=arguments.curves,
+            )
+        summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
+        text += f"\n\n{arguments.curves}\n{as_text(summary['curves'])}"
+    return summary, text
+
+
+def lines_report(file: str) -> Summary:
+    """Inspect polylines in the plane."""
+    lines = read_polylines(file)
+    bounds = bounds_around(lines)
+    summary = {
+        "file": file,
+        "kind": "Polyline",
+        "n_polylines": len(lines),
+        "n_closed": sum(line.closed for line in lines),
+        "n_points": sum(line.n_points for line in lines),
+        "length": float(sum(line.length for line in lines)),
+        "lower": bounds[0].tolist(),
+        "upper": bounds[1].tolist(),
+    }
+    return summary, _table(summary)
+
+
+def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation | None) -> str:
+    """What to expect of a shape, in a line: whether it is whole, and if not, what is mended on the way.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> verdict(inspect(samples.sphere(2)), orientation(samples.sphere(2)))
+    'whole: closed and oriented; distance to it is exact'
+    >>> broken = samples.without_faces(samples.sphere(2), 0.1)
+    >>> verdict(inspect(broken), orientation(broken))
+    'broken: 24 holes to complete; every command takes it as it is'
+    """
+    if isinstance(counts, CloudReport):
+        if counts.has_normals:
+            return "points with normals: every command takes them for the solid that they bound"
+        return "points without normals: these are found first; thin sheets of noisy points may lose their sides"
+    if isinstance(counts, TetReport):
+        turned = counts.inside_out_tets + counts.flat_tets
+        return f"tets, {turned} of them inside out or flat" if turned else "tets, all of them sound"
+    if found is None:
+        return "voxels: closed and oriented"
+    if found.undecided_area > WHOLE:
+        return "open sheets that bound nothing: `signedheat morph thicken` makes walls of them"
+    mended = (
+        (counts.borders, "hole", "to complete"),
+        (found.turned_faces, "face", "to turn"),
+        (found.merged_faces, "duplicate face", "to merge"),
+        (found.nested_bodies, "part", "hidden in others, to leave out"),
+        (counts.nonmanifold_edges, "edge", "of three or more faces"),
+    )
+    said = [f"{_count(number, name)} {what}" for number, name, what in mended if number]
+    if found.undecided_area > 1 - WHOLE:
+        said.append(f"{100 * found.undecided_area:.3g} % of the area bounds nothing")
+    if not said:
+        return "whole: closed and oriented; distance to it is exact"
+    return f"broken: {', '.join(said)}; every command takes it as it is"
+
+
+def orientation_text(found: Orientation) -> str:
+    """Which way a mesh faces, in a line.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> orientation_text(orientation(samples.with_flipped_faces(samples.sphere(2), 0.1)))
+    '1 part, closed; faces disagree at 89 edges: 33 faces to turn (10.2 % of the area)'
+    """
+    closed = "closed" if found.closed_parts == found.n_parts else f"{found.closed_parts} closed"
+    said = [f"{_count(found.n_parts, 'part')}, {closed}"]
+    if found.inconsistent_edges:
+        edges, faces = _count(found.inconsistent_edges, "edge"), _count(found.turned_faces, "face")
+        said.append(f"faces disagree at {edges}: {faces} to turn ({100 * found.turned_area:.3g} % of the area)")
+    elif found.turned_parts:
+        which = "all" if found.turned_area > WHOLE else f"{_count(found.turned_parts, 'part')}"
+        said.append(f"{which} facing inwards ({100 * found.turned_area:.3g} % of the area to turn)")
+    elif found.undecided_area < WHOLE:
+        said.append("facing outwards")
+    kinds = (
+        (found.nonorientable_parts, "nonorientable part", "nonorientable parts"),
+        (found.doubled_walls, "doubled wall", "doubled walls"),
+        (found.nested_bodies, "body hidden in another", "bodies hidden in others"),
+        (found.cavities, "cavity", "cavities"),
+    )
+    said += [f"{number} {one if number == 1 else many}" for number, one, many in kinds if number]
+    if found.merged_faces:
+        said.append(f"{_count(found.merged_faces, 'duplicate face')} to merge")
+    if found.undecided_parts:
+        sheets = _count(found.undecided_parts, "sheet")
+        said.append(f"{100 * found.undecided_area:.3g} % of the area in {sheets} without an inside")
+    return "; ".join(said)
+
+
+def _count(number: int, name: str) -> str:
+    return f"{number} {name}" if number == 1 else f"{number} {name}s"
+
+
+def _widths_text(widths: Thickness) -> dict[str, str]:
+    rows = {}
+    for name, least, typical in (
+        ("thinnest wall", widths.wall, widths.typical_wall),
+        ("narrowest gap", widths.gap, widths.typical_gap),
+    ):
+        if least is not None:
+            rows[name] = f"{least:.4g}" + (f" (typical {typical:.4g})" if typical is not None else "")
+    if widths.spacing is not None:
+        rows["spacing they need"] = f"{widths.spacing:.4g}"
+    return rows
+
+
+def _least_spacing(shape: Any) -> float | None:
+    """Spacing of the finest grid around the shape that fits into the memory that is free; None if there is none."""
+    available = available_memory()
+    if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
+        return None
+    grid = Grid.around(shape.bounds, 128)
+    spacing = fitting_spacing(grid, available, *_most(shape))
+    return float(spacing.max()) if (spacing < grid.upper - grid.origin).all() else None
+
+
+def _memory(shape: Any, resolution: int) -> int | None:
+    """Estimate for a grid around the shape; nothing where the shape is a single place."""
+    if not (shape.bounds[1] > shape.bounds[0]).any():
+        return None
+    grid, (per_node, beside, area) = Grid.around(shape.bounds, resolution), _most(shape)
+    return memory_estimate(grid, per_node, beside) + int(bytes_of_area(area, grid.spacing, grid.n_nodes))
+
+
+def _most(shape: Any) -> tuple[float, float, float]:
+    return BYTES_PER_NODE, BYTES_AT_WORK, 0.0
+
+
+def _table(summary: dict[str, Any]) -> str:
+    rows = []
+    for key, value in summary.items():
+        if key == "least_spacing":
+            rows.append(("spacing that fits", "–" if value is None else f"{value:.3g}"))
+            continue
+        if key == "memory_bytes":
+            for resolution, size in value.items():
+                rows.append((f"memory at {resolution}", "–" if size is None else f"{size / 1e9:.2f} GB"))
+            continue
+        if isinstance(value, (list, tuple)):
+            value = " ".join(f"{entry:g}" for entry in value)
+        elif isinstance(value, bool):
+            value = "yes" if value else "no"
+        elif isinstance(value, float):
+            value = f"{value:g}"
+        rows.append((key.removeprefix("n_").replace("_", " "), str(value)))
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
