@@ -5,8 +5,8 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
-from signedheat import samples, visualization
-from signedheat.visualization.slices import cross_section, level_pieces
+from signedheat import samples, view
+from signedheat.view.slices import cross_section, level_pieces
 
 
 def test_cross_section_of_a_sphere_is_a_circle():
@@ -33,7 +33,7 @@ def test_cross_section_that_misses_is_empty():
 @pytest.mark.parametrize("shape", [None, samples.oriented_points(samples.sphere(2), 100), samples.sphere(2)])
 def test_slices_of_fields_with_one_sign(tmp_path, shape):
     grid = sh.Grid((-1, -1, -1), 0.2, (11, 11, 11))
-    visualization.save_slices(sh.GridField(grid, 2 + grid.points[..., 0]), tmp_path / "a.png", shape)
+    view.save_slices(sh.GridField(grid, 2 + grid.points[..., 0]), tmp_path / "a.png", shape)
     assert (tmp_path / "a.png").stat().st_size > 1000
 
 
@@ -53,4 +53,4 @@ def test_completed_parts_of_levels_are_dashed():
 
 def test_a_picture_of_unknown_kind_is_refused(tmp_path):
     with refused(sh.FileFormatError):
-        visualization.save_scene(samples.sphere(0), tmp_path / "a.bmp")
+        view.save_scene(samples.sphere(0), tmp_path / "a.bmp")

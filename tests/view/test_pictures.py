@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 STORED = Path(__file__).parent / "pictures"
 CELL = 13
@@ -21,35 +21,33 @@ CELL = 13
 def slices(path):
     grid = sh.Grid((-1.5, -1.2, -1.2), 0.1, (31, 25, 25))
     values = np.maximum(np.linalg.norm(grid.points, axis=-1) - 1, 0.3 - np.linalg.norm(grid.points - 0.5, axis=-1))
-    visualization.save_slices(sh.GridField(grid, values), path, samples.sphere(2), levels=[0.2])
+    view.save_slices(sh.GridField(grid, values), path, samples.sphere(2), levels=[0.2])
 
 
 def plane(path):
     grid = sh.Grid((0, 0), 0.1, (41, 31))
     line = sh.Polyline([[1, 1], [1, 2], [3, 2], [3, 1]], closed=True)
     x, y = np.moveaxis(np.abs(grid.points - [2, 1.5]) - [1, 0.5], -1, 0)
-    visualization.save_slices(sh.GridField(grid, np.maximum(x, y)), path, [line])
+    view.save_slices(sh.GridField(grid, np.maximum(x, y)), path, [line])
 
 
 def broken_shape(path):
-    visualization.save_scene(
-        samples.with_flipped_faces(samples.without_patches(samples.torus(1.0, 0.4), 3, 0.4), 0.1), path
-    )
+    view.save_scene(samples.with_flipped_faces(samples.without_patches(samples.torus(1.0, 0.4), 3, 0.4), 0.1), path)
 
 
 def shape_with_y_upwards(path):
-    visualization.save_scene(samples.torus(1.0, 0.4), path, up=1)
+    view.save_scene(samples.torus(1.0, 0.4), path, up=1)
 
 
 def points(path):
-    visualization.save_scene(samples.oriented_points(samples.torus(1.0, 0.4), 2000), path)
+    view.save_scene(samples.oriented_points(samples.torus(1.0, 0.4), 2000), path)
 
 
 def surface(path):
     ball = samples.sphere(3)
     curve = ball.polyline([[1.0, 0.0, 0.4], [0.0, -1.0, 0.5], [-1.0, 0.0, 0.4]])
     field = sh.VertexField(ball, np.where(ball.vertices[:, 0] > 0.9, np.nan, ball.vertices[:, 2] - 0.4))
-    visualization.save_surface(field, path, [curve])
+    view.save_surface(field, path, [curve])
 
 
 @pytest.mark.skipif(
@@ -91,8 +89,8 @@ def test_sources_are_drawn_where_they_are_whatever_triangles_the_field_has():
     assert isinstance(fields[2].domain, sh.IntrinsicTriangulation)
     drawn = []
     for field in fields:
-        axes = visualization.figures.new_figure(4, 4).add_subplot()
-        visualization.draw_surface(field, axes, [loop], view=np.array([0.5, -0.3, 0.7]))
+        axes = view.figures.new_figure(4, 4).add_subplot()
+        view.draw_surface(field, axes, [loop], view=np.array([0.5, -0.3, 0.7]))
         drawn.append(axes.lines[-1].get_xydata())
     assert np.isfinite(drawn[0]).all(axis=1).sum() > 5
     for line in drawn[1:]:

@@ -1,4 +1,8 @@
-"""A small software rasteriser for triangles: depth, face and value at each pixel."""
+"""A small software rasteriser for triangles: depth, face and value at each pixel.
+
+Matplotlib sorts whole faces by depth, which is wrong where they pass through each other, as those of broken shapes do;
+VTK has half a gigabyte, and needs a display or a library for drawing without one.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What shapes and fields look like in notebooks, in PyVista and in Polyscope, and as text."""
+"""What shapes and fields look like in notebooks and in PyVista, and as text."""
 
 from __future__ import annotations
 
@@ -149,27 +149,3 @@ def test_plot_shows_and_returns_what_pyvista_returns(monkeypatch):
     monkeypatch.setattr(pyvista.Plotter, "show", lambda self: ("shown", len(self.actors)))
     shown, actors = THINGS["field on a grid"]().plot()
     assert shown == "shown" and actors > 3
-
-
-def test_everything_goes_to_polyscope():
-    pytest.importorskip("polyscope")
-    code = """
-import sys; sys.path.insert(0, "tests/visualization"); sys.path.insert(0, "tests")
-import polyscope, test_display as cases, signedheat as sh
-polyscope.init("openGL_mock")
-kinds = {}
-for name, make in cases.THINGS.items():
-    try:
-        kinds[name] = type(make().to_polyscope(name)).__name__
-    except sh.UnsupportedTypeError as error:
-        assert error.remedy and error.element
-        kinds[name] = "refused"
-print(kinds)
-"""
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert found.returncode == 0, found.stderr
-    kinds = eval(found.stdout.strip().splitlines()[-1])
-    assert kinds["mesh"] == kinds["field on a mesh"] == kinds["piecewise field"] == "SurfaceMesh"
-    assert kinds["points"] == "PointCloud" and kinds["line"] == "CurveNetwork"
-    assert kinds["field on a grid"] == "VolumeGrid" and kinds["field on tets"] == kinds["tets"] == "VolumeMesh"
-    assert kinds["field in the plane"] == "refused"

@@ -20,12 +20,10 @@ from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import MissingPackageError
-from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
-from ..fields.vertex_field import VertexField
-from ..io.surface_fields import on_simple_surface
+from ..fields.vertex_field import VertexField, on_simple_surface
 from ..packages import lazy_module
 from .figures import new_figure
 from .scenes import draw_shape
@@ -113,11 +111,6 @@ def _(field: GridField, axes: Any, **options: Any) -> bool:
 
 
 @draw.register
-def _(field: BandField, axes: Any, **options: Any) -> bool:
-    return draw(field.coarse, axes, **options)
-
-
-@draw.register
 def _(field: TetField, axes: Any, **options: Any) -> bool:
     grid = Grid.around(np.delete(field.mesh.bounds, 1, axis=1), SECTION_NODES, padding=0.0)
     points = np.insert(grid.points.reshape(-1, 2), 1, field.mesh.bounds[:, 1].mean(), axis=1)
@@ -143,6 +136,7 @@ def _(field: PiecewiseField, axes: Any, **options: Any) -> bool:
 
 def _best_axis(field: GridField) -> int:
     """The axis across which a slice shows most of the inside; of equal ones y, then z."""
+    field = field.whole
     inside = field.values < 0
     counts = [int(inside.take(telling_layer(field, axis), axis).sum()) for axis in range(3)]
     return max((1, 2, 0), key=lambda axis: counts[axis])

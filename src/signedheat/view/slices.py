@@ -79,6 +79,7 @@ def draw_slices(
     across: Sequence[int] = (2, 1, 0),
 ) -> None:
     """Draw one slice into each of some axes of a figure; `across` has the coordinate that is constant on each."""
+    field = field.whole
     colors, isolines, step = _look(field)
     for panel, normal in zip(axes, across, strict=True):
         horizontal, vertical = (axis for axis in range(3) if axis != normal)

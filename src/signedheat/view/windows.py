@@ -8,17 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from ..domains.display import plotter_of
+from ..domains.display import NAME, plotter_of
 from ..domains.grid import Grid
 from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError, OutsideError
-from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
-from ..io.surface_fields import NAME
 from ..packages import lazy_module
 from .colors import INSIDE_TO_OUTSIDE, isolines_between
 from .scenes import INSIDE, OUTSIDE
@@ -67,6 +65,7 @@ def _(grid: Grid, plotter: Any) -> None:
 
 @add.register
 def _(field: GridField, plotter: Any) -> None:
+    field = field.whole
     image, look = field.to_pyvista(), _look(field.values)
     if field.grid.dimension == 2:
         _add_colors(plotter, image, look)
@@ -75,11 +74,6 @@ def _(field: GridField, plotter: Any) -> None:
         return
     _add_section(plotter, image, look)
     _add_zero_set(plotter, field)
-
-
-@add.register
-def _(field: BandField, plotter: Any) -> None:
-    add(field.coarse, plotter)
 
 
 @add.register
