@@ -59,7 +59,7 @@ def test_large_grids_have_several_top_nodes(tmp_path):
     grid = sh.Grid((0, 0, 0), 1.0, (9001, 200, 200))
     blocks = Blocks.of(np.array([[600, 2, 3], [5, 20, 3], [1100, 1, 1], [5, 2, 3]]), grid.shape)
     values = np.random.default_rng(0).normal(size=(4, 8, 8, 8)).astype(np.float32)
-    write_vdb(sh.BandField(grid, blocks, values, coarse, 10.0), tmp_path / "long.vdb")
+    write_vdb(sh.GridField(grid, values, blocks=blocks, coarse=coarse, width=10.0), tmp_path / "long.vdb")
     back = read_vdb(tmp_path / "long.vdb")
     assert back.places.tolist() == [[40, 16, 24], [40, 160, 24], [4800, 16, 24], [8800, 8, 8]]
     np.testing.assert_array_equal(back.values, values[blocks.rows(back.places // 8)])

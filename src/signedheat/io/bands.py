@@ -11,10 +11,9 @@ import numpy as np
 
 from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError
-from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..operators.grid.blocks import Blocks
-from .files import PathLike, ensure_writable, extension, replacing
+from .files import PathLike, extension
 from .vdb import write_vdb
 
 CONVENTION = (
@@ -23,32 +22,8 @@ CONVENTION = (
 )
 
 
-def save_band_field(field: BandField, path: PathLike) -> None:
-    """Write a field in a band, in the format given by the extension.
-
-    Raises
-    ------
-    FileFormatError
-        If the format is unknown, or the file cannot be written.
-    """
-    ensure_band_writable(path)
-    with replacing(path) as temporary:
-        WRITERS[extension(path)](field, temporary)
-
-
-def ensure_band_writable(path: PathLike) -> None:
-    """Check before a long computation that a field in a band can be written.
-
-    Raises
-    ------
-    FileFormatError
-        If the format is unknown, or no file can be made there.
-    """
-    ensure_writable(path, BAND_FORMATS, "a field in a band")
-
-
-def load_band_field(path: PathLike) -> BandField:
-    """Read a ``.npz`` file that `save_band_field` wrote.
+def load_band_field(path: PathLike) -> GridField:
+    """Read a ``.npz`` file of a field in a band.
 
     Raises
     ------
@@ -65,7 +40,9 @@ def load_band_field(path: PathLike) -> BandField:
             values = file["values"]
             if not np.array_equal(blocks.places, file["places"]):
                 raise GeometryError("its blocks are not in order", element="places")
-            return BandField(grid, blocks, values, coarse, float(file["width"]), confidence=confidence)
+            return GridField(
+                grid, values, confidence=confidence, blocks=blocks, coarse=coarse, width=float(file["width"])
+            )
     except (KeyError, ValueError, OSError, zipfile.BadZipFile, GeometryError) as error:
         raise FileFormatError(
             f"it is no field in a band, or is truncated ({error})", remedy="write it again", path=path
@@ -80,7 +57,8 @@ def is_band_field(path: PathLike) -> bool:
         return "coarse_values.npy" in file.namelist()
 
 
-def _write_npz(field: BandField, path: Path) -> None:
+def _write_npz(field: GridField, path: Path) -> None:
+    assert field.blocks is not None
     some: dict[str, Any] = {} if field.confidence is None else {"confidence": field.confidence}
     with path.open("wb") as file:
         np.savez(
@@ -91,13 +69,13 @@ def _write_npz(field: BandField, path: Path) -> None:
             spacing=field.grid.spacing,
             shape=np.array(field.grid.shape),
             width=np.array(field.width),
-            coarse_values=field.coarse.values,
-            coarse_spacing=field.coarse.grid.spacing,
+            coarse_values=field.whole.values,
+            coarse_spacing=field.whole.grid.spacing,
             convention=np.array(CONVENTION),
             **some,
         )
 
 
-WRITERS: dict[str, Callable[[BandField, Path], None]] = {".npz": _write_npz, ".vdb": write_vdb}
+BAND_WRITERS: dict[str, Callable[[GridField, Path], None]] = {".npz": _write_npz, ".vdb": write_vdb}
 
-BAND_FORMATS = frozenset(WRITERS)
+BAND_FORMATS = frozenset(BAND_WRITERS)

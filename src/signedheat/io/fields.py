@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..domains.display import NAME
 from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError
-from ..fields.band_field import BandField
 from ..fields.files import save_field as save_any_field
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
@@ -19,7 +19,7 @@ from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..packages import require
 from .arrays import read_npy, read_npz
-from .bands import is_band_field, load_band_field, save_band_field
+from .bands import BAND_FORMATS, BAND_WRITERS, is_band_field, load_band_field
 from .files import PathLike, contents, ensure_writable, extension, reading, replacing, unknown_extension
 from .nrrd_files import read_image, write_image
 from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
@@ -34,7 +34,6 @@ CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
     "values[i, j, k] at origin + (i, j, k) * spacing, axes x, y, z, in the units of the shape"
 )
-NAME = "signed_distance"
 CONFIDENCE = "confidence"
 
 Parts = tuple[Any, ...]
@@ -45,8 +44,6 @@ Parts = tuple[Any, ...]
 def _(field: object, path: PathLike) -> None:
     if isinstance(field, GridField):
         save_field(field, path)
-    elif isinstance(field, BandField):
-        save_band_field(field, path)
     elif isinstance(field, TetField):
         save_tet_field(field, path)
     elif isinstance(field, VertexField):
@@ -88,8 +85,8 @@ def save_field(field: GridField, path: PathLike) -> None:
             remedy="save it as .npz",
             path=path,
         )
-    ensure_field_writable(path)
-    write, _ = _FORMATS[extension(path)]
+    ensure_field_writable(path, in_band=field.blocks is not None)
+    write = BAND_WRITERS[extension(path)] if field.blocks is not None else _FORMATS[extension(path)][0]
     if extension(path) == ".npy":
         with replacing(Path(path).with_suffix(".json")) as beside, replacing(path) as temporary:
             beside.write_text(json.dumps(_description(field.grid), indent=1) + "\n")
@@ -99,8 +96,8 @@ def save_field(field: GridField, path: PathLike) -> None:
             write(field, temporary)
 
 
-def ensure_field_writable(path: PathLike) -> None:
-    """Check before a long computation that a field can be written.
+def ensure_field_writable(path: PathLike, in_band: bool = False) -> None:
+    """Check before a long computation that a field can be written, in a band or whole.
 
     Raises
     ------
@@ -109,12 +106,12 @@ def ensure_field_writable(path: PathLike) -> None:
     MissingPackageError
         If the format needs a package that is not installed.
     """
-    ensure_writable(path, _FORMATS, "a field")
+    ensure_writable(path, BAND_FORMATS if in_band else _FORMATS, "a field in a band" if in_band else "a field")
     if extension(path) in _NEEDED:
         require(*_NEEDED[extension(path)])
 
 
-def load_field(path: PathLike) -> Field | BandField:
+def load_field(path: PathLike) -> Field:
     """Read a field, exactly as it was written: values and transform.
 
     Parameters
@@ -126,7 +123,7 @@ def load_field(path: PathLike) -> Field | BandField:
 
     Returns
     -------
-    GridField, TetField, VertexField or BandField
+    GridField, TetField or VertexField
         The field; its diagnostics are empty.
 
     Raises

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.digital_surface import DigitalSurface
+from ..domains.display import NAME
 from ..domains.grid import Grid
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.transforms import transform
@@ -21,7 +22,7 @@ from ..errors import FileFormatError, GeometryError
 from ..fields.grid_field import GridField
 from ..packages import lazy_module, require
 from .arrays import read_npy
-from .fields import CONVENTION, NAME, ensure_field_writable, save_field
+from .fields import CONVENTION, ensure_field_writable, save_field
 from .files import (
     PathLike,
     contents,

@@ -15,6 +15,7 @@ from .files import PathLike, extension, reading, replacing, unknown_extension
 from .glb import read_glb
 from .obj import read_obj, write_obj, write_pc
 from .off import read_off, write_off
+from .pcd import read_pcd
 from .ply import read_ply, write_ply
 from .stl import read_stl, write_stl
 from .tets import TET_FORMATS, read_tets, write_tets
@@ -32,6 +33,7 @@ READERS: dict[str, Callable[[PathLike], Shape]] = {
     ".obj": read_obj,
     ".off": read_off,
     ".pc": read_obj,
+    ".pcd": read_pcd,
     ".ply": read_ply,
     ".stl": read_stl,
     ".vti": read_volume,
@@ -59,11 +61,11 @@ MANY, BYTES_PER_FACE = 100_000, 250
 def read(path: PathLike) -> Shape:
     """Read a shape, in the format given by the extension.
 
-    STL, OBJ, PLY, OFF, VTP and GLB files have surfaces; XYZ and PC files have points, and so have PLY, OBJ, OFF and VTP
-    files without faces. Vertices and faces keep their number and order, whatever their defects: nothing is merged,
-    dropped, split or turned. STL has no vertices; corners with exactly the same coordinates become one. NPY, NRRD and
-    VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH, VTU, VTK and TetGen's NODE with ELE have
-    tets.
+    STL, OBJ, PLY, OFF, VTP and GLB files have surfaces; XYZ, PCD and PC files have points, and so have PLY, OBJ, OFF
+    and VTP files without faces. Vertices and faces keep their number and order, whatever their defects: nothing is
+    merged, dropped, split or turned. STL has no vertices; corners with exactly the same coordinates become one. NPY,
+    NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH, VTU, VTK and TetGen's NODE with
+    ELE have tets.
 
     Parameters
     ----------

@@ -12,19 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..domains.display import NAME
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
-from ..fields.vertex_field import VertexField
+from ..fields.vertex_field import VertexField, on_simple_surface
 from .arrays import names_in_npz, read_npz
 from .elements import SurfaceShape, faces_of, points_of
 from .files import PathLike, extension, reading, replacing, unknown_extension
 from .ply import read_ply, read_ply_values
 from .vtk_xml import _Writer, read_vtp, read_vtp_values
-
-NAME = "signed_distance"
 
 
 def save_vertex_field(field: VertexField, path: PathLike) -> None:
@@ -35,16 +33,6 @@ def save_vertex_field(field: VertexField, path: PathLike) -> None:
     content = writer(on_simple_surface(field))
     with replacing(path) as temporary:
         temporary.write_bytes(content)
-
-
-def on_simple_surface(field: VertexField) -> VertexField[SurfaceShape]:
-    """The field on a surface that files support: voxel faces become triangles."""
-    domain = field.domain
-    if isinstance(domain, TriangleMesh | PolygonMesh | PointCloud):
-        return VertexField(domain, field.values)
-    if isinstance(domain, IntrinsicTriangulation):
-        return on_simple_surface(field.restrict())
-    return VertexField(domain.triangulation, domain.on_triangulation(field.values))
 
 
 def load_vertex_field(path: PathLike) -> VertexField:

@@ -1,10 +1,12 @@
-"""Reading and writing of tet meshes, and of fields on them; meshio reads Medit and legacy VTK, and writes.
+"""Tet meshes, and fields on them, by meshio; VTK's XML is read by ourselves.
 
 What meshio reads is parsed within a limit of time: on some damaged files it does not end by itself.
 """
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 import warnings
 from contextlib import redirect_stderr
 from io import StringIO
@@ -13,18 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from ..domains.display import NAME
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
 from ..fields.tet_field import TetField
 from ..packages import require
-from .files import PathLike, contents, extension, parsed_by_others, reading, replacing, unknown_extension
-from .gmsh import read_gmsh
-from .tetgen_files import read_tetgen, write_tetgen
+from .files import PathLike, contents, extension, parsed_by_others, reading, replacing, unknown_extension, writing
 from .vtu import read_vtu
-
-NAME = "signed_distance"
 
 MODULES = {
     ".mesh": "medit",
@@ -32,13 +31,13 @@ MODULES = {
     ".msh": "gmsh",
     ".vtk": "vtk",
     ".vtu": "vtu",
+    ".ele": "tetgen",
+    ".node": "tetgen",
 }
 """meshio's module for each extension."""
-READERS = {".vtu": read_vtu, ".msh": read_gmsh}
-"""What is read without meshio."""
-TETGEN = frozenset({".ele", ".node"})
+TETGEN = (".node", ".ele")
 """Extensions of the files of TetGen, which are read and written as a pair."""
-TET_FORMATS = frozenset(MODULES) | TETGEN
+TET_FORMATS = frozenset(MODULES)
 
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 
@@ -53,8 +52,6 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     GeometryError
         If it has neither tets nor faces.
     """
-    if extension(path) in TETGEN:
-        return read_tetgen(path)
     mesh = _load(path)
     kinds = {block.type for block in mesh.cells}
     if "tetra" in kinds:
@@ -70,8 +67,6 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
 
 def write_tets(mesh: TetMesh, path: PathLike) -> None:
     """Write a tet mesh, in the format given by the extension."""
-    if extension(path) in TETGEN:
-        return write_tetgen(mesh, path)
     _store(mesh.to_meshio(), path)
 
 
@@ -107,22 +102,35 @@ def load_tet_field(path: PathLike) -> TetField:
 
 
 def _load(path: PathLike) -> Any:
-    if (own := READERS.get(extension(path))) is not None:
-        return own(path, (NAME,))
-    module, size = _module(path), len(contents(path))
-    return parsed_by_others(lambda: module.read(str(path)), size)
+    if extension(path) == ".vtu":
+        return read_vtu(path, (NAME,))
+    module, files = _module(path), _files(path)
+    for file in files:
+        if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would look on
+            raise FileFormatError("there is nothing in it", remedy="write it again", path=file)
+    return parsed_by_others(lambda: module.read(str(path)), sum(len(contents(file)) for file in files))
 
 
 def _store(mesh: Any, path: PathLike) -> None:
     module = _module(path)
-    with replacing(path) as temporary:
-        _write(module, temporary, mesh)
-
-
-def _write(module: Any, path: Path, mesh: Any) -> None:
-    with warnings.catch_warnings(), redirect_stderr(StringIO()):
+    with (
+        writing(path),
+        tempfile.TemporaryDirectory() as folder,
+        warnings.catch_warnings(),
+        redirect_stderr(StringIO()),
+    ):
         warnings.simplefilter("ignore")
-        module.write(str(path), mesh)
+        made = Path(folder, f"mesh{extension(path)}")
+        module.write(str(made), mesh)
+        for file in _files(path):
+            with replacing(file) as temporary:
+                shutil.copyfile(made.with_suffix(file.suffix.lower()), temporary)
+
+
+def _files(path: PathLike) -> list[Path]:
+    """The file that is named, after the other one of a pair."""
+    named = Path(path)
+    return [*(named.with_suffix(end) for end in TETGEN if extension(path) in TETGEN and end != extension(path)), named]
 
 
 def _module(path: PathLike) -> Any:

@@ -16,8 +16,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.display import NAME
 from ..errors import FileFormatError
-from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..operators.grid.blocks import CUBE, SIDE, Blocks
 from .files import PathLike, extension, replacing, unknown_extension
@@ -28,13 +28,12 @@ ZIP, ALL_VALUES = 1, 6
 """Codes: values are compressed by zlib; all values are there, whatever the masks."""
 TOP = 32
 """Cubes along each edge of the topmost nodes."""
-NAME = "signed_distance"
 CONVENTION = (
     "signed distance, negative inside, in the units of the shape; voxel (i, j, k) at origin + (i, j, k) * spacing"
 )
 
 
-def write_vdb(field: GridField | BandField, path: PathLike, half: bool = False) -> None:
+def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
     """Write a field in space as a ``.vdb`` file, single precision, without OpenVDB.
 
     A field in a band becomes a level set: voxels up to its half width are active, and the others have plus or minus
@@ -42,7 +41,7 @@ def write_vdb(field: GridField | BandField, path: PathLike, half: bool = False) 
 
     Parameters
     ----------
-    field : GridField in space, or BandField
+    field : GridField in space
         The field. Nodes without a value become inactive.
     path : str or path
         The file; written under a temporary name and renamed.
@@ -69,7 +68,7 @@ def write_vdb(field: GridField | BandField, path: PathLike, half: bool = False) 
         raise unknown_extension(path, [".vdb"], "an OpenVDB grid")
     if field.grid.dimension != 3:
         raise FileFormatError("an OpenVDB grid has three axes", remedy="save the field as .npz", path=path)
-    tree = _LevelSet(field) if isinstance(field, BandField) else _dense_tree(field)
+    tree = _LevelSet(field) if field.blocks is not None else _dense_tree(field)
     with replacing(path) as temporary, temporary.open("wb") as file:
         _Writer(file, half).write(field, tree)
 
@@ -81,7 +80,7 @@ class _Writer:
         self.file, self.half = file, half
         self.kind = np.dtype("<f2" if half else "<f4")
 
-    def write(self, field: GridField | BandField, tree: _Tree) -> None:
+    def write(self, field: GridField, tree: _Tree) -> None:
         """Header, description, transform, topology and voxels."""
         write = self.file.write
         write(struct.pack("<qIIIB", MAGIC, FILE_VERSION, *LIBRARY, 1))
@@ -98,7 +97,7 @@ class _Writer:
         self.metadata(
             {
                 "name": NAME,
-                "class": "level set" if isinstance(field, BandField) else "unknown",
+                "class": "level set" if field.blocks is not None else "unknown",
                 "creator": "signedheat",
                 "convention": CONVENTION,
                 "spacing": " ".join(map(repr, field.grid.spacing.tolist())),
@@ -210,8 +209,9 @@ class _Tree:
 class _LevelSet(_Tree):
     """Blocks of a band: what is not there is plus or minus the background, as the coarse field tells."""
 
-    def __init__(self, field: BandField) -> None:
+    def __init__(self, field: GridField) -> None:
         self.field = field
+        assert field.blocks is not None
         background = np.float32(field.width)
         known = ~np.isnan(field.values)
         values = np.where(known, np.clip(field.values, -background, background), background)
@@ -222,7 +222,7 @@ class _LevelSet(_Tree):
         middle = places * size + 0.5 * (size - 1)
         on_grid = (middle < np.array(grid.shape)).all(axis=1)
         result = super().outer(places, size)
-        inside = self.field.coarse(grid.origin + middle[on_grid] * grid.spacing) < 0
+        inside = self.field(grid.origin + middle[on_grid] * grid.spacing) < 0
         result[np.flatnonzero(on_grid)[inside]] *= -1
         return result
 
