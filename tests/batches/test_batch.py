@@ -14,7 +14,7 @@ import signedheat as sh
 from batch_jobs import measure
 from refusals import refused
 from signedheat import samples
-from signedheat.batches import supervision
+from signedheat.batches import worker as workers
 from signedheat.batches.inputs import expand
 from signedheat.batches.manifest import Manifest
 
@@ -117,7 +117,7 @@ def test_results_do_not_depend_on_the_number_of_workers(tmp_path):
             assert (one / name).read_bytes() == (two / name).read_bytes()
     figures = batch.outcomes[1].figures
     assert figures["surfaces"][0]["distance"] == 0.1 and figures["samples"]["samples"] == 300
-    assert figures["info"]["kind"] == "TriangleMesh" and figures["field"]["notes"]["sharpened_to_shape"]
+    assert figures["info"]["kind"] == "TriangleMesh" and figures["field"]["notes"]["shape_oriented"]
     field = sh.solid_distance(sh.read(tmp_path / "in1.ply"), sh.load_field(one / "in1.npy").grid)
     np.testing.assert_array_equal(sh.load_field(one / "in1.npy").values, field.values)
 
@@ -363,7 +363,7 @@ def test_results_go_where_links_lead_with_the_permissions_there(tmp_path, files)
 def test_a_process_that_is_killed_while_it_begins_is_started_again(tmp_path, files, monkeypatch):
     """As the system does where memory ends."""
     started = []
-    spawn = supervision.Worker._spawn
+    spawn = workers.Worker._spawn
 
     def killed_at_first(worker):
         process = spawn(worker)
@@ -372,6 +372,6 @@ def test_a_process_that_is_killed_while_it_begins_is_started_again(tmp_path, fil
             process.kill()
         return process
 
-    monkeypatch.setattr(supervision.Worker, "_spawn", killed_at_first)
+    monkeypatch.setattr(workers.Worker, "_spawn", killed_at_first)
     assert not sh.batch(files("a.ply"), tmp_path / "out", measure, workers=1).failures
     assert len(started) == 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,18 +38,22 @@ def expand(inputs: Iterable[str | os.PathLike[str]], without: Path) -> list[Inpu
     FileFormatError
         If a name cannot be one, if there is no such file or folder, or none that matches a pattern, or no shape at all.
     """
-    found: dict[str, tuple[Path, Path]] = {}  # by where each is: itself, and what its name is relative to
+    found: dict[str, str] = {}  # by where each is, links apart: its name below the folder that it was looked for in
+    paths: dict[str, Path] = {}
     for each in inputs:
         try:
-            for path, root in _files(named_path(each), without):
-                found.setdefault(_place(path), (path, root))
+            files, root = _files(named_path(each), without)
         except OSError as error:
-            raise FileFormatError(
-                f"cannot be looked for ({error.strerror})", remedy="check the name", path=error.filename or each
-            ) from error
+            cause, where = f"cannot be looked for ({error.strerror})", error.filename or each
+            raise FileFormatError(cause, remedy="check the name", path=where) from error
+        for path in files:
+            place = os.path.join(os.path.realpath(path.parent), path.name)
+            below = path.relative_to(root)
+            paths.setdefault(place, path)
+            found.setdefault(place, path.name if ".." in below.parts else str(below))
     if not found:
         raise FileFormatError("there is no shape among the inputs", remedy="name files, folders or patterns")
-    return [Input(path, name) for (path, _), name in zip(found.values(), _names(found), strict=True)]
+    return [Input(path, name) for path, name in zip(paths.values(), _names(found), strict=True)]
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
@@ -66,27 +70,27 @@ def named_path(name: str | os.PathLike[str]) -> Path:
     return Path(name)
 
 
-def _files(path: Path, without: Path) -> list[tuple[Path, Path]]:
-    """Files, and the folder that the names of each are relative to."""
+def _files(path: Path, without: Path) -> tuple[list[Path], Path]:
+    """Files, and the folder that their names are relative to."""
     if path.is_dir():
-        avoided, own = os.path.realpath(without), os.path.realpath(path)
-        if _is_in(own, avoided):
+        avoided = os.path.realpath(without)
+        if Path(os.path.realpath(path)).is_relative_to(avoided):
             raise FileFormatError(
                 "results would lie among the shapes, and be taken for some the next time",
                 remedy="name another folder for them, such as one in this one",
                 path=path,
             )
-        inner = [Path(folder, name) for folder, names in _walk(path, links=False) for name in names]
+        inner = (Path(folder, name) for folder, names in _walk(path, links=False) for name in names)
         shapes = sorted(file for file in inner if extension(file) in READERS and _is_meant_for_a_file(file))
-        return [(file, path) for file in shapes if not _is_in(os.path.realpath(file), avoided)]
+        return [file for file in shapes if not Path(os.path.realpath(file)).is_relative_to(avoided)], path
     if path.exists() or not MAGIC & set(str(path)):
-        return [(path, path.parent)]  # whether it can be read is for its worker to say
-    root = Path(*_before_magic(path))
-    matches = sorted(_matching(root, path.parts[len(_before_magic(path)) :]))
-    files = [(match, root) for match in matches if _is_meant_for_a_file(match)]
+        return [path], path.parent  # whether it can be read is for its worker to say
+    fixed = next(k for k, part in enumerate(path.parts) if MAGIC & set(part))
+    root = Path(*path.parts[:fixed])
+    files = [match for match in sorted(_matching(root, path.parts[fixed:])) if _is_meant_for_a_file(match)]
     if not files:
         raise FileFormatError("no file matches the pattern", remedy="check the pattern", path=path)
-    return files
+    return files, root
 
 
 def _walk(folder: Path, links: bool) -> Iterator[tuple[str, list[str]]]:
@@ -113,28 +117,19 @@ def _walk(folder: Path, links: bool) -> Iterator[tuple[str, list[str]]]:
 
 
 def _matching(root: Path, parts: Sequence[str]) -> set[Path]:
-    """What matches a pattern below a folder, part by part."""
+    """What matches a pattern below a folder, part by part; `glob` would follow links in circles."""
     found = {root}
     for part in [*parts, "*"] if parts[-1] == "**" else parts:
         if part == "**":
             below = {Path(place) for each in found if each.is_dir() for place, _ in _walk(each, links=True)}
-            found = {place for place in below if not _is_hidden(place.parts[len(root.parts) :])}
+            found = {place for place in below if not _is_hidden(place.relative_to(root))}
         else:
             found = {Path(match) for each in found for match in glob.glob(os.path.join(glob.escape(str(each)), part))}
     return found
 
 
-def _is_hidden(parts: Sequence[str]) -> bool:
-    return any(name.startswith(".") and name != ".." for name in parts)
-
-
-def _place(path: Path) -> str:
-    """Where a file is, by whichever way it was named; links to it are files of their own."""
-    return os.path.join(os.path.realpath(path.parent), path.name)
-
-
-def _is_in(path: str, folder: str) -> bool:
-    return Path(path).is_relative_to(folder)
+def _is_hidden(path: Path) -> bool:
+    return any(name.startswith(".") and name != ".." for name in path.parts)
 
 
 def _is_meant_for_a_file(path: Path) -> bool:
@@ -142,32 +137,21 @@ def _is_meant_for_a_file(path: Path) -> bool:
     return path.is_file() or (path.is_symlink() and not path.exists())
 
 
-def _before_magic(path: Path) -> list[str]:
-    parts: list[str] = []
-    for part in path.parts:
-        if MAGIC & set(part):
-            break
-        parts.append(part)
-    return parts
-
-
-def _names(found: Mapping[str, tuple[Path, Path]]) -> list[str]:
+def _names(found: dict[str, str]) -> list[str]:
     """A name for each file that no other has: without extension, with it, or with folders from further up."""
-    whole = [_below(path, root) for path, root in found.values()]
-    names = [_without_extension(name) for name in whole]
-    for longer in (whole, [_from_above(place, list(found)) for place in found]):
+    alike: dict[str, list[str]] = {}
+    for place in found:
+        alike.setdefault(os.path.basename(place).lower(), []).append(os.path.dirname(place))
+    common = {name: os.path.commonpath(folders) for name, folders in alike.items()}
+    above = [os.path.relpath(place, common[os.path.basename(place).lower()]) for place in found]
+    names = [_without_extension(name) for name in found.values()]
+    for longer in (list(found.values()), above):
         count = Counter(name.lower() for name in names)  # file systems may not tell cases apart
         names = [name if count[name.lower()] == 1 else other for name, other in zip(names, longer, strict=True)]
     twice = next((name for name, times in Counter(names).items() if times > 1), None)
     if twice is not None:
         raise FileFormatError("the results of two shapes would have this name", remedy="rename one", path=twice)
     return names
-
-
-def _below(path: Path, root: Path) -> str:
-    """A file relative to a folder; its name alone where a pattern has led out of that."""
-    relative = path.relative_to(root)
-    return path.name if ".." in relative.parts else str(relative)
 
 
 def _without_extension(name: str) -> str:
@@ -180,10 +164,3 @@ def _without_extension(name: str) -> str:
     """
     short = name.removesuffix(Path(name).suffix)
     return name if os.path.basename(short) in ("", ".", "..") else short
-
-
-def _from_above(place: str, places: list[str]) -> str:
-    """A file below what it has in common with all files of its name, its folders included."""
-    name = Path(place).name.lower()
-    common = Path(os.path.commonpath([other for other in places if Path(other).name.lower() == name]))
-    return str(Path(place).relative_to(common if common != Path(place) else common.parent))

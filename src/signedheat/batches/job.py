@@ -14,7 +14,6 @@ from ..errors import SignedHeatError
 from ..extensions.figures import describe, shape_figures, told
 from ..extensions.sampling import WIDTHS, Layout, sample
 from ..extensions.solid_distance import solid_distance
-from ..fields.band_field import BandField
 from ..fields.grid_field import GridField
 from ..io.bands import BAND_FORMATS
 from ..io.files import told_apart
@@ -152,7 +151,7 @@ class BatchJob:
         phi = self._distance(shape, grid)
         return {**figures, "told": told(phi), "field": describe(phi), **self._written(phi, stem)}
 
-    def _distance(self, shape: ShapeLike, grid: Grid) -> GridField | BandField:
+    def _distance(self, shape: ShapeLike, grid: Grid) -> GridField:
         options: dict[str, Any] = {
             "constraint": self.constraint,
             "diffusion": self.diffusion,
@@ -163,14 +162,14 @@ class BatchJob:
             return solid_distance(shape, grid, band=self.band, **options)
         return solid_distance(shape, grid, plain=self.plain, **options)
 
-    def _written(self, phi: GridField | BandField, stem: Path) -> dict[str, object]:
+    def _written(self, phi: GridField, stem: Path) -> dict[str, object]:
         """Write what is wanted of a field, and tell its figures."""
         figures: dict[str, object] = {}
         if self.volume is not None:
             phi.save(f"{stem}{self.volume}")
         surfaces = []
         for distance, name in zip(self.offsets, told_apart(self.offsets), strict=True):
-            surface = cast("GridField[Literal[3]] | BandField", phi).offset(distance)
+            surface = cast("GridField[Literal[3]]", phi).offset(distance)
             save(surface, f"{stem}_{name}{self.surfaces}")
             surfaces.append({"distance": distance, "vertices": surface.n_vertices, "faces": surface.n_faces})
         if surfaces:

@@ -77,10 +77,6 @@ class Manifest:
         present = all((self.path.parent / output).is_file() for output in outcome.outputs)
         return outcome if same and present else None
 
-    def begin(self, kept: Iterable[Outcome]) -> None:
-        """Leave the lines of what is kept, and no others."""
-        self.write(kept)
-
     def add(self, outcome: Outcome) -> None:
         """Append a line, at once: whatever happens next, it stays."""
         with writing(self.path), self.path.open("a", encoding="utf-8") as file:

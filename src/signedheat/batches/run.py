@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import queue
+import shutil
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass, is_dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from ..compiled import MOST_THREADS
 from ..domains.validation import positive_number, whole_number
 from ..errors import FileFormatError, SignedHeatError
-from ..packages import lazy_module, require
+from ..packages import require
 from ..parallel import connected, n_threads
 from ..progress import Progress, logger
-from .folder import held, make, refuse_file, scratch
 from .inputs import Input, expand, named_path
 from .job import BatchJob
-from .manifest import Manifest, Outcome, State, job_text, source_of
-from .supervision import Worker
-from .task import Answer, Job, Task
+from .manifest import Manifest, Outcome, job_text
+from .worker import Done, Job, Task, Worker, apart
 
-CLUSTER = ("distributed", "clusters")
-distributed = lazy_module(*CLUSTER)
+try:
+    import fcntl
+except ImportError:  # where folders cannot be held, two batches at once are not told
+    fcntl = None  # type: ignore[assignment]
+
+SCRATCH = ".unfinished"
+"""The folder in that of the results in which they are made."""
+HEARING = 0.5
+"""Seconds after which a wait is interrupted, so that a signal is heard everywhere."""
 
 
 @dataclass(frozen=True)
@@ -125,42 +133,39 @@ def batch(
     Batch(3 of 3 shapes done, 0 of them before)
     """
     if scheduler is not None:
-        require(*CLUSTER)
+        require("distributed", "clusters")
     _refuse_odd(workers, threads, time_limit)
     target = named_path(folder)
-    refuse_file(target)
+    _refuse_file(target)
     every = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
     if isinstance(job, BatchJob):
         _refuse_shared(every, job)
-    make(target)
     named = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
-    with held(target), scratch(target) as place:
+    with ExitStack() as stack:
+        scratch = stack.enter_context(_held(target))
         manifest = Manifest(target)
         found = {each.name: manifest.still_holds(each.name, each.path, named) for each in every}
         kept = {name: outcome for name, outcome in found.items() if outcome is not None}
-        manifest.begin(kept.values())
+        manifest.write(kept.values())
         todo = [each for each in every if each.name not in kept]
-        count = _Count(len(every), len(kept), progress)
-        tasks = [
-            Task(job, each.path.absolute(), target.absolute() / each.name, place / str(k))
-            for k, each in enumerate(todo)
-        ]
+        tasks = [Task(job, job_text(named), each, target.absolute(), scratch / str(k)) for k, each in enumerate(todo)]
         if scheduler is not None:
-            results = _on_cluster(scheduler, tasks, threads, time_limit)
+            outcomes = _on_cluster(tasks, scheduler, threads, time_limit)
         else:
-            results = _in_processes(tasks, n_threads() if workers is None else workers, threads, time_limit)
-        count.tell()
-        for index, state, answer in results:
-            outcome = _outcome(todo[index], state, answer, job_text(named))
+            outcomes = _in_processes(tasks, workers or n_threads(), threads, time_limit)
+        stack.enter_context(closing(outcomes))
+        begin, failed = time.perf_counter(), 0
+        _tell(progress, len(kept), len(every))
+        for now, outcome in enumerate(outcomes, 1):
             kept[outcome.name] = outcome
             manifest.add(outcome)
-            logger.info("%s: %s (%.1f s) %s", outcome.name, state, outcome.seconds, outcome.message)
+            logger.info("%s: %s (%.1f s) %s", outcome.name, outcome.state, outcome.seconds, outcome.message)
             if report is not None:
                 report(outcome)
-            count.add(outcome)
-        outcomes = tuple(kept[each.name] for each in every)
-        manifest.write(outcomes)
-    return Batch(outcomes, manifest.path, len(every) - len(todo))
+            failed += not outcome.is_done
+            _tell(progress, len(kept), len(every), failed, (time.perf_counter() - begin) / now)
+        manifest.write(kept[each.name] for each in every)
+    return Batch(tuple(kept[each.name] for each in every), manifest.path, len(every) - len(todo))
 
 
 def _refuse_shared(every: Sequence[Input], job: BatchJob) -> None:
@@ -187,136 +192,120 @@ def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
         raise SignedHeatError(cause, remedy="leave it out", element="time limit")
 
 
-Result = tuple[int, State, Answer]
-"""Which task, how it ended, and what came of it."""
+def _refuse_file(folder: Path) -> None:
+    """Raise `FileFormatError` if there is something else of that name."""
+    if os.path.lexists(folder) and not folder.is_dir():
+        raise FileFormatError("this is no folder", remedy="choose another one", path=folder)
 
 
-def _in_processes(tasks: Sequence[Task], workers: int, threads: int, time_limit: float | None) -> Iterator[Result]:
-    """Results as they come; those that were short of memory once more, alone, at the end."""
-    if workers < 1:
-        raise SignedHeatError(f"{workers} workers do nothing", remedy="take one or more")
-    starved = []
-    for index, state, answer in _in_parallel(range(len(tasks)), tasks, min(workers, len(tasks)), threads, time_limit):
-        if answer.starved and workers > 1 and len(tasks) > 1:
-            starved.append(index)
-        else:
-            yield index, state, answer
-    yield from _in_parallel(starved, tasks, 1, threads, time_limit)
+@contextmanager
+def _held(folder: Path) -> Iterator[Path]:
+    """Make a folder, and keep other batches out: each would leave the lines of the other out of the manifest.
 
+    Gives a place in it for what is not finished, without what a batch has left there that was killed. The system lets
+    go of the folder when the process ends, however it does.
 
-def _in_parallel(
-    indices: Sequence[int], tasks: Sequence[Task], workers: int, threads: int, time_limit: float | None
-) -> Iterator[Result]:
-    """Results as they come, from as many processes, each with a thread that minds it."""
-    waiting: queue.SimpleQueue[int] = queue.SimpleQueue()
-    for index in indices:
-        waiting.put(index)
-    ready: queue.SimpleQueue[Result | BaseException] = queue.SimpleQueue()
-    processes = [Worker(threads) for _ in range(workers)]
-
-    def mind(worker: Worker) -> None:
-        try:
-            while True:
-                index = waiting.get_nowait()
-                ready.put((index, *worker.do(tasks[index], time_limit)))
-        except queue.Empty:
-            return
-        except BaseException as error:
-            ready.put(error)
-
-    minders = [threading.Thread(target=mind, args=(worker,), daemon=True) for worker in processes]
+    Raises
+    ------
+    FileFormatError
+        If it cannot be made.
+    SignedHeatError
+        If there is another batch in it.
+    """
     try:
-        for minder in minders:
-            minder.start()
-        for _ in indices:
-            result = _next(ready)
-            if isinstance(result, BaseException):
-                raise result
-            yield result
-    finally:
-        for worker in processes:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        cause = f"the folder cannot be made ({error.strerror})"
+        raise FileFormatError(cause, remedy="choose another one", path=folder) from error
+    scratch = folder.absolute() / SCRATCH
+    with ExitStack() as stack:
+        if fcntl is not None:
+            number = os.open(folder, os.O_RDONLY)
+            stack.callback(os.close, number)
+            try:
+                fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                if error.errno in (errno.EWOULDBLOCK, errno.EACCES):  # and not that this file system holds nothing
+                    cause, remedy = "another batch is writing into this folder", "wait for it, or choose another folder"
+                    raise SignedHeatError(cause, remedy=remedy, path=folder) from error
+        shutil.rmtree(scratch, ignore_errors=True)
+        stack.callback(shutil.rmtree, scratch, ignore_errors=True)
+        yield scratch
+
+
+def _in_processes(
+    tasks: Sequence[Task], number: int, threads: int, time_limit: float | None
+) -> Generator[Outcome, None, None]:
+    """Outcomes as they come; of those that were short of memory once more, alone, at the end."""
+    starved = []
+    workers = [Worker(threads) for _ in range(min(number, len(tasks)))]
+    idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
+    for worker in workers:
+        idle.put(worker)
+
+    def do(task: Task) -> Done:
+        worker = idle.get()
+        try:
+            return worker.do(task, time_limit)
+        finally:
+            idle.put(worker)
+
+    pool = ThreadPoolExecutor(max(len(workers), 1))
+    try:
+        for task, future in _as_done(pool, do, tasks):
+            outcome, is_starved = future.result()
+            if is_starved and len(workers) > 1:
+                starved.append(task)
+            else:
+                yield outcome
+        for worker in workers[1:]:
             worker.stop()
-        for worker, minder in zip(processes, minders, strict=True):
-            minder.join()
+        yield from (workers[0].do(task, time_limit)[0] for task in starved)
+    finally:
+        for worker in workers:
+            worker.stop()
+        pool.shutdown(cancel_futures=True)
+        for worker in workers:
             worker.close()
 
 
-def _next(ready: queue.SimpleQueue[Any]) -> Any:
-    """The next result; waits in steps, so that a signal is heard everywhere."""
-    while True:
-        with suppress(queue.Empty):
-            return ready.get(timeout=0.5)
-
-
-def _on_cluster(address: str, tasks: Sequence[Task], threads: int, time_limit: float | None) -> Iterator[Result]:
-    """Results as they come from a Dask cluster, each task in a process beside the Dask worker that got it."""
+def _on_cluster(
+    tasks: Sequence[Task], address: str, threads: int, time_limit: float | None
+) -> Generator[Outcome, None, None]:
+    """Outcomes as they come from a Dask cluster, each task in a process beside the Dask worker that got it."""
     with connected(address) as client:
-        futures = {
-            client.submit(apart, task, threads, time_limit, pure=False, key=f"shape-{os.getpid()}-{k}"): k
-            for k, task in enumerate(tasks)
-        }
-        for future in distributed.as_completed(futures):
-            problem = future.exception()
-            if problem is None:
-                yield futures[future], *future.result()
-            elif isinstance(problem, SignedHeatError):
-                raise problem
-            else:
-                yield futures[future], "died", Answer(f"its Dask worker died ({problem})")
+        do = partial(apart, threads=threads, time_limit=time_limit)
+        for task, future in _as_done(client.get_executor(pure=False), do, tasks):
+            try:
+                yield future.result()[0]
+            except SignedHeatError:
+                raise
+            except Exception as error:
+                yield task.outcome("died", 0.0, f"its Dask worker died ({error})")
 
 
-_mine = threading.local()
-"""The process of each thread of a Dask worker."""
+def _as_done(
+    executor: Executor, do: Callable[[Task], Done], tasks: Sequence[Task]
+) -> Iterator[tuple[Task, Future[Done]]]:
+    """Tasks with what came of them, as it comes."""
+    ready: queue.SimpleQueue[Future[Done]] = queue.SimpleQueue()
+    submitted = {executor.submit(do, task): task for task in tasks}
+    for future in submitted:
+        future.add_done_callback(ready.put)
+    while submitted:
+        with suppress(queue.Empty):
+            future = ready.get(timeout=HEARING)
+            yield submitted.pop(future), future
 
 
-def apart(task: Task, threads: int, time_limit: float | None) -> tuple[State, Answer]:
-    """Do a task in a process beside this one, which stays for the next: Dask cannot stop what takes too long."""
-    if getattr(_mine, "worker", None) is None or _mine.worker.threads != threads:
-        _mine.worker = Worker(threads)
-    done: tuple[State, Answer] = _mine.worker.do(task, time_limit)
-    return done
-
-
-def _outcome(each: Input, state: State, answer: Answer, job: str) -> Outcome:
-    figures = dict(answer.figures)
-    told = figures.pop("told", [])
-    said = [answer.error] if answer.error is not None else [*(told if isinstance(told, list) else []), *answer.warnings]
-    folder = Path(each.name).parent
-    return Outcome(
-        each.name,
-        str(each.path),
-        state,
-        round(answer.seconds, 3),
-        "; ".join(map(str, said)),
-        tuple((folder / output).as_posix() for output in answer.outputs),
-        figures,
-        job,
-        source_of(each.path),
-    )
-
-
-class _Count:
-    """Counts shapes, and estimates how long the others will take."""
-
-    def __init__(self, total: int, done: int, progress: Progress | None) -> None:
-        self._total, self._before, self._done, self._failed = total, done, done, 0
-        self._progress, self._begin = progress, time.perf_counter()
-
-    def add(self, outcome: Outcome) -> None:
-        self._done += 1
-        self._failed += not outcome.is_done
-        self.tell()
-
-    def tell(self) -> None:
-        if self._progress is None:
-            return
-        text = f"{self._done} of {self._total} shapes"
-        text += f", {self._failed} not done" if self._failed else ""
-        now = self._done - self._before
-        if now and self._done < self._total:
-            left = (time.perf_counter() - self._begin) / now * (self._total - self._done)
-            text += f", about {duration(left)} left"
-        self._progress(self._done / max(self._total, 1), text)
+def _tell(progress: Progress | None, done: int, total: int, failed: int = 0, each: float = 0.0) -> None:
+    """How many shapes are done, how many are not, and how long the others will take if each takes so many seconds."""
+    if progress is None:
+        return
+    text = f"{done} of {total} shapes"
+    text += f", {failed} not done" if failed else ""
+    text += f", about {duration(each * (total - done))} left" if each and done < total else ""
+    progress(done / max(total, 1), text)
 
 
 def duration(seconds: float) -> str:
