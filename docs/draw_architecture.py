@@ -12,11 +12,11 @@ from PIL import Image
 
 FLOORS = [
     (
-        "__main__   cli   visualization   samples   public   batches   io",
+        "__main__   cli   view   samples   public   batches   io",
         "commands, pictures, many shapes, files",
         "#f3d9c1",
     ),
-    ("extensions", "sharpening, jumps, completion, morphology, tet meshing", "#f7e6d0"),
+    ("extensions curves solids", "sharpening, jumps, completion, morphology, tet meshing", "#f7e6d0"),
     ("solver   fields", "SignedHeatSolver, signed_distance; values that know their domain", "#fbf1de"),
     ("method   extrapolation   constraints", "diffuse → normalize → integrate, once, on discretisations", "#fff6c9"),
     ("lowering", "every domain and every source to its discretisation: surface, grid, tets", "#e3efd3"),
@@ -25,9 +25,7 @@ FLOORS = [
     ("operators   linear", "sparse matrices, matrix-free stencils, factorisations, Krylov", "#c9dcee"),
     ("geometry", "arrays in, arrays out: intrinsic meshes, geodesics, flips, clipping", "#bccfe8"),
     (
-        "cache compiled diagnostics errors frozen kernel_arrays kernel_cache kernel_calls "
-        "kernel_compiler kernel_entry kernel_lowering kernel_steps kernel_values memory packages "
-        "parallel progress reprs slots",
+        "cache compiled diagnostics errors frozen memory packages parallel progress reprs slots",
         "used by all",
         "#d9d9e3",
     ),

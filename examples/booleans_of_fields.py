@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (2 * np.pi / 3 * 0.75**2 * (3 - 0.75), 0.06)
 """Volume common to two unit balls 0.5 apart: two caps of height 0.75."""
@@ -21,7 +21,7 @@ def main(folder: Path) -> float:
     left, right = (sh.solid_distance(samples.sphere(4, center=(x, 0, 0)), grid) for x in (-0.25, 0.25))
     sets = {"a | b": left | right, "a & b": left & right, "a - b": left - right}
 
-    visualization.save_row(
+    view.save_row(
         folder / "booleans_of_fields.png", *((title, field, {"across": (1,)}) for title, field in sets.items())
     )
     return float(sets["a & b"].contour().to_trimesh().volume)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (8.5, 0.1)
 """Area of the letter, and what its missing corners may cost."""
@@ -28,7 +28,7 @@ def main(folder: Path) -> float:
     """Write the outlines and a picture; return the area of the sharp one."""
     sides = broken(LETTER, gap=0.3)
     sh.write_polylines(folder / "broken.svg", sides)
-    figure = visualization.new_figure(11, 6.5)
+    figure = view.new_figure(11, 6.5)
     areas, cuts = [], []
     for k, (name, diffusion) in enumerate([("sharp", 1.0), ("round", 30.0)]):
         phi = sh.signed_distance(sides, resolution=160, padding=0.8, diffusion=diffusion)
@@ -38,7 +38,7 @@ def main(folder: Path) -> float:
         areas.append(-outline.signed_area)
         cuts.append(np.linalg.norm(outline.points - LETTER[1], axis=1).min())
         axes = figure.add_subplot(1, 2, k + 1)
-        visualization.draw_plane(phi, axes, sides)
+        view.draw_plane(phi, axes, sides)
         axes.set_title(f"diffusion {diffusion:g}: cuts {cuts[-1]:.3f} off the corner")
     figure.savefig(folder / "broken_letter.png")
     assert cuts[1] > 3 * cuts[0]

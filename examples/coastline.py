@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (1.0, 0.08)
 """Distance from the coast to the middle of the island, beside the least great-circle distance."""
@@ -27,11 +27,11 @@ def main(folder: Path) -> float:
     phi = sh.curve_distance(globe, pieces)
     whole = sh.close_curves(globe, pieces)
 
-    view = direction(-50.0, 25.0)
-    visualization.save_row(
+    eye = direction(-50.0, 25.0)
+    view.save_row(
         folder / "coastline.png",
-        ("the pieces, and distance from the coast", phi, {"sources": pieces, "view": view}),
-        ("the coast, closed", phi, {"sources": whole, "view": view}),
+        ("the pieces, and distance from the coast", phi, {"sources": pieces, "view": eye}),
+        ("the coast, closed", phi, {"sources": whole, "view": eye}),
     )
     middle = direction(-60.0, 15.0)
     away = np.arccos([direction(*place) @ middle for place in coast])

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = 0.705, 0.02  # how far the roundest completion goes from the centre; the corners are at 0.849
 
@@ -36,7 +36,7 @@ def main(folder: Path) -> float:
     sides = [np.array([[0.6, -0.3, 0], [0.6, 0.3, 0]]) @ rotation(quarter).T for quarter in range(4)]
     broken = [mesh.polyline(side) for side in sides]
     fields = [sh.SignedHeatSolver(mesh, diffusion).distance(broken) for diffusion in (1, 10, 100, 1000)]
-    visualization.save_row(
+    view.save_row(
         folder / "completion_and_diffusion.png",
         *(
             (f"diffusion = {diffusion}", phi, {"sources": broken, "view": np.array([0.0, 0.0, 1.0])})

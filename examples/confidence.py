@@ -7,7 +7,7 @@ Distance knows how far the surface that is nearest was there, and how far it had
 from pathlib import Path
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (1.0, 0.01)
 """Confidence on the side where no face is missing."""
@@ -21,10 +21,10 @@ def main(folder: Path) -> float:
     phi = sh.solid_distance(shape, resolution=72)
     sure = sh.GridField(phi.grid, phi.confidence.astype(float))
 
-    figure = visualization.new_figure(12, 4.2)
+    figure = view.new_figure(12, 4.2)
     left, middle, right = (figure.add_subplot(1, 3, k + 1) for k in range(3))
-    visualization.draw_shape(shape, left, view=(15, -40))
-    visualization.draw_slices(phi, [middle], shape, across=(1,))
+    view.draw_shape(shape, left, view=(15, -40))
+    view.draw_slices(phi, [middle], shape, across=(1,))
     node = phi.grid.shape[1] // 2
     picture = right.pcolormesh(
         phi.grid.axes[0], phi.grid.axes[2], sure.values[:, node].T, cmap="cividis", vmin=0, vmax=1

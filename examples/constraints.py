@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.0, 0.05)
 """Mean of φ on the outer circle, where it is to be zero."""
@@ -23,11 +23,11 @@ def main(folder: Path) -> float:
     arcs = [sh.Polyline(radius * ring[a : a + 9]) for radius in (1.0, 1.6) for a in range(0, 96, 12)]
     solver = sh.SignedHeatSolver(sh.Grid((-2.2, -2.2), 0.04, (111, 111)))
 
-    figure = visualization.new_figure(13.5, 4.2)
+    figure = view.new_figure(13.5, 4.2)
     for k, constraint in enumerate((sh.Free(), sh.ZeroSet(), sh.EachComponent())):
         phi = solver.distance(arcs, constraint)
         axes = figure.add_subplot(1, 3, k + 1)
-        visualization.draw_plane(phi, axes, arcs)
+        view.draw_plane(phi, axes, arcs)
         axes.set_title(type(constraint).__name__)
     figure.savefig(folder / "constraints.png")
     zero = solver.distance(arcs, sh.ZeroSet())

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.5 * np.pi, 0.08)
 """Distance from the equators to the top of the torus, a quarter of the way round a tube of radius 1."""
@@ -44,7 +44,7 @@ def main(folder: Path) -> float:
 
     phi = sh.SignedHeatSolver(mesh, diffusion=4).distance(dashes, sh.Free())
 
-    visualization.save_surface(phi, folder / "curve_across_polygons.png", dashes)
+    view.save_surface(phi, folder / "curve_across_polygons.png", dashes)
     return float(phi.values[np.isclose(mesh.vertices[:, 2], 1.0)].mean())
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.15, 0.051)
 """Mean distance of the longest line from the seam: 0.1 or 0.2."""
@@ -32,7 +32,7 @@ def main(folder: Path) -> float:
     stitches = [curve for level in (-0.2, -0.1, 0.1, 0.2) for curve in phi.contour(level)]
     sh.write_curves(folder / "stitches.obj", stitches, part)
 
-    visualization.save_row(
+    view.save_row(
         folder / "curve_design.png",
         ("strokes, and distance", phi, {"sources": strokes, "view": np.array([0.3, -0.5, 1.0])}),
         ("lines at ±0.1 and ±0.2", phi, {"sources": stitches, "view": np.array([0.3, -0.5, 1.0])}),

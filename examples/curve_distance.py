@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (0.0, 0.002)
 """Root mean square error of `curve_distance`, over the range of distance."""
@@ -31,11 +31,11 @@ def main(folder: Path) -> float:
     truth = sh.curve_distance(ball, whole).values
     errors = [float(np.sqrt(np.mean((field.values - truth) ** 2)) / np.ptp(truth)) for field in fields]
 
-    view = {"sources": pieces, "view": np.array([1.0, -1.0, 0.8])}
-    visualization.save_row(
+    look = {"sources": pieces, "view": np.array([1.0, -1.0, 0.8])}
+    view.save_row(
         folder / "curve_distance.png",
-        (f"the method alone: error {100 * errors[0]:.2f} %", fields[0], view),
-        (f"curve_distance: error {100 * errors[1]:.2f} %", fields[1], view),
+        (f"the method alone: error {100 * errors[0]:.2f} %", fields[0], look),
+        (f"curve_distance: error {100 * errors[1]:.2f} %", fields[1], look),
     )
     return errors[1]
 

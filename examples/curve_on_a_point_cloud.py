@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.5 * np.pi - np.arcsin(0.4), 0.03)
 """Distance from the circle at height 0.4 to the north pole."""
@@ -31,7 +31,7 @@ def main(folder: Path) -> float:
 
     phi = sh.SignedHeatSolver(cloud).distance(curves, sh.Free())
 
-    visualization.save_surface(phi, folder / "curve_on_a_point_cloud.png", curves)
+    view.save_surface(phi, folder / "curve_on_a_point_cloud.png", curves)
     return float(phi.values[np.argmax(points[:, 2])])
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (0.0, 0.002)
 """Largest error of a distance to the unit sphere whose faces are flat by at most 0.001."""
@@ -25,7 +25,7 @@ def main(folder: Path) -> float:
     grid = sh.Grid((-1.2, -1.2), 0.02, (121, 121))
     exact = sh.GridField(grid, np.linalg.norm(grid.points, axis=-1) - 1)
     thin = found.points[np.abs(found.points[:, 1]) < 0.1][:, [0, 2]]
-    visualization.save_row(
+    view.save_row(
         folder / "deepsdf_set.png",
         ("the shape", ball),
         ("samples in a slice", exact, {"shape": sh.PointCloud(thin)}),

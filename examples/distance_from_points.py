@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (np.pi / 2, 0.03)
 """Distance from the poles to the equator."""
@@ -24,7 +24,7 @@ def main(folder: Path) -> float:
     part = samples.torus(1.0, 0.45)
     source = part.points_at([200, 2500])
     on_part = sh.sharpen(sh.signed_distance(source, part))
-    visualization.save_row(
+    view.save_row(
         folder / "distance_from_points.png",
         ("from both poles", phi, {"sources": [poles]}),
         ("from two points of a torus", on_part, {"sources": [source], "view": np.array([0.4, -0.6, 0.9])}),

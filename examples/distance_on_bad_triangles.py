@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.0, 3e-3)
 """Root mean square error as a fraction of the range of φ; on the mesh itself it is about 0.15."""
@@ -26,7 +26,7 @@ def main(folder: Path) -> float:
     grid = sh.Grid((-1.0, -1.0), 0.01, (201, 201))
     points = np.concatenate([grid.points.reshape(-1, 2), np.zeros((grid.n_nodes, 1))], axis=1)
     shown = [sh.GridField(grid, field(points).reshape(grid.shape)) for field in (plain, robust)]
-    visualization.save_row(
+    view.save_row(
         folder / "distance_on_bad_triangles.png",
         (f"{mesh.n_faces} bad triangles: error {100 * error(plain):.0f} %", shown[0]),
         (f"{better.n_faces} intrinsic ones: {100 * error(robust.restrict()):.2f} %", shown[1]),

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (1.5, 0.03)
 """Mean radius of the offset of 0.5 of a broken unit sphere."""
@@ -23,7 +23,7 @@ def main(folder: Path) -> float:
     offset = phi.offset(0.5)
 
     cut = sh.TetMesh(mesh.vertices, mesh.tets[mesh.tet_barycenters[:, 1] > 0])
-    visualization.save_row(
+    view.save_row(
         folder / "distance_on_tets.png",
         ("half of the tets", cut, {"view": (20, -70)}),
         ("signed distance", phi),

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.0, 0.01)
 """Error at the pole with corrected normals, as a part of the distance."""
@@ -32,7 +32,7 @@ def main(folder: Path) -> float:
 
         errors.append(float(phi.values[np.argmax(along)] / (np.pi / 2 - np.arcsin(0.3)) - 1))
         if radius is None:
-            visualization.save_surface(phi, folder / "distance_on_voxels.png", circle)
+            view.save_surface(phi, folder / "distance_on_voxels.png", circle)
     print(f"error with corrected normals {errors[0]:+.2%}, without {errors[1]:+.2%}")
     return errors[0]
 

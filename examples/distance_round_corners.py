@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = 3.297, 0.08  # from the sphere over the edge of the baffle to the far corner: the exact length
 CENTER, RADIUS = np.array([0.5, 0.5, 0.5]), 0.3
@@ -39,9 +39,9 @@ def main(folder: Path) -> float:
     x, y = np.moveaxis(plane.points, -1, 0)
     middle = np.stack([x, y, 0.5 + 0 * x], axis=-1).reshape(-1, 3)
     values = np.where((np.abs(x - 1.5) < 0.1) & (y < 1.5), np.nan, phi(middle).reshape(x.shape))
-    figure = visualization.new_figure(9.0, 5.0)
+    figure = view.new_figure(9.0, 5.0)
     axes = figure.add_subplot()
-    visualization.draw_plane(sh.GridField(plane, values), axes)
+    view.draw_plane(sh.GridField(plane, values), axes)
     axes.set_title("round a baffle, from a sphere without a third of its faces")
     figure.savefig(folder / "distance_round_corners.png")
     return float(phi([[3.0, 0.0, 0.5]])[0])

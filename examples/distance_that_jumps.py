@@ -15,7 +15,7 @@ import numpy as np
 import signedheat as sh
 from signedheat.diagnostics import Jumps
 from signedheat.samples import sphere, torus
-from signedheat.visualization import draw_surface
+from signedheat.view import draw_surface
 
 EXPECTED = 2 * np.pi * 0.4, 0.08  # length of the first cut: once across the tube, whose radius is 0.4
 

@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (25.4 * 1.1, 0.1)
 """Mean radius of the offset by 2.54 millimetres of a ball whose radius is one inch."""
@@ -24,8 +24,7 @@ def main(folder: Path) -> float:
     sdf = sh.solid_distance(ball, resolution=36)
     sh.save(sdf.offset(2.54), folder / "grown.stl")
     sh.write_vdb(sdf, folder / "ball.vdb")
-    visualization.save_page(sdf, folder / "ball.html")
-    visualization.save_scene(ball, folder / "ball.png")
+    view.save_scene(ball, folder / "ball.png")
 
     image = np.full((60, 80), 255, dtype=np.uint8)
     image[15:45, 30:34] = image[:10, 60:64] = 0
@@ -44,7 +43,7 @@ def main(folder: Path) -> float:
     labels[np.linalg.norm(np.indices(labels.shape) - 20.0, axis=0) < 15] = 3
     np.save(folder / "labels.npy", labels)
     organ = sh.read_labels(folder / "labels.npy")
-    visualization.save_row(
+    view.save_row(
         folder / "files_in_and_out.png",
         ("ball.ply, in millimetres", sdf, {"across": (1,), "levels": [2.54]}),
         ("walls.png", round_walls, {"shape": line}),

@@ -2,8 +2,8 @@
 =============================
 
 Fine nodes are needed near the surface only. A band has the fine spacing up to a distance on both sides, and a coarse
-grid beyond: the same surface from a tenth of the nodes, and from a hundredth where grids are finer. Where even a
-:class:`signedheat.BandField` is too much for the memory, :func:`signedheat.tiled_distance` makes it in tiles on disk.
+grid beyond: the same surface from a tenth of the nodes, and from a hundredth where grids are finer. Where even
+that is too much for the memory, ``Solid.field`` keeps it on disk (``store=``).
 """
 
 from pathlib import Path
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (0.0, 0.15)
 """Largest distance of the completed surface from the whole torus, over the radius of its tube."""
@@ -27,7 +27,7 @@ def main(folder: Path) -> float:
     slice_grid = sh.Grid((-1.7, -1.7), 0.01, (341, 341))
     x, y = np.moveaxis(slice_grid.points, -1, 0)
     values = band(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)).reshape(x.shape)
-    visualization.save_row(
+    view.save_row(
         folder / "fine_band.png",
         ("in: three holes", broken),
         ("fine to the thin lines, coarse beyond", sh.GridField(slice_grid, values), {"levels": [-0.12, 0.12]}),

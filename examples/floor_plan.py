@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 PLAN = """
 XXXXXXXXXXXXXXXXXXXXXXXXX
@@ -42,7 +42,7 @@ def main(folder: Path) -> float:
     phi = sh.signed_distance(north, grid)
 
     phi.save(folder / "floor_plan.npz")
-    visualization.save_slices(phi, folder / "floor_plan.png", north)
+    view.save_slices(phi, folder / "floor_plan.png", north)
     return float(phi([[9.5, 1.5]])[0])
 
 

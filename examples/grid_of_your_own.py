@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (0.3, 0.02)
 """Distance at a point 0.3 outside the sphere."""
@@ -24,7 +24,7 @@ def main(folder: Path) -> float:
     sdf.save(folder / "distance.nrrd")
 
     again = sh.load_field(folder / "distance.nrrd")
-    visualization.save_slices(again, folder / "grid_of_your_own.png", sphere)
+    view.save_slices(again, folder / "grid_of_your_own.png", sphere)
     return float(again([1.3 * np.array([0.6, 0.48, 0.64])])[0])
 
 

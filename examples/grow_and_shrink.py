@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (-0.1, 0.01)
 """Mean distance of the eroded surface from the duck."""
@@ -29,7 +29,7 @@ def main(folder: Path) -> float:
     for title, surface in changed.items():
         sh.save(surface, folder / f"{title.split()[0]}.stl")
         assert surface.to_trimesh().is_watertight
-    visualization.save_row(folder / "grow_and_shrink.png", ("in: three holes", duck), *changed.items())
+    view.save_row(folder / "grow_and_shrink.png", ("in: three holes", duck), *changed.items())
     return float(np.mean(sh.solid_distance(duck, grid)(changed["eroded by 0.1"].vertices)))
 
 

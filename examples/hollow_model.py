@@ -7,7 +7,7 @@ A whole application: a duck with holes in its scan becomes a duck of even wall, 
 from pathlib import Path
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (1.0, 0.08)
 """Volume of the wall beside area times thickness."""
@@ -20,7 +20,7 @@ def main(folder: Path) -> float:
     wall.save(folder / "hollow.stl")
 
     grid = sh.Grid.around(wall.bounds, resolution=80, padding=0.15)
-    visualization.save_row(
+    view.save_row(
         folder / "hollow_model.png",
         ("in: holes", scan),
         ("out: distance to the wall", sh.solid_distance(wall, grid), {"across": (1,)}),

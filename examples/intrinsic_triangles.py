@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (20.0, 11.0)
 """Smallest angle of the new triangles, in degrees."""
@@ -26,7 +26,7 @@ def main(folder: Path) -> float:
     better = sh.intrinsic_delaunay(mesh, refine=True)
     pieces, interpolate = sh.common_subdivision(better)
 
-    figure = visualization.new_figure(11, 5.5)
+    figure = view.new_figure(11, 5.5)
     for k, (title, shown) in enumerate([("faces of the part", mesh), ("cut by the intrinsic triangles", pieces)]):
         axes = figure.add_subplot(1, 2, k + 1, projection="3d")
         polygons = shown.faces if k == 0 else shown.polygons

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (1.0, 0.0)
 """Share of the voxels that come back as they were."""
@@ -27,7 +27,7 @@ def main(folder: Path) -> float:
     phi = sh.solid_distance(voxels.squares, grid)
     grown = sh.DigitalSurface(phi.values < 1.0, spacing=spacing)
 
-    visualization.save_row(
+    view.save_row(
         folder / "mask_and_back.png",
         ("in: a mask, slices of 1.6 mm", voxels, {"view": (25, -50)}),
         ("distance in the same space", phi, {"shape": voxels.squares, "across": (2,), "levels": [1.0]}),

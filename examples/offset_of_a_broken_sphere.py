@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (1.2, 0.01)
 """Mean radius of the offset surface, and how far from it the noise may lead."""
@@ -24,7 +24,7 @@ def main(folder: Path) -> float:
     surface = sdf.offset(0.2)
 
     surface.save(folder / "offset.stl")
-    visualization.save_slices(sdf, folder / "offset_of_a_broken_sphere.png", broken, levels=[0.2])
+    view.save_slices(sdf, folder / "offset_of_a_broken_sphere.png", broken, levels=[0.2])
     return float(np.linalg.norm(surface.vertices, axis=1).mean())
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (1.0, 0.0)
 """Share of the nodes with positive distance."""
@@ -34,7 +34,7 @@ def main(folder: Path) -> float:
     )
     phi = sh.solid_distance(table, resolution=72, padding=0.4)
 
-    visualization.save_row(
+    view.save_row(
         folder / "open_sheets.png",
         ("in: boards without thickness", table, {"view": (20, -60)}),
         ("distance: outside on both sides", phi, {"shape": table, "across": (1,), "levels": [0.12]}),

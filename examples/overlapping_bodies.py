@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (-np.sqrt(0.75), 0.02)
 """Distance from the middle between two unit balls 1 apart to the circle where they meet."""
@@ -19,13 +19,14 @@ def main(folder: Path) -> float:
     """Write a picture; return the distance in the middle."""
     shape = samples.union(samples.sphere(4, center=(-0.5, 0, 0)), samples.sphere(4, center=(0.5, 0, 0)))
     grid = sh.Grid.around(shape.bounds, 64)
-    given, united = sh.sharpen(sh.signed_distance(shape, grid)), sh.solid_distance(shape, grid)
+    solid = sh.complete(shape)
+    given, united = sh.sharpen(sh.signed_distance(shape, grid)), solid.field(grid=grid)
 
-    visualization.save_row(
+    view.save_row(
         folder / "overlapping_bodies.png",
         ("two balls, one mesh", shape),
         ("as they were given", given, {"shape": shape, "across": (1,)}),
-        ("solid_distance, and what sh.unite leaves", united, {"shape": sh.unite(shape), "across": (1,)}),
+        ("the solid, and the faces that bound it", united, {"shape": solid.faces, "across": (1,)}),
     )
     return float(united([0.0, 0.0, 0.0]))
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (2 * np.pi**2 * 0.4**2, 0.12)
 """Volume of the torus."""
@@ -21,7 +21,7 @@ def main(folder: Path) -> float:
     phi = sh.solid_distance(cloud, resolution=72)
     surface = phi.contour()
 
-    visualization.save_row(
+    view.save_row(
         folder / "points_without_normals.png",
         ("in: 8000 points", cloud, {"view": (40, -58)}),
         ("signed distance", phi, {"shape": cloud, "across": (2,)}),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (2 * np.pi * 0.12 - np.pi * 0.2**2 * 0.12, 0.06)
 """Volume: half of the sphere times the wall, less the hole."""
@@ -30,7 +30,7 @@ def main(folder: Path) -> float:
     part = drained.contour()
     part.save(folder / "bowl.stl")
 
-    visualization.save_row(
+    view.save_row(
         folder / "print_shell.png",
         ("in: an open sheet", bowl, {"view": (35, -58)}),
         ("its wall, with a drain hole", drained, {"shape": bowl, "across": (1,)}),

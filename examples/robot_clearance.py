@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 RADIUS = 0.25
 EXPECTED = (0.0, 0.01)
@@ -41,7 +41,7 @@ def main(folder: Path) -> float:
     flat = sh.Grid(phi.grid.origin[:2], phi.grid.spacing[:2], phi.grid.shape[:2])
     points = np.insert(flat.points.reshape(-1, 2), 2, 0.0, axis=1)
     plane = sh.GridField(flat, phi(points).reshape(flat.shape))
-    visualization.save_row(
+    view.save_row(
         folder / "robot_clearance.png",
         ("the scan", scan, {"view": (60, -70)}),
         (f"before: clearance {phi(start).min():.2f}", plane, {"shape": sh.Polyline(start[:, :2]), "levels": [RADIUS]}),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (1.0, 0.02)
 """Area after opening, beside that of the plate without its thin pin and its corners."""
@@ -38,10 +38,10 @@ def main(folder: Path) -> float:
     phi = sh.sharpen(sh.signed_distance(plate, grid))
     opened, closed = sh.opening(plate, 0.15, grid), sh.closing(plate, 0.15, grid)
 
-    figure = visualization.new_figure(13.5, 3.4)
+    figure = view.new_figure(13.5, 3.4)
     for k, (title, lines) in enumerate([("a plate", plate), ("opened by 0.15", opened), ("closed by 0.15", closed)]):
         axes = figure.add_subplot(1, 3, k + 1)
-        visualization.draw_plane(phi, axes, lines)
+        view.draw_plane(phi, axes, lines)
         axes.set_title(title)
     figure.savefig(folder / "rounding_a_drawing.png")
     cut_off = (1 - np.pi / 4) * 0.15**2

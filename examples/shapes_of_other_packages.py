@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.0, 1e-12)
 """Largest difference of the distances to one shape in several forms."""
@@ -26,7 +26,7 @@ def main(folder: Path) -> float:
     }
     fields = {name: sh.solid_distance(form, resolution=48) for name, form in forms.items()}
 
-    visualization.save_row(
+    view.save_row(
         folder / "shapes_of_other_packages.png",
         ("a trimesh.Trimesh", sh.as_shape(part)),
         *((f"from {name}", field, {"across": (1,)}) for name, field in list(fields.items())[:2]),

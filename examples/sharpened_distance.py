@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.path import Path as Outline
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = 0.0, 0.05  # per cent of the range: root mean square of the sharpened error
 
@@ -41,12 +41,12 @@ def main(folder: Path) -> float:
     exact = star_distance(mesh.vertices[:, :2])
     plain = sh.SignedHeatSolver(mesh, diffusion=100).distance(mesh.level_set(exact, 0.0))
     cases = {"heat, t = 100 h²": plain, "convex": sh.sharpen(plain, method=sh.Convex()), "geodesic": sh.sharpen(plain)}
-    view, panels = {"view": np.array([0.0, 0.0, 1.0])}, []
+    look, panels = {"view": np.array([0.0, 0.0, 1.0])}, []
     for title, phi in cases.items():
         error = 100 * np.sqrt(np.mean((phi.values - exact) ** 2)) / np.ptp(exact)
         print(f"{title}: {error:.3f} % of the range")
-        panels.append((f"{title}: error {error:.3f} %", phi, view))
-    visualization.save_row(folder / "sharpened_distance.png", *panels)
+        panels.append((f"{title}: error {error:.3f} %", phi, look))
+    view.save_row(folder / "sharpened_distance.png", *panels)
     return float(error)
 
 

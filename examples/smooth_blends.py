@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (0.125, 0.01)
 """How far the blend of width 0.5 goes beyond the sharp edge: a quarter of the width, over the gradient there."""
@@ -27,7 +27,7 @@ def main(folder: Path) -> float:
         "common part, width 0.2": sh.smooth_intersection(ball, ring, 0.2),
         "difference, width 0.2": sh.smooth_difference(ball, ring, 0.2),
     }
-    visualization.save_row(
+    view.save_row(
         folder / "smooth_blends.png",
         *((title, field.contour(), {"view": (30, -60)}) for title, field in shown.items()),
     )

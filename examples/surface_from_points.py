@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (2 * np.pi**2 * 1.0 * 0.4**2, 0.06)
 """Volume of the torus, and how far from it 1500 points leave us."""
@@ -24,7 +24,7 @@ def main(folder: Path) -> float:
     surface = sdf.contour(0.0)
 
     surface.save(folder / "surface.ply")
-    visualization.save_slices(sdf, folder / "surface_from_points.png", points)
+    view.save_slices(sdf, folder / "surface_from_points.png", points)
     corners = surface.vertices[surface.faces]
     return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (2.5, 0.35)
 """Height halfway between the lines of 2 and 3."""
@@ -26,9 +26,9 @@ def main(folder: Path) -> float:
     grid = sh.Grid((-5, -4.2), 0.1, (101, 85))
     phi = sh.SignedHeatSolver(grid).distance(lines, sh.LevelValues(heights))
 
-    figure = visualization.new_figure(8.0, 5.6)
+    figure = view.new_figure(8.0, 5.6)
     axes = figure.add_subplot()
-    visualization.draw_plane(phi, axes, lines)
+    view.draw_plane(phi, axes, lines)
     axes.set_title("lines of height 1, 2, 3, 4, and heights between them")
     figure.savefig(folder / "terrain_from_contours.png")
     return float(phi([[2.5, 0.0]])[0])

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.0, 0.004)
 """Largest distance of a vertex of the offset from where it should be."""
@@ -25,7 +25,7 @@ def main(folder: Path) -> float:
 
     away = np.abs(offset.vertices) - half
     exact = np.linalg.norm(np.maximum(away, 0), axis=1) + np.minimum(away.max(axis=1), 0)
-    visualization.save_row(
+    view.save_row(
         folder / "thin_plates.png",
         ("a plate, 0.02 thick", sh.as_shape(plate)),
         ("distance at nodes 0.08 apart", phi, {"shape": sh.as_shape(plate), "across": (1,), "levels": [0.2]}),

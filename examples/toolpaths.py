@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.12, 0.02)
 """Least distance of the first path from the drawing."""
@@ -29,10 +29,10 @@ def main(folder: Path) -> float:
     paths = [line for level in levels for line in phi.contour(level)]
     sh.write_polylines(folder / "paths.svg", paths)
 
-    figure = visualization.new_figure(11.5, 4.2)
+    figure = view.new_figure(11.5, 4.2)
     for k, (title, lines) in enumerate([("the drawing, with gaps", drawing), (f"{len(paths)} paths", paths)]):
         axes = figure.add_subplot(1, 2, k + 1)
-        visualization.draw_plane(phi, axes, lines)
+        view.draw_plane(phi, axes, lines)
         axes.set_title(title)
     figure.savefig(folder / "toolpaths.png")
     first = max(phi.contour(levels[0]), key=lambda line: line.length).points

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (0.0, 0.005)
 """Largest error of the distance to the unit sphere, whose faces are flat by at most 0.001."""
@@ -22,7 +22,7 @@ def main(folder: Path) -> float:
     plain, mended = sh.sharpen(sh.signed_distance(shape, grid)), sh.solid_distance(shape, grid)
     turned = sh.orientation(shape).turned_faces
 
-    visualization.save_row(
+    view.save_row(
         folder / "turned_faces.png",
         ("half of the faces turned (red)", shape),
         (f"sh.orient: {turned} turned back", sh.orient(shape)),

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (0.0, 0.03)
 """Root mean square difference from the distance to the whole curve."""
@@ -30,11 +30,11 @@ def main(folder: Path) -> float:
     given = sh.signed_distance(drawn, mesh)
     agreeing = sh.curve_distance(mesh, sh.orient(drawn, mesh), as_oriented=True)
 
-    view = np.array([0.5, -0.6, 0.6])
-    visualization.save_row(
+    eye = np.array([0.5, -0.6, 0.6])
+    view.save_row(
         folder / "turned_pieces.png",
-        ("every third piece turned", given, {"sources": drawn, "view": view}),
-        (f"{found.turned.sum()} turned back", agreeing, {"sources": found.curves, "view": view}),
+        ("every third piece turned", given, {"sources": drawn, "view": eye}),
+        (f"{found.turned.sum()} turned back", agreeing, {"sources": found.curves, "view": eye}),
     )
     whole = sh.curve_distance(mesh, mesh.polyline(wave[:-1], closed=True)).values
     return float(np.sqrt(np.mean((agreeing.values - whole) ** 2)))

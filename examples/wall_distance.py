@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import signedheat as sh
-from signedheat import visualization
+from signedheat import view
 
 EXPECTED = (0.5, 0.01)
 """Largest distance from a wall in the free channel of width 1."""
@@ -28,13 +28,13 @@ def main(folder: Path) -> float:
     inlet = sh.Polyline([[0.05, 1.1], [0.05, 0.1]])
     from_inlet = sh.signed_distance(inlet, sh.Grid(grid.origin, grid.spacing, grid.shape, mask=solid), diffusion=1.0)
 
-    figure = visualization.new_figure(9.0, 7.0)
+    figure = view.new_figure(9.0, 7.0)
     free = sh.GridField(grid, np.where(solid, np.nan, np.abs(to_walls.values)))
     for k, (title, field) in enumerate(
         [("to the nearest wall", free), ("from the inlet, round the blocks", from_inlet)]
     ):
         axes = figure.add_subplot(2, 1, k + 1)
-        visualization.draw_plane(field, axes, inlet if k else None)
+        view.draw_plane(field, axes, inlet if k else None)
         axes.set_title(title)
     figure.savefig(folder / "wall_distance.png")
     return float(np.nanmax(free.values[x < 0.6]))

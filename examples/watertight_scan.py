@@ -7,7 +7,7 @@ A whole application: a scan with holes, noise and turned faces becomes a closed 
 from pathlib import Path
 
 import signedheat as sh
-from signedheat import samples, visualization
+from signedheat import samples, view
 
 EXPECTED = (1.0, 0.06)
 """Its volume beside that of the part before it was damaged."""
@@ -24,7 +24,7 @@ def main(folder: Path) -> float:
     closed.save(folder / "part.stl")
     confidence = sh.GridField(phi.grid, phi.values.clip(max=0.3))
 
-    visualization.save_row(
+    view.save_row(
         folder / "watertight_scan.png",
         ("in: holes, noise, turned faces", scan, {"view": (40, -58)}),
         ("signed distance", confidence, {"shape": scan, "across": (2,)}),
