@@ -20,7 +20,7 @@ from scipy.sparse import linalg
 import signedheat as sh
 from benchmarks.reproduction.baselines import cotan_laplacian, error
 from benchmarks.reproduction.shapes import mean_edge, organic, subdivided
-from signedheat.io.interop import to_pyvista
+from signedheat.domains.foreign import to_pyvista
 
 Array = np.ndarray
 Way = Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]

@@ -1,4 +1,4 @@
-"""What this library and others can do, tried out: `python benchmarks/features.py` writes docs/features.md.
+"""What this library and others can do, tried out: `python benchmarks/features.py` writes its table in docs/evidence.md.
 
 Every cell of the table is a run: a task, done with the calls that a package's documentation names for it, and judged
 against the same truth. The truth in space is libigl's exact distance to the whole part; on the sphere it is arc length.
@@ -23,7 +23,9 @@ from peers import calls, cases
 import signedheat as sh
 from signedheat import samples
 
-PAGE = Path(__file__).parent.parent / "docs" / "features.md"
+PAGE = Path(__file__).parent.parent / "docs" / "evidence.md"
+BEGIN, END = "<!-- features.py -->", "<!-- end -->"
+"""What stands before and after the table."""
 PACKAGES = ["signedheat", "potpourri3d", "libigl", "meshlib", "trimesh", "pyvista", "gpytoolbox"]
 OFFSET = 0.1
 
@@ -184,6 +186,7 @@ def cell(package: str, name: str, arguments: Callable[[], tuple], judge: Callabl
 
 
 def page(lines: list[str]) -> str:
+    """The page with this table in place of the old one."""
     found = [f"signedheat {sh.__version__}"]
     for name in PACKAGES[1:]:
         try:
@@ -191,36 +194,9 @@ def page(lines: list[str]) -> str:
         except PackageNotFoundError:
             found.append(f"{name} (not installed)")
     head = "| | " + " | ".join(found) + " |"
-    return f"{ABOUT}\n{head}\n|---|{'---|' * len(PACKAGES)}\n" + "\n".join(lines) + "\n" + REST
-
-
-ABOUT = """# Beside other packages
-
-Which package does what? Every cell is a run by `python benchmarks/features.py`: the task, done with the calls that the
-package documents for it (all of them are in `benchmarks/peers/calls.py`). Numbers are errors, and 0 is exact. A dash:
-the package has no call for the task, and we did not build one from its parts. In space the shape is a machined part of
-about 10,000 faces; errors of distance are root mean squares over 3,000 points, in per cent of its range. Offsets are by
-0.1; their error is how far they are from that level, in per cent of the part's diagonal, and "open" means not
-watertight. On surfaces the curve is a parallel of a sphere.
-"""
-
-REST = """
-What the numbers do not show:
-
-* **Exact distance to whole meshes** is what libigl, MeshLib and gpytoolbox do, faster than this library, which computes
-  a grid first. If your meshes are closed and oriented, take one of them.
-* **Three quarters missing**: the signs of PyVista and of libigl's offset are those of the nearest face, right where
-  faces are dense and all face the same way, as here; the winding numbers of the others fall with what is left.
-* **Booleans of closed meshes** are exact with manifold3d (which trimesh calls) and MeshLib. Ours are those of fields on
-  a grid: they round edges by part of a cell, and take broken meshes.
-* **Mesh processing at large** (decimation, remeshing, registration, parametrisation) is in libigl, MeshLib, PyVista and
-  gpytoolbox, and not here.
-* **potpourri3d** is the code of the method's authors on surfaces: the same method, without sharpening, and without
-  curves that bound nothing, voxels, tets and volumes. Volumes have a program of their own, signedheat3d, for which
-  there is no wheel.
-* **Only here**, of these packages: distance to broken outlines in the plane; curves on surfaces completed; distance
-  that jumps where a curve bounds no region; distance round walls in grids; confidence in what was completed.
-"""
+    table = f"{head}\n|---|{'---|' * len(PACKAGES)}\n" + "\n".join(lines)
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    return f"{before}{BEGIN}\n{table}\n{END}{rest.partition(END)[2]}"
 
 
 if __name__ == "__main__":

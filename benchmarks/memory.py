@@ -1,6 +1,6 @@
 """Peak memory of a first distance, in a process of its own, beside its estimate.
 
-``python benchmarks/memory.py`` prints the table of docs/reliability.md, ``… KIND`` the rows that begin so, and
+``python benchmarks/memory.py`` prints the table of docs/evidence.md, ``… KIND`` the rows that begin so, and
 ``… KIND SIZE`` measures one of them, here.
 """
 
@@ -18,15 +18,9 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.extensions.band_memory import memory_of_band
-from signedheat.extensions.band_plan import plan_band
-from signedheat.extensions.bands import joined_band
 from signedheat.extensions.joining import Shape
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
 from signedheat.extensions.sampling import BYTES_PER_SAMPLE
-from signedheat.extensions.solid_distance import coarse_distance
-from signedheat.extensions.solid_memory import bytes_of_faces, bytes_per_node, most_memory
-from signedheat.extensions.steps import Steps
 from signedheat.geometry.surfels import count_surfels
 from signedheat.lowering.grid.discretization import bytes_of_area
 from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate
@@ -37,6 +31,9 @@ from signedheat.lowering.surface.point_clouds import BYTES_PER_POINT, NEIGHBORS
 from signedheat.lowering.surface.polygons import LIGHTER
 from signedheat.lowering.tets.discretization import memory_estimate as tet_estimate
 from signedheat.memory import libraries
+from signedheat.operators.grid.blocks import NODES
+from signedheat.solids.complete import bytes_to_complete, complete
+from signedheat.solids.fields import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_NODE, blocks_near
 
 SIZES = {
     "triangles": (70, 140, 280),
@@ -139,26 +136,21 @@ def phi_alone(balls: int, size: int) -> tuple[Callable[[], object], float]:
 def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable[[], object], float]:
     """A solid in a grid of this resolution."""
     made = shape()
-    steps = Steps(True, True, True, sh.ZeroSet(), 1.0)
     grid = sh.Grid.around(made.bounds, size)
-    per_node, beside, area = bytes_per_node(made, steps, True), bytes_of_faces(made), 0.0
-    if not closed:
-        per_node, beside, area = most_memory(made, steps)
-    surface = bytes_of_area(area, grid.spacing, grid.n_nodes)
-    estimate = grid_estimate(grid, per_node, beside) + surface - libraries()
+    count = made.n_points if isinstance(made, sh.PointCloud) else made.triangulation.n_faces
+    estimate = max(grid_estimate(grid, BYTES_PER_NODE, BYTES_AT_WORK) - libraries(), bytes_to_complete(made, count))
     return lambda: sh.solid_distance(made, grid), estimate
 
 
 def band(closed: bool, size: int) -> tuple[Callable[[], object], float]:
-    """A band four nodes wide to either side, from a coarse field that is there."""
+    """A band four nodes wide to either side, from a solid that is there."""
     ball = samples.sphere(5)
-    made = ball if closed else samples.without_patches(ball, 4, 0.1)
+    made = complete(ball if closed else samples.without_patches(ball, 4, 0.1))
     grid = sh.Grid.around(made.bounds, size)
-    steps = Steps(True, True, True, sh.ZeroSet(), 1.0)
-    coarse = coarse_distance(made, grid, steps, None)
     width = 4 * float(grid.spacing.max())
-    estimate = sum(memory_of_band(plan_band(coarse, grid, width)))
-    return lambda: joined_band(coarse, grid, width, None), estimate
+    places = blocks_near(made.tree, grid, width + float(np.linalg.norm(grid.spacing)), 2**40)
+    assert places is not None
+    return lambda: made.field(grid=grid, band=width), NODES * BYTES_IN_BAND * len(places) + BYTES_AT_WORK
 
 
 def sampled(size: int) -> tuple[Callable[[], object], float]:

@@ -1,4 +1,4 @@
-"""One page with every comparison, as its command printed it: `python benchmarks/report.py` writes docs/benchmarks.md.
+"""Every comparison, as its command printed it: `python benchmarks/report.py` writes benchmarks/results.md.
 
     python benchmarks/report.py [NAME …]     (some comparisons only; the others keep what their last run printed)
 
@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
-KEPT = HERE.parent / "docs" / "benchmarks.json"
-PAGE = HERE.parent / "docs" / "benchmarks.md"
+KEPT = HERE / "results.json"
+PAGE = HERE / "results.md"
 PEERS = ["potpourri3d", "libigl", "meshlib", "pygeodesic", "trimesh", "numpy", "scipy", "numba", "mkl"]
 
 
@@ -81,7 +81,7 @@ COMPARISONS = {
         "Broken curves on surfaces",
         ("broken_curves.py", "--seeds", "3"),
         """Distance to what is left of a curve against distance to the whole: five meshes, three seeds ([ten seeds
-        each](extensions.md)). In brackets, how often a program failed.""",
+        each](../docs/extensions.md)). In brackets, how often a program failed.""",
     ),
     "polygons": Comparison(
         "Polygons, points, voxels",
@@ -123,7 +123,7 @@ than seconds, and one of less than 1.3 means little. Libraries are loaded and ke
 **Peers.** libigl, MeshLib and potpourri3d (`pip install libigl meshlib potpourri3d`). signedheat3d, the authors'
 program for volumes, has no wheel, and its source distribution downloads other libraries while it is built, which was
 not possible here: `python benchmarks/grid.py --peers` runs it where it is installed. What more packages can do at all
-is on [a page of its own](features.md)."""
+is in [evidence](../docs/evidence.md)."""
 
 
 def main(names: list[str]) -> int:

@@ -57,7 +57,7 @@ def our_curve(share: float) -> np.ndarray:
 
 
 OURS = {
-    "distance at points": lambda shape, points: our_field(shape).closest_points(points).distances,
+    "distance at points": lambda shape, points: our_field(shape).closest(points).distances,
     "points": lambda cloud, points: our_field(cloud)(points),
     "bare points": lambda cloud, points: our_field(sh.PointCloud(cloud.points))(points),
     "offset surface": our_offset,

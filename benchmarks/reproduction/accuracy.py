@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, NullFormatter
 from numpy.typing import NDArray
 
 import signedheat as sh
-from signedheat.visualization import draw_surface, new_figure
+from signedheat.view import draw_surface, new_figure
 
 from . import baselines, shapes
 from .pages import Page, figure

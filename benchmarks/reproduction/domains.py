@@ -9,7 +9,7 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.visualization import draw_surface, new_figure
+from signedheat.view import draw_surface, new_figure
 
 from . import baselines
 from .pages import Page, figure

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.visualization import draw_plane, draw_shape, new_figure
+from signedheat.view import draw_plane, draw_shape, new_figure
 
 from . import baselines, shapes
 from .pages import Page, figure

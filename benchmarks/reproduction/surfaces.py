@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.visualization import draw_surface, new_figure
+from signedheat.view import draw_surface, new_figure
 
 from . import baselines, shapes
 from .pages import Page, figure
