@@ -3,13 +3,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
-.PHONY: demo docs test fuzz lint types coverage matrix dist clean
+.PHONY: demo docs test fuzz lint types conformance coverage matrix dist clean
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) --upgrade pip
 	$(PIP) hatchling editables
-	$(PIP) --no-build-isolation --editable .
+	$(PIP) --no-build-isolation --editable .[pictures]
 	touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed
@@ -39,6 +39,9 @@ $(VENV)/.installed-docs: $(VENV)/.installed
 
 docs: $(VENV)/.installed-docs  # into docs/_build/html, without a warning; runs every example of the gallery
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
+conformance: $(VENV)/.installed-test  # PEERS=FOLDER with checkouts of other packages, which must be installed too
+	$(BIN)/python tools/conformance $(PEERS)
 
 coverage: $(VENV)/.installed-test
 	$(BIN)/python -m coverage run -m pytest $(TESTS)
