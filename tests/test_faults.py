@@ -18,7 +18,7 @@ import pytest
 import signedheat as sh
 from signedheat import samples
 from signedheat.io import files
-from signedheat.visualization import save_scene
+from signedheat.view import save_scene
 
 resource = pytest.importorskip("resource", reason="limits and signals of POSIX")
 
@@ -148,7 +148,7 @@ def test_signals_at_many_moments(tmp_path, number):
 def test_a_signal_while_a_file_is_written(tmp_path, number):
     code = f"""
 import os, sys
-from signedheat.cli import main, info
+from signedheat.cli import main, reports
 from signedheat.io import files
 import signedheat as sh
 def halfway(path):
@@ -156,7 +156,7 @@ def halfway(path):
         temporary.write_bytes(b"half")
         os.kill(os.getpid(), {int(number)})
         import time; time.sleep(5)
-info.read = halfway
+reports.read = halfway
 sys.exit(main(["info", "ball.stl"]))
 """
     done = subprocess.run([sys.executable, "-c", code], cwd=ready(tmp_path / "run"), capture_output=True, text=True)
@@ -169,10 +169,10 @@ def test_a_signal_while_python_runs_text(tmp_path, number):
     """As where classes are made and kernels compiled: the status is that of the signal all the same."""
     code = f"""
 import os, sys
-from signedheat.cli import main, info
+from signedheat.cli import main, reports
 def halfway(path):
     exec("os.kill(os.getpid(), {int(number)})\\nimport time; time.sleep(5)", globals())
-info.read = halfway
+reports.read = halfway
 sys.exit(main(["info", "ball.stl"]))
 """
     (ready(tmp_path / "run") / "own.py").write_text(code)

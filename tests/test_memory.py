@@ -18,7 +18,6 @@ from refusals import refused
 from shapes.tet_cases import boxes
 from signedheat import memory, samples
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
-from signedheat.extensions.solid_memory import BYTES_IF_CLOSED, BYTES_IF_SCATTERED, bytes_of_faces
 from signedheat.extensions.tetrahedralize import BYTES_PER_TET
 from signedheat.lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
 from signedheat.lowering.surface import intrinsic
@@ -231,18 +230,10 @@ def test_rows_are_imposed_exactly_only_where_there_is_memory_for_it(monkeypatch)
     assert "hard=True" in caught.value.remedy
 
 
-def test_noisy_soups_are_refused_before_their_faces_are_turned(monkeypatch):
-    """With memory for a closed ball, but not for its faces in layers."""
-    soup = samples.soup(BALL, 0.02)
-    grid = sh.Grid.around(soup.bounds, 64)
-    closed = memory_estimate(grid, BYTES_IF_CLOSED, bytes_of_faces(soup))
-    monkeypatch.setattr(memory, "_free", lambda: closed + 1_000_000)
-    monkeypatch.setattr(solid_distance, "_oriented", lambda *_: pytest.fail("turned"))
-    with refused(sh.MemoryLimitError) as caught:
-        solid_distance.solid_distance(soup, grid)
-    spacing = float(caught.value.remedy.split()[4])
-    fits = sh.Grid.around(soup.bounds, spacing=1.05 * spacing)
-    assert memory_estimate(fits, BYTES_IF_SCATTERED, bytes_of_faces(soup)) <= closed + 1_000_000
+def test_shapes_are_refused_before_their_faces_are_turned(monkeypatch):
+    monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 10_000)
+    with refused(sh.MemoryLimitError):
+        sh.complete(BALL)
 
 
 @given(st.integers(1, 10**12), st.floats(0, 1e13), st.floats(0.1, 1e4))

@@ -14,13 +14,14 @@ from refusals import refused
 from signedheat.cli import main
 from signedheat.extensions.tet_meshers import tetrahedralize_with_tetgen, tetrahedralize_with_tetwild
 from signedheat.packages import REMEDIES, lazy_module, require
-from signedheat.visualization import save_scene
+from signedheat.view import save_scene
 
 SOURCES = sorted(Path(sh.__file__).parent.rglob("*.py"))
 CUBE = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"><path d="M 0,0 L 1,0 L 1,1 Z"/></svg>'
 
 USES = {
+    "nibabel": lambda folder: sh.read_labels(folder / "labels.nii"),
     "trimesh": lambda folder: CUBE.to_trimesh(),
     "meshio": lambda folder: CUBE.to_meshio(),
     "pyvista": lambda folder: CUBE.to_pyvista(),
@@ -46,7 +47,7 @@ FILES = {
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "line.svg").write_text(SVG)
-    for name in ("phi.nrrd", "walls.png", *FILES):
+    for name in ("phi.nrrd", "walls.png", "labels.nii", *FILES):
         (tmp_path / name).write_bytes(b"anything but empty")
     return tmp_path
 
@@ -85,6 +86,13 @@ def test_pictures_are_refused_before_anything_is_computed(monkeypatch, folder, c
     assert main(arguments) == 1
     assert "pip install matplotlib" in capsys.readouterr().err
     assert not (folder / "phi.npz").exists()
+
+
+def test_the_demo_without_pictures_makes_the_rest(monkeypatch, tmp_path, capsys):
+    block(monkeypatch, "matplotlib")
+    assert main(["demo", "-o", str(tmp_path), "--resolution", "24"]) == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"duck.stl", "distance.vti", "offset.stl"}
+    assert "pip install matplotlib" in capsys.readouterr().err
 
 
 def test_a_missing_package_is_bad_input_and_an_import_error():

@@ -20,7 +20,7 @@ from fuzz.frame import Wrong, family
 from fuzz.inputs import Random, chance, one_of
 from signedheat import memory, samples
 from signedheat.cli import main
-from signedheat.cli.usage import parser
+from signedheat.cli.parser import parser
 
 FREE = 600_000_000
 """Bytes that commands are told to be free, so that what is refused for its size is refused soon."""
@@ -193,7 +193,7 @@ OUTPUTS = {
     "contour": ("out.stl", "out.obj", "out.txt", "out.csv", "out.ply", "-"),
     "morph": ("out.stl", "out.obj", "out.ply", "-"),
     "sample": ("out.npz", "-"),
-    "view": ("out.html", "out.png"),
+    "view": ("out.pdf", "out.png"),
 }
 ODD_OUTPUTS = ("out", "", "folder", "folder/out.stl", "missing/out.npz", "out.xyzzy", "shape.stl", "a b.stl", ".stl")
 
@@ -289,7 +289,7 @@ def _refuse(constant: str) -> None:
 
 def _values(field: Any) -> np.ndarray:
     """Those of a band without its nodes beyond the walls, which have none."""
-    if not isinstance(field, sh.BandField):
+    if getattr(field, "blocks", None) is None:
         return np.asarray(field.values)
     steps = np.moveaxis(np.indices((8, 8, 8)), 0, -1)
     nodes = 8 * field.blocks.places[:, None, None, None] + steps

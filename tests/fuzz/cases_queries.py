@@ -13,6 +13,7 @@ from fuzz.cases_surfaces import constraint, embedded, source, surface
 from fuzz.frame import Wrong, family
 from fuzz.inputs import chance, one_of, spoiled
 from fuzz.judging import Subject, announced, judge, length_of_edges, subject
+from signedheat.solids.complete import complete
 
 
 def check_curves(given: Subject) -> str:
@@ -39,13 +40,13 @@ def check_queries(given: Subject) -> str:
     if kind == 0 and band is not None:
         with tempfile.TemporaryDirectory() as folder:
             grid = sh.Grid.around(own.bounds, resolution)
-            phi, _ = announced(lambda: sh.tiled_distance(own, Path(folder) / "tiles", grid, band=band))
+            phi, _ = announced(lambda: complete(own).field(grid=grid, band=band, store=Path(folder) / "tiles"))
         return f"tiles: {type(phi).__name__}"
     grid = sh.Grid.around(own.bounds, resolution)
-    phi, warned = announced(lambda: sh.solid_distance(own, grid, band=band))
+    phi, warned = announced(lambda: complete(own).field(grid=grid, band=band))
     places = spoiled(random, own.bounds.mean(axis=0) + size * random.normal(size=(4, 3)))
     if kind == 1:
-        found, _ = announced(lambda: phi.closest_points(places))
+        found, _ = announced(lambda: phi.closest(places))
         judge(found.distances, warned, 100 * size, "distances of nearest places")
         return "nearest places"
     made, _ = announced(lambda: sh.sample(phi, int(random.integers(1, 50))))

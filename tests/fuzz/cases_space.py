@@ -105,9 +105,9 @@ def check_solid(given: Subject) -> str:
         judge(made.vertices, False, np.inf, "oriented")
         return "oriented"
     if kind == 2:
-        made, _ = announced(lambda: sh.unite(source, resolution=resolution))
-        judge(made.points if isinstance(made, sh.PointCloud) else made.vertices, False, np.inf, "united")
-        return "united"
+        made, _ = announced(lambda: sh.complete(source))
+        judge(made.triangles, False, np.inf, "completed")
+        return "completed"
     operation = one_of(random, (sh.dilate, sh.erode, sh.closing, sh.opening, sh.thicken))
     made, _ = announced(lambda: operation(source, size * random.random() ** 2, resolution=resolution))
     judge(made.vertices, False, np.inf, operation.__name__)
@@ -179,7 +179,7 @@ def check_arguments(given: Subject) -> str:
         (sh.close_curves, {"domain": ball, "curves": ball.path([0, 1])}),
         (sh.tetrahedralize, {"shape": ball, "resolution": 3, "padding": 0.1, "grading": 3.0}),
         (sh.orient, {"shape": ball}),
-        (sh.unite, {"shape": ball, "resolution": 8}),
+        (sh.complete, {"shape": ball}),
     ]
     call, arguments = one_of(random, right)
     name = one_of(random, arguments)

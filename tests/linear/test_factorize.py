@@ -1,6 +1,8 @@
 """Every back end solves the same systems."""
 
 import gc
+import io
+import sys
 
 import numpy as np
 import pytest
@@ -9,9 +11,11 @@ from scipy import sparse
 import signedheat as sh
 from refusals import refused
 from shapes.surface_cases import sphere
+from signedheat import linear
 from signedheat.discretization import discretize
 from signedheat.linear import available_backends, elimination_order, factorize, pardiso, upper_triangle, whole
 from signedheat.operators.crouzeix_raviart import vector_heat_matrix
+from signedheat.progress import Announcement
 
 backends = pytest.mark.parametrize("backend", available_backends())
 
@@ -175,3 +179,23 @@ def test_libraries_that_cannot_make_a_factor_anew_are_not_asked_to(surface, monk
     first = sparse.csr_matrix(sparse.triu(surface.stiffness + sparse.identity(surface.triangles.n_vertices)))
     monkeypatch.setattr(pardiso, "_makes_factors_anew", lambda: False)
     assert pardiso.PardisoFactor(first).like_this(first * 2.0) is None
+
+
+def test_where_pardiso_would_pay_it_is_named_once(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    matrix = sparse.eye(5, format="csr") * 2.0
+    monkeypatch.setattr(Announcement, "are_wanted", True)
+    monkeypatch.setattr(linear, "LARGE", 5)
+    monkeypatch.setattr(linear, "HAS_MKL", True)
+    monkeypatch.setattr(linear, "available_backends", lambda: ["superlu"])
+    monkeypatch.setattr(linear, "advise", Announcement("pip install mkl", "%d"))
+    monkeypatch.setattr("sys.stderr", Terminal())
+    factorize(matrix, backend="superlu")
+    factorize(matrix[:4, :4])
+    assert sys.stderr.getvalue() == ""
+    for _ in range(2):
+        factorize(matrix)
+    assert sys.stderr.getvalue().count("pip install mkl") == 1

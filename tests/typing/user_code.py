@@ -83,9 +83,8 @@ assert_type(sh.read_curves("curves.txt", mesh), list[sh.Curve | sh.SurfacePoints
 
 # --- unions where it truly is one
 field = sh.load_field("phi.npz")
-assert_type(field, sh.GridField | sh.VertexField | sh.TetField | sh.BandField)
-if not isinstance(field, sh.BandField):  # measured to the shape itself
-    assert_type(sh.sharpen(field), sh.GridField | sh.VertexField | sh.TetField)
+assert_type(field, sh.GridField | sh.VertexField | sh.TetField)
+assert_type(sh.sharpen(field), sh.GridField | sh.VertexField | sh.TetField)
 for surface in (mesh, polygons):
     assert_type(sh.SignedHeatSolver(surface).distance(curve), sh.VertexField[sh.TriangleMesh | sh.PolygonMesh])
 

@@ -111,7 +111,7 @@ def test_a_grid_without_solid_nodes_measures_as_one_without_a_mask():
         here, there = (sh.signed_distance(circle, grid, constraint=constraint).values for grid in (plain, masked))
         away = np.linalg.norm(plain.points, axis=-1) - 1
         assert np.abs(here - there)[np.abs(away) < 0.3].max() < 0.12 * 0.05
-        assert np.abs(here - there).max() < 0.5 * 0.05  # far away the one is diffused on coarser grids
+        assert np.abs(here - there).max() < 0.6 * 0.05  # far away the one is diffused on coarser grids
         assert np.sqrt(np.mean((there - away) ** 2)) < 0.1 * 0.05
 
 

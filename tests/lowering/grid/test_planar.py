@@ -8,7 +8,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
-from signedheat import visualization
+from signedheat import view
 
 
 def circle(n=400, radius=1.0, center=(0.0, 0.0), part=1.0):
@@ -152,7 +152,7 @@ def test_field_in_the_plane(tmp_path):
         again = sh.load_field(tmp_path / f"phi.{ending}")
         np.testing.assert_array_equal(again.values, phi.values)
         np.testing.assert_array_equal(again.grid.origin, phi.grid.origin)
-    visualization.save_slices(phi, tmp_path / "phi.png", [circle()], [0.2])
+    view.save_slices(phi, tmp_path / "phi.png", [circle()], [0.2])
     assert matplotlib.image.imread(tmp_path / "phi.png")[..., :3].std() > 0.05
 
 
