@@ -1,50 +1,51 @@
-"""Kernels: functions that Numba compiles at their first call, so that importing them does not import Numba."""
+"""Kernels: functions that Numba compiles at their first call, so that importing them does not import Numba.
+
+What is compiled is kept on disk by Numba's own cache, which knows a kernel by the text of its file. A kernel takes in
+those that it calls and constants of other files too, so that here the cache's folder is named by a digest of them all:
+of code as it was imported, since files may have been edited before a kernel is first called.
+"""
 
 from __future__ import annotations
 
 import gc
+import hashlib
 import logging
 import os
 import sys
-from collections.abc import Callable
-from contextlib import nullcontext
-from functools import cached_property, partial, update_wrapper
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
-from threading import RLock
+from pickle import UnpicklingError
+from threading import RLock, local
+from types import CodeType
 from typing import Any, overload
 
+import numpy as np
+
 from .errors import SignedHeatError
-from .kernel_cache import KernelCache, digest_of
 from .packages import lazy_module
+from .progress import Announcement
 
 numba = lazy_module("numba", "compiled kernels")
-kernel_compiler = lazy_module("signedheat.kernel_compiler", "compiled kernels")
+events = lazy_module("numba.core.event", "compiled kernels")
 extending = lazy_module("numba.extending", "compiled kernels")
-types = lazy_module("numba.core.types", "compiled kernels")
 
 logger = logging.getLogger("signedheat")
-_LOCK = RLock()
 MOST_THREADS = 1024
-TRIED = (0, 59), (0, 68)
-"""Versions of Numba, first to last, with which `kernel_compiler` has been tried; others compile in their own steps."""
-DEFAULTS = {"error_model": "numpy", "no_cfunc_wrapper": True}
-"""Options that save compiling: dividing by zero is no exception, and C does not call kernels."""
+OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""Dividing by zero is no exception; C does not call kernels, so that what it would call is not compiled."""
+PATIENCE = 2.0
+"""Seconds after which a lock on the cache is taken to be left by a process that was killed: writing takes .01."""
+DAMAGE = OSError, EOFError, UnpicklingError
+"""What reading or writing the cache raises where files are damaged or cannot be written. Kernels raise none of them."""
+_LOCK = RLock()
+made: list[Kernel] = []
+"""The kernels that this process has used."""
 
 
-class Announcement:
-    """Tells on a terminal, once in a process, that something is being compiled, which takes a while at first use."""
-
-    def __init__(self) -> None:
-        self.is_wanted = True
-
-    def __call__(self, name: str) -> None:
-        logger.info("compiling %s", name)
-        if self.is_wanted and sys.stderr is not None and sys.stderr.isatty():
-            self.is_wanted = False
-            sys.stderr.write("\r\x1b[2Ksignedheat: compiling what this needs, once (signedheat warmup compiles all)\n")
-
-
-announce = Announcement()
+announce = Announcement("compiling what this needs, once (signedheat warmup compiles all)", "compiling %s")
 
 
 class Kernel:
@@ -59,67 +60,42 @@ class Kernel:
     3.0
     """
 
+    is_kept = True
+    """Whether what is compiled is kept on disk: no longer once the cache was found damaged, or the disk full."""
+
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
         self.function = function
-        self.options = {**DEFAULTS, **options}
+        self.options = {**OPTIONS, **options}
 
     def __call__(self, *arguments: Any) -> Any:
+        try:
+            return self.dispatcher(*arguments)
+        except Exception as error:
+            if not Kernel.is_kept or not any(isinstance(each, DAMAGE) for each in _chain(error)):
+                raise
+            logger.warning("the cache of compiled kernels is not used any more: %s", error)
+        with _LOCK:
+            Kernel.is_kept = False
+            while made:
+                vars(made.pop()).pop("dispatcher", None)
         return self.dispatcher(*arguments)
 
     @cached_property
     def dispatcher(self) -> Callable[..., Any]:
-        """The compiled function; the function itself if ``NUMBA_DISABLE_JIT`` is set."""
-        return self._made(self.options)
-
-    @cached_property
-    def inner(self) -> Callable[..., Any]:
-        """The same for other kernels, which alone can call it: without the conversion of Python's objects."""
-        code = self.function.__code__
-        if self.function.__name__ in (*code.co_names, *code.co_freevars):  # it calls itself, which is one function
-            return self.dispatcher
-        made = self._made({**self.options, "no_cpython_wrapper": True})
-        template: Any = getattr(made, "get_call_template", None)
-        if template is not None:  # Numba would compile `f(0)` and `f(1)` apart
-            made.get_call_template = lambda args, kws: template(  # type: ignore[attr-defined]
-                tuple(map(types.unliteral, args)), {name: types.unliteral(kind) for name, kind in kws.items()}
-            )
-        return made
-
-    def _made(self, options: dict[str, Any]) -> Callable[..., Any]:
+        """What Numba makes of the function, which is the function itself if ``NUMBA_DISABLE_JIT`` is set."""
         with _LOCK:
-            made = _compiler()(**options, pipeline_class=kernel_compiler.Pipeline)(self.function)
-            if not hasattr(made, "_cache"):  # compiling is disabled
-                return made  # type: ignore[no-any-return]
-            made.compile = alone(made.compile)
-            if Path(self.function.__code__.co_filename).is_file():  # what was typed in is not kept on disk
-                name = f"{self.function.__module__}.{self.function.__qualname__}".replace("<locals>", "")
-                made._cache = KernelCache(name, digest_of(self.function, options, _parts), announce)
-            return made  # type: ignore[no-any-return]
-
-
-def alone(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function during which garbage is not searched for: an eighth of the time that compiling takes."""
-
-    def called(*arguments: Any) -> Any:
-        was_on = gc.isenabled()
-        gc.disable()
-        try:
-            with kernel_compiler.our_steps() if _are_ours() else nullcontext():
-                return function(*arguments)
-        finally:
-            if was_on:
-                gc.enable()
-
-    return called
-
-
-def _are_ours() -> bool:
-    return bool(TRIED[0] <= numba.version_info[:2] <= TRIED[1])
-
-
-def _parts(value: Any) -> tuple[Callable[..., Any], dict[str, Any]] | None:
-    return (value.function, value.options) if isinstance(value, Kernel) else None
+            _prepare()
+            made.append(self)
+            if Kernel.is_kept and Path(self.function.__code__.co_filename).is_file():  # not what was typed in
+                wanted, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(cache_folder() / _digest(self))
+                try:
+                    return numba.njit(cache=True, **self.options)(self.function)  # type: ignore[no-any-return]
+                except RuntimeError as error:  # no folder can be written to
+                    logger.info("compiled in every process: %s", error)
+                finally:
+                    numba.config.CACHE_DIR = wanted
+            return numba.njit(**self.options)(self.function)  # type: ignore[no-any-return]
 
 
 @overload
@@ -127,14 +103,64 @@ def compiled(function: Callable[..., Any]) -> Kernel: ...
 @overload
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Kernel]: ...
 def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Make a function a kernel: ``@compiled``, or ``@compiled(nogil=True)`` with options of ``numba.njit``."""
+    """Make a function a kernel: ``@compiled``, or ``@compiled(fastmath=True)`` with options of ``numba.njit``."""
     if function is not None:
         return Kernel(function, options)
     return lambda function: Kernel(function, options)
 
 
-def _compiler() -> Any:
-    """``numba.njit`` with our own steps, after registering `Kernel` with Numba so that compiled code can call kernels.
+def cache_folder() -> Path:
+    """Where compiled code is kept; if it cannot be written, Numba keeps it beside the source, or in its own folder."""
+    wanted = os.environ.get("NUMBA_CACHE_DIR")
+    if wanted:
+        return Path(wanted) / "signedheat"
+    with suppress(RuntimeError):  # no home
+        base = {
+            "win32": os.environ.get("LOCALAPPDATA") or Path.home() / "AppData/Local",
+            "darwin": Path.home() / "Library/Caches",
+        }.get(sys.platform, os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        return Path(base) / "signedheat" / "kernels"
+    return Path(__file__).parent / "__pycache__"
+
+
+def _digest(kernel: Kernel) -> str:
+    """Of the code, options and constants that a kernel and those that it calls are made of, and of Numba's version."""
+    digest, seen, waiting = hashlib.sha256(repr(numba.version_info).encode()), set(), [kernel]
+    while waiting:
+        one = waiting.pop()
+        if one in seen:
+            continue
+        seen.add(one)
+        function = one.function
+        digest.update(repr((one.__module__, one.options, _spelled(function.__code__))).encode())
+        cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+        names = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+        for name, value in {**names, **{name: cell.cell_contents for name, cell in cells}}.items():
+            if isinstance(value, Kernel):
+                waiting.append(value)
+            elif isinstance(value, np.ndarray):
+                digest.update(f"{name}{value.dtype}{value.shape}".encode() + value.tobytes())
+            elif isinstance(value, bool | int | float | complex | str | tuple | np.generic):
+                digest.update(f"{name}={value!r}".encode())
+    return digest.hexdigest()[:16]
+
+
+def _spelled(value: Any) -> Any:
+    """Code and constants as what is written the same in every process: sets have no order of their own."""
+    if isinstance(value, CodeType):
+        return value.co_code, value.co_names, [_spelled(constant) for constant in value.co_consts]
+    return sorted(map(repr, value)) if isinstance(value, frozenset) else value
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
+
+
+@cache
+def _prepare() -> None:
+    """Tell Numba what kernels are, so that compiled code can call them, and be told of what it compiles.
 
     Raises
     ------
@@ -148,8 +174,60 @@ def _compiler() -> Any:
             remedy="unset it, or set it to 1 or more",
             element="NUMBA_NUM_THREADS",
         )
-    if Kernel not in extending.typeof_impl.registry:
-        extending.typeof_impl.register(Kernel)(lambda kernel, _: types.Dispatcher(kernel.inner))
-    if not _are_ours():
-        return numba.njit
-    return partial(numba.njit, pipeline_class=kernel_compiler.Pipeline)
+    extending.typeof_impl.register(Kernel)(lambda kernel, _: numba.typeof(kernel.dispatcher))
+
+    events.Listener.register(_Listener)
+    listener = _Listener()
+    for kind in ("numba:compile", "numba:compiler_lock"):
+        events.register(kind, listener)
+
+
+class _Listener:
+    """Hears from Numba when it compiles: tells so, and searches for no garbage meanwhile, an eighth of the time.
+
+    What was compiled is written between the end of that and the end of Numba's own lock on threads. Processes wait for
+    one another there: of two that write one kernel for two kinds of arguments, each could take the other's file for its
+    own.
+    """
+
+    def __init__(self) -> None:
+        self.depth, self.was_on = 0, True
+        self.held = local()
+
+    def notify(self, event: Any) -> None:
+        if event.kind == "numba:compiler_lock":
+            if event.is_end and vars(self.held).pop("lock", None):
+                _unlock()
+        elif event.is_start:
+            function = event.data["dispatcher"].py_func
+            if any(function is kernel.function for kernel in made):
+                announce(f"{function.__module__}.{function.__qualname__}")
+            if self.depth == 0:
+                self.was_on = gc.isenabled()
+                gc.disable()
+            self.depth += 1
+        else:
+            self.depth -= 1
+            if self.depth == 0 and self.was_on:
+                gc.enable()
+            self.held.lock = _lock()
+
+
+def _lock() -> bool:
+    """Wait until no other process writes to the cache; returns whether there is a lock to be taken off."""
+    until = time.monotonic() + PATIENCE
+    with suppress(OSError):
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        while time.monotonic() < until:
+            try:
+                os.close(os.open(cache_folder() / "lock", os.O_CREAT | os.O_EXCL))
+                return True
+            except FileExistsError:
+                time.sleep(0.001)
+        return True  # left by a process that was killed
+    return False
+
+
+def _unlock() -> None:
+    with suppress(OSError):
+        (cache_folder() / "lock").unlink()

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from .compiled import made
 from .errors import MemoryLimitError
 
 GROUPS = Path("/proc/self/cgroup")
@@ -38,7 +39,7 @@ ROOM = 1.1
 
 def libraries() -> int:
     """What libraries still take: most of it is the compiler, which the first kernel loads."""
-    if "signedheat.kernel_compiler" in sys.modules:
+    if made:
         return LOADED
     return IMPORTED if "numba" in sys.modules else UNLOADED
 

@@ -14,17 +14,10 @@ from .errors import MissingPackageError
 
 REMEDIES = {
     "PIL": "pip install pillow",
-    "distributed": "pip install signedheat[cluster]",
     "mpl_toolkits": "pip install matplotlib",
-    "nibabel": "pip install signedheat[nifti]",
     "nrrd": "pip install pynrrd",
-    "polyscope": "pip install polyscope",
-    "pytetwild": "pip install signedheat[tetwild]",
-    "pyvista": "pip install signedheat[plot]",
     "skimage": "pip install scikit-image",
     "sksparse": "conda install -c conda-forge scikit-sparse",
-    "tetgen": "pip install signedheat[tetgen]",
-    "zarr": "pip install signedheat[large]",
 }
 """How to get the packages that are not installed by the name by which they are imported."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +12,22 @@ logger = logging.getLogger("signedheat")
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done, from 0 to 1, and the name of the step that begins."""
+
+
+class Announcement:
+    """Tells something on a terminal, once in a process; each time in the log, with what it is about."""
+
+    are_wanted = True
+    """Whether any are; not where nothing but results are to be told."""
+
+    def __init__(self, text: str, logged: str) -> None:
+        self._text, self._logged, self._was_told = text, logged, False
+
+    def __call__(self, about: object) -> None:
+        logger.info(self._logged, about)
+        if self.are_wanted and not self._was_told and sys.stderr is not None and sys.stderr.isatty():
+            self._was_told = True
+            sys.stderr.write(f"\r\x1b[2Ksignedheat: {self._text}\n")
 
 
 class Stopwatch:

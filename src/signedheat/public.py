@@ -4,6 +4,9 @@ from .batches.job import BatchJob, Sampling
 from .batches.manifest import Outcome
 from .batches.run import Batch, batch
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
+from .curves.close import close_curves
+from .curves.distance import curve_distance
+from .curves.orientation import CurveOrientation, curve_orientation
 from .diagnostics import Diagnostics
 from .domains.common_subdivision import common_subdivision
 from .domains.curves import Curve, SurfacePoints
@@ -32,26 +35,21 @@ from .errors import (
     UnreachedWarning,
     UnsupportedTypeError,
 )
-from .extensions.close_curves import close_curves
-from .extensions.curve_distance import curve_distance
-from .extensions.curve_orientation import CurveOrientation, curve_orientation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.orient import orient
 from .extensions.orientation import Orientation, orientation
-from .extensions.phi_band import phi_in_band as _phi_in_band  # noqa: F401  provides bands of `signed_distance`
 from .extensions.piecewise import piecewise_distance
 from .extensions.sampling import Samples, sample
 from .extensions.sharpening import sharpen
 from .extensions.sharpening_methods import Convex, Geodesic
 from .extensions.solid_distance import solid_distance
 from .extensions.tetrahedralize import tetrahedralize
-from .extensions.tiles import tiled_distance
-from .extensions.uniting import unite
 from .extrapolation import Extrapolated
-from .fields.band_field import BandField
 from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
 from .fields.grid_field import GridField
+from .fields.known_solid import Closest
 from .fields.piecewise_field import PiecewiseField
+from .fields.redistancing import redistance
 from .fields.tet_field import TetField
 from .fields.vertex_field import VertexField
 from .io import (
@@ -69,13 +67,15 @@ from .io import (
     write_polylines,
     write_vdb,
 )
+from .solids.complete import complete
+from .solids.solid import Solid
 from .solver import SignedHeatSolver, signed_distance
-from .visualization import new_figure as _new_figure  # noqa: F401  provides notebooks, windows and Polyscope
+from .view import new_figure as _new_figure  # noqa: F401  provides notebooks and windows
 
 __all__ = [
-    "BandField",
     "Batch",
     "BatchJob",
+    "Closest",
     "ConstraintError",
     "Convex",
     "Curve",
@@ -109,6 +109,7 @@ __all__ = [
     "SignedHeatError",
     "SignedHeatSolver",
     "Soft",
+    "Solid",
     "SourceError",
     "SurfacePoints",
     "TetField",
@@ -123,6 +124,7 @@ __all__ = [
     "close_curves",
     "closing",
     "common_subdivision",
+    "complete",
     "curve_distance",
     "curve_orientation",
     "dilate",
@@ -141,6 +143,7 @@ __all__ = [
     "read_mask",
     "read_polylines",
     "read_volume",
+    "redistance",
     "sample",
     "save",
     "sharpen",
@@ -152,9 +155,7 @@ __all__ = [
     "solid_distance",
     "tetrahedralize",
     "thicken",
-    "tiled_distance",
     "transform",
-    "unite",
     "write_curves",
     "write_polylines",
     "write_vdb",

@@ -13,14 +13,14 @@ from .diagnostics import Diagnostics
 from .discretization import Adaptable, Discretization, discretize
 from .domains.curves import CurvesAndPoints
 from .domains.foreign import ForeignShape, as_shapes, converted
+from .domains.given_curves import given_curves
 from .domains.grid import Dimension, Grid
 from .domains.intrinsic_triangulation import triangle_mesh
 from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources
 from .domains.tet_mesh import TetMesh
 from .domains.validation import positive_number
-from .errors import SourceError, UnsupportedTypeError
+from .errors import SignedHeatError, SourceError, UnsupportedTypeError
 from .extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
-from .fields.band_field import BandField
 from .fields.grid_field import GridField
 from .fields.tet_field import TetField
 from .fields.to_field import Field, to_field, warned
@@ -30,10 +30,6 @@ from .lowering.area_elements import grid_around
 from .lowering.surface.intrinsic import Retriangulated, lowered_by_angles
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .progress import Progress, Stopwatch
-from .slots import Slot
-
-band_of_phi: Slot[[Any, Grid, float, Diffusion | None, Progress | None], BandField] = Slot("band_of_phi")
-"""`signed_distance` in a band."""
 
 _BATCH = 16  # sources diffused at a time
 
@@ -77,6 +73,10 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         object.__setattr__(self, "domain", converted(self.domain))
         if not isinstance(self.diffusion, Extrapolated | None):
             object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
+        if not (isinstance(self.intrinsic, bool) or self.intrinsic == "auto"):
+            raise SignedHeatError(
+                f"intrinsic must be 'auto', True or False, not {self.intrinsic!r:.40}", element="intrinsic"
+            )
 
     @cached_property
     def discretization(self) -> Adaptable:
@@ -125,8 +125,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         Parameters
         ----------
         sources : one source or a sequence of them
-            On surfaces: `Curve`, `SurfacePoints`. In space: `TriangleMesh`, `PolygonMesh`, `PointCloud`; in the plane:
-            `Polyline`.
+            On surfaces: `Curve`, `SurfacePoints`, or potpourri3d's lists of (element, coordinates). In space:
+            `TriangleMesh`, `PolygonMesh`, `PointCloud`; in the plane: `Polyline`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
             Imposed on φ at the sources; `ZeroSet` by default.
 
@@ -150,7 +150,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         with stopwatch("prepare"):
             discretization = self.discretization
         with stopwatch("sources"):
-            discretization, adapted = discretization.adapt(as_list(sources))
+            listed, left_out = given_curves(self.domain, as_list(sources))
+            discretization, adapted = discretization.adapt(listed)
             times = self._times(discretization)
             sources_by_time = lowered_for_times(discretization, adapted, times)
         with stopwatch("diffuse"):
@@ -162,6 +163,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         with stopwatch("integrate"):
             values = integrate(discretization, directions, source, constraint)
         diagnostics = Diagnostics(timings=dict(stopwatch.seconds), time=source.time)
+        if left_out is not None:
+            diagnostics = diagnostics.noting(left_out)
         return to_field(discretization, values, source, diagnostics)
 
     @overload
@@ -198,7 +201,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         for begin in range(0, len(sources), _BATCH):
             batch = []
             for entry in sources[begin : begin + _BATCH]:
-                discretization, adapted = self.discretization.adapt(as_list(entry))
+                discretization, adapted = self.discretization.adapt(given_curves(self.domain, as_list(entry))[0])
                 times = self._times(discretization)
                 batch.append((discretization, lowered_for_times(discretization, adapted, times)))
             for (discretization, _), run in groupby(batch, key=lambda entry: (entry[0], len(entry[1]))):
@@ -277,18 +280,6 @@ def signed_distance(
 ) -> GridField[Literal[2]]: ...
 @overload
 def signed_distance(
-    source: Shapes,
-    domain: Grid[Literal[3]] | None = None,
-    *,
-    resolution: int = 128,
-    padding: float | None = None,
-    band: float,
-    constraint: None = None,
-    diffusion: Diffusion | None = None,
-    progress: Progress | None = None,
-) -> BandField: ...
-@overload
-def signed_distance(
     source: SpaceSources,
     domain: Grid[Dimension],
     *,
@@ -331,11 +322,10 @@ def signed_distance(
     *,
     resolution: int = 128,
     padding: float | None = None,
-    band: float | None = None,
     constraint: Constraint | None = None,
     diffusion: Diffusion | None = None,
     progress: Progress | None = None,
-) -> Field | BandField:
+) -> Field:
     """Signed distance to a shape, however broken, in one call.
 
     Parameters
@@ -349,9 +339,6 @@ def signed_distance(
         Number of nodes along the longest side of that grid.
     padding : float, optional
         Least distance between the shape and the boundary of that grid; by default a fifth of its longest side.
-    band : float, optional
-        Compute nodes of the grid only where ``|φ|`` is at most this or a face as near, and a coarse grid elsewhere.
-        φ then vanishes at the shape in the mean of each connected part of the band; there is no other constraint.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
         Imposed on φ at the source; `ZeroSet` by default.
     diffusion : float or Extrapolated, optional
@@ -362,7 +349,7 @@ def signed_distance(
 
     Returns
     -------
-    GridField, TetField or VertexField; BandField with a `band`
+    GridField, TetField or VertexField
         φ > 0 on the side that the normals point to: negative inside a shape whose normals point outwards.
 
     Raises
@@ -388,8 +375,4 @@ def signed_distance(
     if domain is None:
         source = as_list(source)
         domain = grid_around(source, resolution, padding)
-    if band is not None:
-        if not isinstance(domain, Grid) or constraint is not None:
-            raise UnsupportedTypeError("a band lies on a grid, and takes no constraint", remedy="leave out the band")
-        return band_of_phi(source, domain, band, diffusion, progress)
     return warned(SignedHeatSolver(domain, diffusion, progress)._distance(source, constraint))

@@ -37,6 +37,7 @@ from .surfaces import (
     SmallLoops,
     TetsTurned,
     VerticesAdded,
+    WithoutLength,
 )
 
 __all__ = [
@@ -65,6 +66,7 @@ __all__ = [
     "SmallLoops",
     "TetsTurned",
     "VerticesAdded",
+    "WithoutLength",
 ]
 
 AnyNote = TypeVar("AnyNote", bound=Note)

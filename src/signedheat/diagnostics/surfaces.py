@@ -41,6 +41,16 @@ class LargeAngles(Note):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class WithoutLength(Note):
+    """Curves that were left out, by number, since all points of each coincide: a click where a stroke was meant."""
+
+    without_length: NDArray[np.int64]
+
+    def __str__(self) -> str:
+        return f"curves without length left out: {', '.join(map(str, self.without_length))}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class SmallLoops(Note):
     """Number of closed curves that are smaller than a few triangles, to which the method is inaccurate."""
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import platform
+import sys
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SignedHeatError
+from ..progress import Announcement
 from . import cholmod, pardiso
 from .cholmod import CholmodFactor
 from .matrices import upper_triangle, whole
@@ -26,6 +29,15 @@ __all__ = [
     "upper_triangle",
     "whole",
 ]
+
+
+LARGE = 40_000
+"""Unknowns from which PARDISO is worth its size: SuperLU takes 1.3 times its time there, 2.5 times at 160,000."""
+HAS_MKL = platform.machine() in ("x86_64", "AMD64") and sys.platform != "darwin"
+"""Whether there is an MKL for this machine."""
+advise = Announcement(
+    "pip install mkl makes large surfaces and tets up to 2.5 times as fast", "SuperLU factorises %d unknowns"
+)
 
 
 class Factor(Protocol):
@@ -114,4 +126,6 @@ def factorize(
         return PardisoFactor(upper, None if reused else order, together)
     if name == "cholmod":
         return CholmodFactor(upper, order)
+    if upper.shape[0] >= LARGE and backend is None and HAS_MKL:
+        advise(upper.shape[0])
     return SuperLUFactor(upper, order)

@@ -59,7 +59,7 @@ def merge_in_cells(
     return samples, NodeSources(sources.places, nodes, sources.shape, sources.steps)
 
 
-@compiled(nogil=True)
+@compiled
 def _merge(corners, vectors, weights, components, order, shape, size, slots, nodes, places, scale):
     """Sums of weight · position, vector and weight per (component, cell).
 

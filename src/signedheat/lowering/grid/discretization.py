@@ -70,22 +70,20 @@ def refuse_beyond_memory(
     beside: float = 0.0,
     area: float = 0.0,
     at_most: tuple[float, float, float] | None = None,
-    scale: float = 1.0,
 ) -> None:
     """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing.
 
     Of φ alone, more is known when the area of the surface is. The spacing that is told has room for `at_most`:
-    bytes for each node, bytes besides and area, where it may turn out that so much is needed. It is multiplied
-    by `scale`: a band is asked for by the spacing of its own nodes.
+    bytes for each node, bytes besides and area, where it may turn out that so much is needed.
     """
     available, needed = available_memory(), memory_estimate(grid, per_node, beside)
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    fitting = scale * ROOM * fitting_spacing(grid, available, *(at_most or (per_node, beside, area)))
+    fitting = ROOM * fitting_spacing(grid, available, *(at_most or (per_node, beside, area)))
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     coarser = f"choose a spacing of {spacing} or more, or a lower resolution"
-    some_nodes = (fitting < scale * (grid.upper - grid.origin)).all()
+    some_nodes = (fitting < grid.upper - grid.origin).all()
     raise MemoryLimitError(
         f"a grid of {' × '.join(map(str, grid.shape))} nodes needs about {needed / 1e9:.1f} GB, "
         f"and {available / 1e9:.1f} GB are free",

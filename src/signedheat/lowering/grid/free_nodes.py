@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...compiled import compiled
 from ...domains.grid import Grid
+from ...operators.grid.walls import lines_are_clear
 
 REFLECTION = 3
 """Width, in nodes, of the layer beside a wall in which reflected heat turns gradients by more than a degree."""
@@ -118,39 +118,4 @@ class FreeNodes:
         """(n,) whether the line from each free node to its target (n, d), in cells, avoids the boxes of solid nodes."""
         counts = np.array(self.grid.shape)
         strides = np.append(np.cumprod(counts[:0:-1])[::-1], 1)
-        return _see(self.indices, targets, self.grid.mask.ravel(), counts, strides)
-
-
-@compiled(nogil=True)
-def _see(starts, targets, solid, counts, strides):
-    n, dimension = starts.shape
-    seen = np.ones(n, dtype=np.bool_)
-    place = np.empty(dimension, dtype=np.int64)
-    last = np.empty(dimension, dtype=np.int64)
-    for i in range(n):
-        steps = 0
-        for d in range(dimension):
-            place[d] = starts[i, d]
-            last[d] = min(max(np.int64(np.floor(targets[i, d] + 0.5)), 0), counts[d] - 1)
-            steps += abs(last[d] - place[d])
-        entered = 0.0
-        for _ in range(steps):
-            axis, leave = -1, np.inf
-            for d in range(dimension):
-                way = targets[i, d] - starts[i, d]
-                if place[d] != last[d] and way != 0.0:
-                    at = (place[d] + (0.5 if way > 0.0 else -0.5) - starts[i, d]) / way
-                    if at < leave:
-                        axis, leave = d, at
-            node = 0
-            for d in range(dimension):
-                node += place[d] * strides[d]
-            # a line that only touches a corner of a box does not enter it
-            if solid[node] and leave > entered + 1e-9:
-                seen[i] = False
-                break
-            if axis < 0:
-                break
-            entered = max(entered, leave)
-            place[axis] += 1 if targets[i, axis] > starts[i, axis] else -1
-    return seen
+        return lines_are_clear(self.indices, targets, self.grid.mask.ravel(), counts, strides)
