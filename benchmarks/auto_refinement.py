@@ -145,7 +145,7 @@ def case(mesh: sh.TriangleMesh, seed: int) -> tuple[list[sh.Curve], np.ndarray, 
     heights = heights * (1 + 1e-7 * np.random.default_rng(1).normal(size=len(heights)))
     level = float(np.quantile(heights, 0.6))
     curves = mesh.level_set(heights, level)
-    away = np.abs(sh.curve_distance(mesh, curves, as_oriented=True).restrict().values)
+    away = np.abs(sh.signed_distance(curves, mesh, as_oriented=True).restrict().values)
     truth = np.where(heights > level, away, -away)
     return curves, truth, error(sh.SignedHeatSolver(mesh, intrinsic=True).distance(curves), truth)
 

@@ -36,13 +36,13 @@ Surface = tuple[np.ndarray, np.ndarray]
 
 def band(mesh: sh.TriangleMesh, grid: sh.Grid) -> Surface:
     """Ours, in a band."""
-    surface = sh.solid_distance(mesh, grid, band=CELLS * float(grid.spacing[0])).contour()
+    surface = sh.signed_distance(mesh, grid, band=CELLS * float(grid.spacing[0])).contour()
     return surface.vertices, surface.faces
 
 
 def dense(mesh: sh.TriangleMesh, grid: sh.Grid) -> Surface:
     """Ours, on the whole grid."""
-    surface = sh.solid_distance(mesh, grid).contour()
+    surface = sh.signed_distance(mesh, grid).contour()
     return surface.vertices, surface.faces
 
 

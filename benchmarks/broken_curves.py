@@ -4,7 +4,7 @@ Closed curves on five generated meshes, one with a handle, are cut into about tw
 of the length gone in random intervals; pieces moved across themselves by a normal deviate of one mean edge length;
 10 or 30 % of the pieces turned; four spurious pieces. Truth is exact distance to the whole curve. Ways:
 
-* one call: `sh.curve_distance`
+* one call: `sh.signed_distance`
 * heat: `SignedHeatSolver.distance` of the pieces as they are; zero set: that, sharpened to its own zero set
 * potpourri3d: as heat
 * nearest: exact distance to the pieces, with the side of the nearest segment
@@ -79,7 +79,7 @@ def study(
         if names and name not in names:
             continue
         curve = max(mesh.level_set(heights, 0.0), key=lambda c: c.n_points)
-        region = np.sign(heights) if name != "torus" else np.sign(sh.curve_distance(mesh, curve).values)
+        region = np.sign(heights) if name != "torus" else np.sign(sh.signed_distance(curve, mesh).values)
         truth = region * unsigned(mesh, [curve])
         solver = sh.SignedHeatSolver(mesh)
         peer = pp3d.MeshSignedHeatSolver(np.array(mesh.vertices), np.array(mesh.faces))
@@ -112,7 +112,7 @@ def answers(mesh, solver, peer, pieces) -> dict[str, np.ndarray]:
     except (RuntimeError, ValueError):
         theirs = np.full(mesh.n_vertices, np.nan)
     return {
-        "one call": sh.curve_distance(mesh, pieces).values,
+        "one call": sh.signed_distance(pieces, mesh).values,
         "heat": heat.values,
         "zero set": sh.sharpen(heat).values,
         "potpourri3d": theirs,

@@ -2,7 +2,7 @@
 
 The sources are level sets of the three lowest eigenfunctions of the Laplacian, subdivided with the mesh; the meshes
 have 1,250 vertices at first and 320,000 in the end. For each source: order (slope of log ε against the log of the mean
-edge length) and ε in per cent at each level, of the default, of the paper's one time, and of `sh.curve_distance`.
+edge length) and ε in per cent at each level, of the default, of the paper's one time, and of `sh.signed_distance`.
 Truth is exact distance to the zero line of the eigenfunction, taken as linear in every triangle.
 Run with ``python -m benchmarks.convergence MESH ...``; without meshes it takes two generated ones.
 """
@@ -31,7 +31,7 @@ EXACT = 1e-3  # per cent
 WAYS: dict[str, Way] = {
     "default": lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
     "one time": lambda mesh, curves: sh.SignedHeatSolver(mesh, 1.0).distance(curves),
-    "one call": lambda mesh, curves: sh.curve_distance(mesh, curves),
+    "one call": lambda mesh, curves: sh.signed_distance(curves, mesh),
 }
 
 

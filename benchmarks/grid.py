@@ -115,13 +115,13 @@ def measure(n: int) -> dict[str, Any]:
     from scipy.fft import dctn
 
     shape, grid = sphere(10_000), box(n)
-    sh.sharpen(sh.signed_distance(shape, box(36))).offset(OFFSET)  # compile
+    sh.sharpen(sh.SignedHeatSolver(box(36)).distance(shape)).offset(OFFSET)  # compile
     before = peak_bytes()
     totals, fields = [], []
     transform, peak = np.inf, 0
     for _ in range(REPEATS):
         begin = time.perf_counter()
-        field = sh.signed_distance(shape, grid)
+        field = sh.SignedHeatSolver(grid).distance(shape)
         totals.append(time.perf_counter() - begin)
         fields.append(field.diagnostics.timings)
         peak = peak or peak_bytes()  # of the first run alone
@@ -170,7 +170,7 @@ def peers(n: int) -> None:
     }
     for name, shape in shapes.items():
         print(f"{name}, {n}³")
-        times, field = repeated(lambda shape=shape: sh.solid_distance(shape, grid))
+        times, field = repeated(lambda shape=shape: sh.signed_distance(shape, grid))
         seconds = min(times)
         contouring, surface = repeated(lambda field=field: field.offset(OFFSET))
         radius = np.abs(np.linalg.norm(surface.vertices, axis=1) - 1 - OFFSET).max()

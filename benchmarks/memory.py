@@ -130,7 +130,7 @@ def phi_alone(balls: int, size: int) -> tuple[Callable[[], object], float]:
     mesh = samples.without_patches(mesh, 4, 0.1)
     grid = sh.Grid.around(mesh.bounds, size)
     surface = bytes_of_area(float(mesh.face_areas.sum()), grid.spacing, grid.n_nodes)
-    return lambda: sh.signed_distance(mesh, grid), grid_estimate(grid) + surface - libraries()
+    return lambda: sh.SignedHeatSolver(grid).distance(mesh), grid_estimate(grid) + surface - libraries()
 
 
 def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable[[], object], float]:
@@ -139,7 +139,7 @@ def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable
     grid = sh.Grid.around(made.bounds, size)
     count = made.n_points if isinstance(made, sh.PointCloud) else made.triangulation.n_faces
     estimate = max(grid_estimate(grid, BYTES_PER_NODE, BYTES_AT_WORK) - libraries(), bytes_to_complete(made, count))
-    return lambda: sh.solid_distance(made, grid), estimate
+    return lambda: sh.signed_distance(made, grid), estimate
 
 
 def band(closed: bool, size: int) -> tuple[Callable[[], object], float]:
@@ -155,7 +155,7 @@ def band(closed: bool, size: int) -> tuple[Callable[[], object], float]:
 
 def sampled(size: int) -> tuple[Callable[[], object], float]:
     """Samples of a ball with holes."""
-    field = sh.solid_distance(samples.without_patches(samples.sphere(5), 4, 0.1), resolution=96)
+    field = sh.signed_distance(samples.without_patches(samples.sphere(5), 4, 0.1), resolution=96)
     sh.sample(field, 10)
     return lambda: sh.sample(field, size), float(BYTES_PER_SAMPLE * size)
 

@@ -47,7 +47,7 @@ COMPARISONS = {
     "spheres": Comparison(
         "Solids in space: spheres",
         ("grid.py", "--peers"),
-        """Spheres, whole and damaged, at 128³: `sh.solid_distance` and its offset; unsigned distance × sign of fast
+        """Spheres, whole and damaged, at 128³: `sh.signed_distance` and its offset; unsigned distance × sign of fast
         winding numbers by libigl, each tree built once; offsets by MeshLib. Both do less, and are as exact or more
         where the whole surface is there or little of it is missing. CPU seconds, the least of three runs; in brackets,
         how much longer the slowest took.""",

@@ -18,7 +18,7 @@ EXPECTED = (2 * np.pi / 3 * 0.75**2 * (3 - 0.75), 0.06)
 def main(folder: Path) -> float:
     """Write a picture; return the volume of the intersection."""
     grid = sh.Grid((-1.6, -1.4, -1.4), 0.05, (75, 57, 57))
-    left, right = (sh.solid_distance(samples.sphere(4, center=(x, 0, 0)), grid) for x in (-0.25, 0.25))
+    left, right = (sh.signed_distance(samples.sphere(4, center=(x, 0, 0)), grid) for x in (-0.25, 0.25))
     sets = {"a | b": left | right, "a & b": left & right, "a - b": left - right}
 
     view.save_row(

@@ -31,7 +31,7 @@ def main(folder: Path) -> float:
     figure = view.new_figure(11, 6.5)
     areas, cuts = [], []
     for k, (name, diffusion) in enumerate([("sharp", 1.0), ("round", 30.0)]):
-        phi = sh.signed_distance(sides, resolution=160, padding=0.8, diffusion=diffusion)
+        phi = sh.SignedHeatSolver(sh.Grid.around(sides, 160, padding=0.8), diffusion=diffusion).distance(sides)
         outline = max(phi.contour(0.0), key=lambda line: line.length)
         sh.write_polylines(folder / f"{name}.svg", outline)
 

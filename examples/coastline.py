@@ -24,7 +24,7 @@ def main(folder: Path) -> float:
     coast = np.stack([-60 + reach * np.cos(angle) / np.cos(np.radians(15)), 15 + reach * np.sin(angle)], axis=1)
     pieces = [sh.globe_curve(globe, coast[a : a + 16]) for a in range(0, 170, 22)]  # six of 22 steps are missing
 
-    phi = sh.curve_distance(globe, pieces)
+    phi = sh.signed_distance(pieces, globe)
     whole = sh.close_curves(globe, pieces)
 
     eye = direction(-50.0, 25.0)

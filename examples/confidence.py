@@ -18,7 +18,7 @@ def main(folder: Path) -> float:
     ball = samples.sphere(5)
     hole = ball.vertices[ball.faces].mean(axis=1)[:, 0] > 0.75
     shape = sh.TriangleMesh(ball.vertices, ball.faces[~hole])
-    phi = sh.solid_distance(shape, resolution=72)
+    phi = sh.signed_distance(shape, resolution=72)
     sure = sh.GridField(phi.grid, phi.confidence.astype(float))
 
     figure = view.new_figure(12, 4.2)

@@ -1,7 +1,7 @@
 """Exact distance to broken curves
 ================================
 
-What is left of a curve is there: `curve_distance` measures to it exactly, along the surface, and to what completes it
+What is left of a curve is there: `signed_distance` measures to it exactly, along the surface, and to what completes it
 elsewhere. The method alone (`SignedHeatSolver.distance`) is off by tenths of a per cent on fine meshes, by more on
 coarse ones.
 """
@@ -14,7 +14,7 @@ import signedheat as sh
 from signedheat import samples, view
 
 EXPECTED = (0.0, 0.002)
-"""Root mean square error of `curve_distance`, over the range of distance."""
+"""Root mean square error of `signed_distance`, over the range of distance."""
 
 
 def main(folder: Path) -> float:
@@ -27,15 +27,15 @@ def main(folder: Path) -> float:
     step = len(corners) // 6
     pieces = [ball.polyline(corners[a : a + round(0.8 * step)]) for a in range(0, 6 * step, step)]
 
-    fields = [sh.SignedHeatSolver(ball).distance(pieces), sh.curve_distance(ball, pieces)]
-    truth = sh.curve_distance(ball, whole).values
+    fields = [sh.SignedHeatSolver(ball).distance(pieces), sh.signed_distance(pieces, ball)]
+    truth = sh.signed_distance(whole, ball).values
     errors = [float(np.sqrt(np.mean((field.values - truth) ** 2)) / np.ptp(truth)) for field in fields]
 
     look = {"sources": pieces, "view": np.array([1.0, -1.0, 0.8])}
     view.save_row(
         folder / "curve_distance.png",
         (f"the method alone: error {100 * errors[0]:.2f} %", fields[0], look),
-        (f"curve_distance: error {100 * errors[1]:.2f} %", fields[1], look),
+        (f"signed_distance: error {100 * errors[1]:.2f} %", fields[1], look),
     )
     return errors[1]
 

@@ -19,7 +19,7 @@ EXPECTED = (0.0, 0.002)
 def main(folder: Path) -> float:
     """Write the set and a picture; return the largest error of a distance."""
     ball = samples.sphere(5)
-    found = sh.sample(sh.solid_distance(ball, resolution=48), 4000)
+    found = sh.sample(sh.signed_distance(ball, resolution=48), 4000)
     found.save(folder / "ball.npz", "deepsdf")
 
     grid = sh.Grid((-1.2, -1.2), 0.02, (121, 121))

@@ -19,11 +19,11 @@ def main(folder: Path) -> float:
     """Write a picture; return the distance at the equator."""
     ball = samples.sphere(5)
     poles = ball.points_at([int(ball.vertices[:, 2].argmax()), int(ball.vertices[:, 2].argmin())])
-    phi = sh.sharpen(sh.signed_distance(poles, ball))
+    phi = sh.sharpen(sh.SignedHeatSolver(ball).distance(poles))
 
     part = samples.torus(1.0, 0.45)
     source = part.points_at([200, 2500])
-    on_part = sh.sharpen(sh.signed_distance(source, part))
+    on_part = sh.sharpen(sh.SignedHeatSolver(part).distance(source))
     view.save_row(
         folder / "distance_from_points.png",
         ("from both poles", phi, {"sources": [poles]}),

@@ -19,7 +19,7 @@ def main(folder: Path) -> float:
     """Write a picture; return the mean radius of the offset."""
     shape = samples.without_patches(samples.sphere(4), 3, 0.35, seed=1)
     mesh = sh.tetrahedralize(shape, resolution=14, padding=0.8)
-    phi = sh.sharpen(sh.signed_distance(shape, mesh))
+    phi = sh.sharpen(sh.SignedHeatSolver(mesh).distance(shape))
     offset = phi.offset(0.5)
 
     cut = sh.TetMesh(mesh.vertices, mesh.tets[mesh.tet_barycenters[:, 1] > 0])

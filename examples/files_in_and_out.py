@@ -21,7 +21,7 @@ def main(folder: Path) -> float:
     """Write files and a picture; return the radius of the offset that was read again."""
     samples.with_flipped_faces(samples.sphere(4), 0.3).save(folder / "ball.ply")
     ball = sh.transform(sh.read(folder / "ball.ply"), 25.4 * np.eye(4)[:3])  # inches to millimetres
-    sdf = sh.solid_distance(ball, resolution=36)
+    sdf = sh.signed_distance(ball, resolution=36)
     sh.save(sdf.offset(2.54), folder / "grown.stl")
     sh.write_vdb(sdf, folder / "ball.vdb")
     view.save_scene(ball, folder / "ball.png")
@@ -37,7 +37,7 @@ def main(folder: Path) -> float:
     (folder / "coast.csv").write_text("longitude,latitude\n-55,-5\n-40,-25\n10,-20\n20,15\n\n10,20\n-30,30\n-60,5\n")
     coast = sh.read_globe_curves(folder / "coast.csv", globe)
     sh.write_curves(folder / "whole.txt", sh.close_curves(globe, coast), globe)
-    along = sh.curve_distance(globe, sh.read_curves(folder / "whole.txt", globe))
+    along = sh.signed_distance(sh.read_curves(folder / "whole.txt", globe), globe)
 
     labels = np.zeros((40, 40, 40), dtype=np.uint8)
     labels[np.linalg.norm(np.indices(labels.shape) - 20.0, axis=0) < 15] = 3

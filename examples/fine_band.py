@@ -20,7 +20,7 @@ EXPECTED = (0.0, 0.15)
 def main(folder: Path) -> float:
     """Write a picture and an OpenVDB level set; return the largest error of the completed surface."""
     broken = samples.without_patches(samples.torus(n_around=120, n_across=60), 3, 0.2, seed=1)
-    band = sh.solid_distance(broken, spacing=0.03, padding=0.3, band=0.12)
+    band = sh.signed_distance(broken, spacing=0.03, padding=0.3, band=0.12)
     band.save(folder / "torus.vdb")
     surface = band.contour()
 

@@ -20,7 +20,7 @@ def main(folder: Path) -> float:
     sphere = samples.without_patches(samples.sphere(4), n_patches=3, radius=0.5)
     grid = sh.Grid(origin=(-1.5, -1.5, -1.6), spacing=(0.06, 0.06, 0.1), shape=(51, 51, 33))
 
-    sdf = sh.sharpen(sh.signed_distance(sphere, grid))
+    sdf = sh.signed_distance(sphere, grid)
     sdf.save(folder / "distance.nrrd")
 
     again = sh.load_field(folder / "distance.nrrd")

@@ -30,7 +30,7 @@ def main(folder: Path) -> float:
         sh.save(surface, folder / f"{title.split()[0]}.stl")
         assert surface.to_trimesh().is_watertight
     view.save_row(folder / "grow_and_shrink.png", ("in: three holes", duck), *changed.items())
-    return float(np.mean(sh.solid_distance(duck, grid)(changed["eroded by 0.1"].vertices)))
+    return float(np.mean(sh.signed_distance(duck, grid)(changed["eroded by 0.1"].vertices)))
 
 
 if __name__ == "__main__":

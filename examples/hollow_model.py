@@ -23,7 +23,7 @@ def main(folder: Path) -> float:
     view.save_row(
         folder / "hollow_model.png",
         ("in: holes", scan),
-        ("out: distance to the wall", sh.solid_distance(wall, grid), {"across": (1,)}),
+        ("out: distance to the wall", sh.signed_distance(wall, grid), {"across": (1,)}),
         ("out: from outside", wall),
     )
     middle = sh.dilate(scan, 0.0, resolution=96)

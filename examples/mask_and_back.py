@@ -24,7 +24,7 @@ def main(folder: Path) -> float:
 
     voxels = sh.DigitalSurface(mask, spacing=spacing)
     grid = sh.Grid((0, 0, 0), spacing, shape)
-    phi = sh.solid_distance(voxels.squares, grid)
+    phi = sh.signed_distance(voxels.squares, grid)
     grown = sh.DigitalSurface(phi.values < 1.0, spacing=spacing)
 
     view.save_row(

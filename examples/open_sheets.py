@@ -32,7 +32,7 @@ def main(folder: Path) -> float:
         board((0.2, 0.1, 0), (0, 1, 0), (0, 0, 1)),
         board((1.8, 0.1, 0), (0, 1, 0), (0, 0, 1)),
     )
-    phi = sh.solid_distance(table, resolution=72, padding=0.4)
+    phi = sh.signed_distance(table, resolution=72, padding=0.4)
 
     view.save_row(
         folder / "open_sheets.png",

@@ -20,7 +20,7 @@ def main(folder: Path) -> float:
     shape = samples.union(samples.sphere(4, center=(-0.5, 0, 0)), samples.sphere(4, center=(0.5, 0, 0)))
     grid = sh.Grid.around(shape.bounds, 64)
     solid = sh.complete(shape)
-    given, united = sh.sharpen(sh.signed_distance(shape, grid)), solid.field(grid=grid)
+    given, united = sh.sharpen(sh.SignedHeatSolver(grid).distance(shape)), solid.field(grid=grid)
 
     view.save_row(
         folder / "overlapping_bodies.png",

@@ -18,7 +18,7 @@ EXPECTED = (2 * np.pi**2 * 0.4**2, 0.12)
 def main(folder: Path) -> float:
     """Write a picture; return the volume of the surface."""
     cloud = sh.PointCloud(samples.oriented_points(samples.torus(1.0, 0.4), 8000).points)
-    phi = sh.solid_distance(cloud, resolution=72)
+    phi = sh.signed_distance(cloud, resolution=72)
     surface = phi.contour()
 
     view.save_row(

@@ -23,7 +23,7 @@ def main(folder: Path) -> float:
     wall = sh.thicken(bowl, 0.06, resolution=96)
 
     grid = sh.Grid.around(wall.bounds, resolution=96, padding=0.15)
-    solid = sh.solid_distance(wall, grid)
+    solid = sh.signed_distance(wall, grid)
     x, y, _ = np.moveaxis(grid.points, -1, 0)
     drill = sh.GridField(grid, np.hypot(x, y) - 0.2)
     drained = sh.sharpen(solid - drill)

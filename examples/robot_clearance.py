@@ -25,7 +25,7 @@ def main(folder: Path) -> float:
         samples.sphere(3, 0.3, (0.6, 0.95, 0)),
     )
     scan = samples.without_patches(scene, 6, 0.2)
-    phi = sh.solid_distance(scan, resolution=72, padding=0.7)
+    phi = sh.signed_distance(scan, resolution=72, padding=0.7)
 
     start = np.linspace([-1.5, -0.7, 0], [1.5, 0.6, 0], 61)
     path = start.copy()

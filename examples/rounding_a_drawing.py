@@ -35,7 +35,7 @@ def main(folder: Path) -> float:
     """Write a picture; return the quotient of the areas."""
     plate = sh.Polyline(PLATE, closed=True)
     grid = sh.Grid.around(plate.bounds, resolution=220, padding=0.4)
-    phi = sh.sharpen(sh.signed_distance(plate, grid))
+    phi = sh.signed_distance(plate, grid)
     opened, closed = sh.opening(plate, 0.15, grid), sh.closing(plate, 0.15, grid)
 
     figure = view.new_figure(13.5, 3.4)

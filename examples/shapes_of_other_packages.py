@@ -24,7 +24,7 @@ def main(folder: Path) -> float:
         "arrays": (np.asarray(part.vertices), np.asarray(part.faces)),
         "a scene": trimesh.Scene([part]),
     }
-    fields = {name: sh.solid_distance(form, resolution=48) for name, form in forms.items()}
+    fields = {name: sh.signed_distance(form, resolution=48) for name, form in forms.items()}
 
     view.save_row(
         folder / "shapes_of_other_packages.png",

@@ -18,8 +18,8 @@ EXPECTED = (0.125, 0.01)
 def main(folder: Path) -> float:
     """Write a picture; return the largest difference of the fields."""
     grid = sh.Grid((-1.8, -1.4, -1.4), 0.06, (61, 48, 48))
-    ball = sh.solid_distance(samples.sphere(4, 0.8, (-0.5, 0, 0)), grid)
-    ring = sh.solid_distance(samples.torus(0.8, 0.25), grid)
+    ball = sh.signed_distance(samples.sphere(4, 0.8, (-0.5, 0, 0)), grid)
+    ring = sh.signed_distance(samples.torus(0.8, 0.25), grid)
     sharp, smooth = ball | ring, sh.smooth_union(ball, ring, 0.5)
     shown = {
         "union": sharp,

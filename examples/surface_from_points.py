@@ -20,7 +20,7 @@ def main(folder: Path) -> float:
     points = samples.oriented_points(samples.torus(major=1.0, minor=0.4), 1500)
     points.save(folder / "scan.ply")
 
-    sdf = sh.sharpen(sh.signed_distance(sh.read(folder / "scan.ply"), resolution=80))
+    sdf = sh.signed_distance(sh.read(folder / "scan.ply"), resolution=80)
     surface = sdf.contour(0.0)
 
     surface.save(folder / "surface.ply")

@@ -20,7 +20,7 @@ def main(folder: Path) -> float:
     """Write a picture; return the largest error of the offset."""
     half = np.array([1.0, 0.6, 0.01])
     plate = trimesh.creation.box(2 * half)
-    phi = sh.solid_distance(plate, spacing=0.08, padding=0.5)
+    phi = sh.signed_distance(plate, spacing=0.08, padding=0.5)
     offset = phi.offset(0.2)
 
     away = np.abs(offset.vertices) - half

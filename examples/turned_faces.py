@@ -19,7 +19,7 @@ def main(folder: Path) -> float:
     """Write a picture; return the largest error."""
     shape = samples.with_flipped_faces(samples.sphere(5), 0.5)
     grid = sh.Grid.around(shape.bounds, 64)
-    plain, mended = sh.sharpen(sh.signed_distance(shape, grid)), sh.solid_distance(shape, grid)
+    plain, mended = sh.sharpen(sh.SignedHeatSolver(grid).distance(shape)), sh.signed_distance(shape, grid)
     turned = sh.orientation(shape).turned_faces
 
     view.save_row(
@@ -27,7 +27,7 @@ def main(folder: Path) -> float:
         ("half of the faces turned (red)", shape),
         (f"sh.orient: {turned} turned back", sh.orient(shape)),
         ("as they were given", plain, {"shape": shape, "across": (1,)}),
-        ("solid_distance", mended, {"shape": shape, "across": (1,)}),
+        ("signed_distance", mended, {"shape": shape, "across": (1,)}),
     )
     return float(np.abs(np.linalg.norm(grid.points, axis=-1) - 1 - mended.values).max())
 

@@ -27,8 +27,8 @@ def main(folder: Path) -> float:
 
     found = sh.curve_orientation(drawn, mesh)
     assert found.turned.tolist() in ([k % 3 == 0 for k in range(9)], [k % 3 != 0 for k in range(9)])
-    given = sh.signed_distance(drawn, mesh)
-    agreeing = sh.curve_distance(mesh, sh.orient(drawn, mesh), as_oriented=True)
+    given = sh.SignedHeatSolver(mesh).distance(drawn)
+    agreeing = sh.signed_distance(sh.orient(drawn, mesh), mesh, as_oriented=True)
 
     eye = np.array([0.5, -0.6, 0.6])
     view.save_row(
@@ -36,7 +36,7 @@ def main(folder: Path) -> float:
         ("every third piece turned", given, {"sources": drawn, "view": eye}),
         (f"{found.turned.sum()} turned back", agreeing, {"sources": found.curves, "view": eye}),
     )
-    whole = sh.curve_distance(mesh, mesh.polyline(wave[:-1], closed=True)).values
+    whole = sh.signed_distance(mesh.polyline(wave[:-1], closed=True), mesh).values
     return float(np.sqrt(np.mean((agreeing.values - whole) ** 2)))
 
 

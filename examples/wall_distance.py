@@ -24,9 +24,9 @@ def main(folder: Path) -> float:
     solid = blocks | (y < 0.1) | (y > 1.1)
 
     walls = sh.Polyline.from_mask(solid, spacing=grid.spacing)
-    to_walls = ~sh.sharpen(sh.signed_distance([line.reversed() for line in walls], grid))
+    to_walls = ~sh.signed_distance([line.reversed() for line in walls], grid)
     inlet = sh.Polyline([[0.05, 1.1], [0.05, 0.1]])
-    from_inlet = sh.signed_distance(inlet, sh.Grid(grid.origin, grid.spacing, grid.shape, mask=solid), diffusion=1.0)
+    from_inlet = sh.signed_distance(inlet, sh.Grid(grid.origin, grid.spacing, grid.shape, mask=solid))
 
     figure = view.new_figure(9.0, 7.0)
     free = sh.GridField(grid, np.where(solid, np.nan, np.abs(to_walls.values)))

@@ -19,7 +19,7 @@ def main(folder: Path) -> float:
     scan = samples.without_patches(part, 6, 0.3, seed=1)
     scan = samples.with_flipped_faces(samples.with_noise(scan, 0.008, seed=2), 0.1, seed=3)
 
-    phi = sh.solid_distance(scan, resolution=72)
+    phi = sh.signed_distance(scan, resolution=72)
     closed = phi.contour()
     closed.save(folder / "part.stl")
     confidence = sh.GridField(phi.grid, phi.values.clip(max=0.3))

@@ -75,7 +75,7 @@ def curve_on(surface: sh.PolygonMesh | sh.PointCloud | sh.DigitalSurface) -> sh.
 
 def banded() -> sh.GridField:
     """A band after use: its trees are there."""
-    band = sh.solid_distance(samples.without_patches(samples.sphere(2), 2, 0.2), resolution=24, band=0.3)
+    band = sh.signed_distance(samples.without_patches(samples.sphere(2), 2, 0.2), resolution=24, band=0.3)
     assert band.offset(0.1).n_faces and band.closest([[1.2, 0.0, 0.0]]).distances.shape == (1,)
     return band
 
@@ -122,13 +122,13 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "tet field": lambda: sh.SignedHeatSolver(BOX).distance(INNER),
     "grid field": lambda: sh.SignedHeatSolver(grid()).distance(BALL),
     "walled grid's field": lambda: sh.SignedHeatSolver(walled_grid()).distance(BALL),
-    "solid": lambda: sh.solid_distance(BALL, resolution=16),
+    "solid": lambda: sh.signed_distance(BALL, resolution=16),
     "piecewise field": lambda: sh.piecewise_distance(BALL, BALL.path([0, 5])),
     "orientation": lambda: sh.orientation(BALL),
     "completed solid": lambda: sh.complete(samples.without_patches(samples.sphere(2), 2, 0.2)),
     "closest": lambda: sh.complete(samples.sphere(2)).closest([[0.5, 0.0, 0.0]]),
     "band": lambda: banded(),
-    "samples": lambda: sh.sample(sh.solid_distance(BALL, resolution=16), 20),
+    "samples": lambda: sh.sample(sh.signed_distance(BALL, resolution=16), 20),
     "curve orientation": lambda: sh.curve_orientation(RING, BALL),
     "labels": lambda: sh.LabelImage(np.arange(8).reshape(2, 2, 2), np.eye(3), np.zeros(3)),
     "sampling": lambda: sh.Sampling(n=10),

@@ -18,7 +18,7 @@ def runs() -> dict[str, np.ndarray]:
     ball = samples.sphere(1)
     broken = samples.without_faces(ball, 0.2, 0)
     found = {}
-    grid = sh.signed_distance(broken, resolution=9)
+    grid = sh.SignedHeatSolver(sh.Grid.around(broken, 9)).distance(broken)
     found["grid"] = grid.values
     found["sharpened grid"] = sh.sharpen(grid).values
     found["solid on a grid"] = sh.complete(broken).field(grid=grid.grid).values
@@ -31,13 +31,13 @@ def runs() -> dict[str, np.ndarray]:
     found["refined"] = np.sort(sh.intrinsic_delaunay(ball, refine=True).triangles.edge_lengths, axis=None)
     found["points"] = sh.SignedHeatSolver(sh.PointCloud(ball.vertices)).distance(ball.points_at(3)).values
     tets = sh.tetrahedralize(broken, resolution=5)
-    field = sh.signed_distance(broken, tets)
+    field = sh.SignedHeatSolver(tets).distance(broken)
     found["tets"] = field.values
     found["sharpened tets"] = sh.sharpen(field).values
     walls = np.zeros((9, 9), dtype=bool)
     walls[4, :6] = True
     line = sh.Polyline([[0.5, 0.2], [0.2, 7.5]])
-    found["walls"] = sh.signed_distance(line, sh.Grid((0, 0), 1.0, (9, 9), walls)).values
+    found["walls"] = sh.SignedHeatSolver(sh.Grid((0, 0), 1.0, (9, 9), walls)).distance(line).values
     return {name: np.asarray(values, dtype=np.float64).ravel() for name, values in found.items()}
 
 

@@ -33,7 +33,7 @@ FLOORS = [
     {"method", "extrapolation"},
     {"fields"},
     {"solver"},
-    {"extensions", "curves", "solids"},
+    {"extensions", "curves", "solids", "signed_distance"},
     {"io"},
     {"view"},
     {"batches"},

@@ -91,7 +91,7 @@ def test_the_default_is_extrapolated_on_surfaces_alone():
     values = sh.SignedHeatSolver(mesh).distance(curve).values
     assert np.array_equal(values, sh.SignedHeatSolver(mesh, sh.Extrapolated()).distance(curve).values)
     assert not np.allclose(values, sh.SignedHeatSolver(mesh, 1.0).distance(curve).values, atol=1e-6)
-    assert np.array_equal(values, sh.signed_distance(curve, mesh).values)
+    assert np.array_equal(values, sh.SignedHeatSolver(mesh).distance(curve).values)
 
 
 def test_times_of_fine_surfaces_grow_so_that_their_error_falls():

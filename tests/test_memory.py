@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import subprocess
 import sys
@@ -125,12 +124,12 @@ def test_how_much_surface_there_is_counts(monkeypatch):
     one = sh.TriangleMesh(BALL.vertices + 3, BALL.faces)
     at = [(x, y, z) for x in (1, 2.2, 3.4, 4.6) for y in (1, 2.2, 3.4, 4.6) for z in (1, 2.2, 3.4, 4.6)]
     many = samples.union(*(sh.TriangleMesh(0.5 * BALL.vertices + place, BALL.faces) for place in at))
-    sh.signed_distance(one, grid)
+    sh.SignedHeatSolver(grid).distance(one)
     free = memory.libraries() + 32 * grid.n_nodes
     monkeypatch.setattr(memory, "_free", lambda: free)
-    sh.signed_distance(one, grid)
+    sh.SignedHeatSolver(grid).distance(one)
     with refused(sh.MemoryLimitError):
-        sh.signed_distance(many, grid)
+        sh.SignedHeatSolver(grid).distance(many)
 
 
 def test_the_spacing_that_is_proposed_fits_with_the_surface():
@@ -141,7 +140,6 @@ def test_the_spacing_that_is_proposed_fits_with_the_surface():
     assert 0.9 * free < fitting <= free
 
 
-solid_distance = importlib.import_module("signedheat.extensions.solid_distance")
 BENCHMARK = Path(__file__).parents[1] / "benchmarks" / "memory.py"
 
 

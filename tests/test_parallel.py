@@ -44,7 +44,7 @@ def test_a_job_is_reported_on_until_it_ends():
 
 @pytest.mark.parametrize("seen", [lambda fraction, step: None, None])
 def test_sharpening_is_the_same_whoever_watches(seen):
-    mesh, field = sphere(2000), sh.signed_distance(sphere(2000), box(24))
+    mesh, field = sphere(2000), sh.SignedHeatSolver(box(24)).distance(sphere(2000))
     on_surface = sh.SignedHeatSolver(mesh).distance(mesh.path(mesh.edges.vertices[0]))
     for each in (field, on_surface):
         np.testing.assert_array_equal(sh.sharpen(each, progress=seen).values, sh.sharpen(each).values)
@@ -62,7 +62,7 @@ def test_sharpening_stops_when_asked_to(monkeypatch):
 
     begin = time.perf_counter()
     with pytest.raises(Stop):
-        sh.sharpen(sh.signed_distance(sphere(400), box(12)), progress=progress)
+        sh.sharpen(sh.SignedHeatSolver(box(12)).distance(sphere(400)), progress=progress)
     assert time.perf_counter() - begin < 10
 
 

@@ -18,7 +18,7 @@ def surface_of(polydata: object) -> tuple[np.ndarray, np.ndarray]:
 
 
 def our_field(shape: object) -> sh.GridField:
-    return sh.solid_distance(shape, resolution=96, padding=0.35)
+    return sh.signed_distance(shape, resolution=96, padding=0.35)
 
 
 def our_offset(shape: sh.TriangleMesh, distance: float) -> tuple[np.ndarray, np.ndarray]:
@@ -33,27 +33,29 @@ def our_wall() -> tuple[np.ndarray, np.ndarray]:
 
 def our_boolean() -> float:
     grid = sh.Grid((-0.7,) * 3, 1.6 / 95, (96,) * 3)
-    return volume((sh.solid_distance(box(0.5), grid) - sh.solid_distance(box(0.25, (0.5, 0.1, 0.05)), grid)).contour())
+    return volume(
+        (sh.signed_distance(box(0.5), grid) - sh.signed_distance(box(0.25, (0.5, 0.1, 0.05)), grid)).contour()
+    )
 
 
 def our_plane(share: float) -> np.ndarray:
     lines = [sh.Polyline(line) for line in outline(share)]
-    return sh.sharpen(sh.signed_distance(lines, sh.Grid((-1.6, -1.6), 3.2 / 199, (200, 200))))(plane_points())
+    return sh.sharpen(sh.SignedHeatSolver(sh.Grid((-1.6, -1.6), 3.2 / 199, (200, 200))).distance(lines))(plane_points())
 
 
 def our_polygons(share: float) -> np.ndarray:
     mesh = sh.PolygonMesh(*globe())
-    return sh.sharpen(sh.signed_distance([mesh.path(arc) for arc in arcs(share)], mesh)).values
+    return sh.sharpen(sh.SignedHeatSolver(mesh).distance([mesh.path(arc) for arc in arcs(share)])).values
 
 
 def our_points(share: float) -> np.ndarray:
     cloud = sh.PointCloud(globe()[0])
-    return sh.sharpen(sh.signed_distance([cloud.path(arc) for arc in arcs(share)], cloud)).values
+    return sh.sharpen(sh.SignedHeatSolver(cloud).distance([cloud.path(arc) for arc in arcs(share)])).values
 
 
 def our_curve(share: float) -> np.ndarray:
     mesh = globe_triangles()
-    return sh.curve_distance(mesh, [mesh.path(arc) for arc in arcs(share)]).values
+    return sh.signed_distance([mesh.path(arc) for arc in arcs(share)], mesh).values
 
 
 OURS = {
@@ -65,7 +67,7 @@ OURS = {
     "boolean": our_boolean,
     "plane whole": our_plane,
     "plane": our_plane,
-    "geodesic": lambda: sh.curve_distance(globe_triangles(), globe_triangles().points_at(int(ring()[0]))).values,
+    "geodesic": lambda: sh.signed_distance(globe_triangles().points_at(int(ring()[0])), globe_triangles()).values,
     "curve": our_curve,
     "broken curve": our_curve,
     "polygons": our_polygons,

@@ -101,8 +101,9 @@ def accuracy_in_the_plane(page: Page) -> None:
     does, and include that triangulation and all factorisations; UHM runs on the mesh as it is. The convex column is our
     own method for the same objective, on the mesh as it is; it and fast marching, a loop in plain Python, are run on
     the smallest meshes only. The unsigned methods get the true sign for nothing; fast marching starts from exact
-    distances beside the curve. `sh.curve_distance` is what a user would call. UHM is the more accurate one for the star
-    on the finest mesh, where heat rounds its corners off in the signed method too; and it is the fastest everywhere.
+    distances beside the curve. `sh.signed_distance` is what a user would call. UHM is the more accurate one for the
+    star on the finest mesh, where heat rounds its corners off in the signed method too; and it is the fastest
+    everywhere.
     """
     domains = {"disk": shapes.flat_disk, "square": shapes.flat_square}
     curves = {"circle": [circle(0.8, n=400)], "blob": [shapes.blob(480)], "star": [shapes.star()]}
@@ -121,7 +122,7 @@ def draw_planar_fields(page: Page) -> None:
     star = [shapes.placed(mesh, shapes.star())]
     shown = {
         "SHM": (sh.SignedHeatSolver(mesh, 1.0, intrinsic=True).distance(star).restrict(), star),
-        "sh.curve_distance": (sh.curve_distance(mesh, star).restrict(), star),
+        "sh.signed_distance": (sh.signed_distance(star, mesh).restrict(), star),
     }
     page.draw(row_of_surfaces(shown, FROM_ABOVE))
 
@@ -139,7 +140,7 @@ def planar_errors(mesh: sh.TriangleMesh, lines: list[sh.Polyline], slow_ones: bo
 
     ways: dict[str, Callable[[], Array]] = {
         "SHM": lambda: heat().values,
-        "curve_distance": lambda: sh.curve_distance(mesh, curves).restrict().values,
+        "signed_distance": lambda: sh.signed_distance(curves, mesh).restrict().values,
         "UHM": lambda: sign * np.abs(baselines.unsigned_heat(mesh, curves)),
     }
     if slow_ones:
@@ -160,7 +161,7 @@ def planar_errors(mesh: sh.TriangleMesh, lines: list[sh.Polyline], slow_ones: bo
 def convergence(page: Page) -> None:
     """Twenty generated bumpy surfaces, five of them tori, of irregular triangles, Loop-subdivided four times; at each
     level the level set of one smooth function is the source. Truth is exact polyhedral distance to the zero line of
-    that function, which is what `sh.curve_distance` computes (it differs from that by 10⁻⁵ % at most). Order: slope of
+    that function, which is what `sh.signed_distance` computes (it differs from that by 10⁻⁵ % at most). Order: slope of
     log ε against the log of the mean edge length. The paper finds about 1 for all methods. At t = h² heat falls by a
     factor e along an edge, which triangles do not resolve: directions far from the source keep an error of the size
     h²/t, which depends on the triangles' shapes and not on their size, so that one time alone converges more slowly. A
@@ -178,7 +179,7 @@ def convergence(page: Page) -> None:
     eigenfunctions, is `python -m benchmarks.convergence MESH ...`. On eleven scans ε of the default falls at every
     level for all 33 sources, from 0.72 to 0.059 % in the median, with orders from 0.60 to 1.06, median 0.88, 15 of
     them at least 0.9; that of one time falls for 26, to 0.15 %, with orders from 0.18 to 0.78, median 0.55.
-    `sh.curve_distance` is exact (10⁻⁴ %) at every level. What is left lies within some ten edges of where directions
+    `sh.signed_distance` is exact (10⁻⁴ %) at every level. What is left lies within some ten edges of where directions
     turn back: that place comes from comparing heat that has fallen along two paths, which is the less exact the longer
     they are. Even the best times at each level, chosen by the error, would leave one source on a femur at an order of
     0.6; each other way that was tried (shorter times there, directions carried on from where they are sure, φ's own
@@ -241,13 +242,13 @@ def broken_curves_on_surfaces(page: Page) -> None:
     """The paper compares with repairing a curve first: surface winding numbers (SWN, Feng et al. 2023) give the sign,
     exact polyhedral distance to what is left the rest. Here five surfaces, ten seeds each, a closed curve in
     about twelve pieces, damaged in seven ways (`benchmarks/broken_curves.py`; all but the first three with 25 % gone).
-    ε as median / worst over the fifty cases; in brackets, how often a program failed. `sh.curve_distance` also turns
+    ε as median / worst over the fifty cases; in brackets, how often a program failed. `sh.signed_distance` also turns
     pieces and leaves out what belongs to no other; heat is the method alone, zero set the same sharpened. This takes
     seven minutes. Against the method alone SWN × exact wins where little is gone, since most of the surface is nearer
-    to what is left than to a gap, where pieces were moved, and where few are turned; against `sh.curve_distance`,
+    to what is left than to a gap, where pieces were moved, and where few are turned; against `sh.signed_distance`,
     which measures to what is left too, nowhere.
     """
-    names = {"one call": "curve_distance", "nearest": "nearest side × exact", "winding": "SWN × exact"}
+    names = {"one call": "signed_distance", "nearest": "nearest side × exact", "winding": "SWN × exact"}
     errors = broken_curves.study(10)
     for damage in broken_curves.DAMAGES:
         ways = {
@@ -258,13 +259,13 @@ def broken_curves_on_surfaces(page: Page) -> None:
 
 
 def draw_broken_curves(page: Page) -> None:
-    """The five surfaces, a third of the pieces turned, and what `sh.curve_distance` makes of them."""
+    """The five surfaces, a third of the pieces turned, and what `sh.signed_distance` makes of them."""
     shown = {}
     for name, (mesh, heights) in broken_curves.meshes().items():
         curve = max(mesh.level_set(heights, 0.0), key=lambda each: each.n_points)
         options = broken_curves.DAMAGES["30 % turned"]
         pieces = broken_curves.damaged(mesh, heights, curve, np.random.default_rng(0), **options)
-        shown[name] = sh.curve_distance(mesh, pieces), pieces
+        shown[name] = sh.signed_distance(pieces, mesh), pieces
     page.draw(row_of_surfaces(shown), width=1500)
 
 

@@ -53,15 +53,15 @@ def completed_surfaces(page: Page) -> None:
     GWN jumps at every face and so must follow the noise; GSD may interpolate its input (constraint `ZeroSet`) or
     approximate it (`Free`). Deviation: root mean square distance of the completed surface's vertices from the whole
     duck, in per cent of its length. Where the surface is there and clean, GWN with exact distance is the more exact
-    way, and it is what `sh.solid_distance` does there.
+    way, and it is what `sh.signed_distance` does there.
     """
     broken = scanned_duck()
     grid = sh.Grid.around(broken.bounds, resolution=72, padding=0.3)
     winding = baselines.solid_winding(grid.points.reshape(-1, 3), broken).reshape(grid.shape)
     fields = {
         "GWN, level ½": sh.GridField(grid, 0.5 - winding),
-        "GSD, interpolating": sh.signed_distance(broken, grid, constraint=sh.ZeroSet()),
-        "GSD, approximating": sh.signed_distance(broken, grid, constraint=sh.Free()),
+        "GSD, interpolating": sh.SignedHeatSolver(grid).distance(broken, sh.ZeroSet()),
+        "GSD, approximating": sh.SignedHeatSolver(grid).distance(broken, sh.Free()),
     }
     picture = new_figure(15, 4.2)
     draw_shape(broken, picture.add_subplot(1, 4, 1))
@@ -89,8 +89,8 @@ def offsets_of_broken_surfaces(page: Page) -> None:
     winding = baselines.solid_winding(points, broken)
     signed = baselines.to_faces(points, broken) * np.where(winding > 0.5, -1, 1)
     fields = {
-        "method alone": sh.signed_distance(broken, grid),
-        "sh.solid_distance": sh.solid_distance(broken, grid),
+        "method alone": sh.SignedHeatSolver(grid).distance(broken),
+        "sh.signed_distance": sh.signed_distance(broken, grid),
         "winding sign × exact distance": sh.GridField(grid, signed.reshape(grid.shape)),
     }
     picture = new_figure(15, 4.2)
@@ -123,7 +123,7 @@ def diffusion_times(page: Page) -> None:
     whole = exact_in_plane(grid, shapes.blob()) < 0
     picture = new_figure(15, 4.2)
     for k, diffusion in enumerate((1.0, 30.0, 1000.0)):
-        field = sh.signed_distance(lines, grid, diffusion=diffusion)
+        field = sh.SignedHeatSolver(grid, diffusion=diffusion).distance(lines)
         inside = field.values.ravel() < 0
         share = [100 * float(np.mean(inside ^ other) / np.mean(whole)) for other in (straight, harmonic, whole)]
         names = ("from pseudonormals %", "from winding numbers %", "from the whole shape %")
@@ -148,7 +148,7 @@ def signing_unsigned_distance(page: Page) -> None:
         lines = shapes.broken_blob(gaps, share)
         distance, _, _ = baselines.to_segments(points, lines)
         signed = distance * np.where(baselines.planar_winding(points, lines) > 0.5, -1, 1)
-        field = sh.signed_distance(lines, grid)
+        field = sh.SignedHeatSolver(grid).distance(lines)
         ways = {
             "winding sign": signed,
             "pseudonormal sign": baselines.pseudonormal_distance(points, lines),
@@ -177,7 +177,7 @@ def joins_of_strokes(page: Page) -> None:
     sides = [sh.Polyline([a + 0.3 * t, b - 0.3 * t]) for a, b, t in zip(corners, ends, along, strict=True)]
     picture = new_figure(15, 6)
     for k, diffusion in enumerate((1.0, 10.0, 100.0)):
-        field = sh.signed_distance(sides, resolution=140, padding=0.8, diffusion=diffusion)
+        field = sh.SignedHeatSolver(sh.Grid.around(sides, 140, padding=0.8), diffusion=diffusion).distance(sides)
         outline = max(field.contour(0.0), key=lambda line: line.length)
         page.add(
             **{"t / h²": f"{diffusion:g}"},
@@ -220,7 +220,7 @@ def broken_geometry_on_tets(page: Page) -> None:
     """GWN and GSD at the vertices of one tet mesh. Both give a completed surface; only GSD gives distance as well, and
     its level sets stay closed away from zero. ε: at the vertices, against exact distance to the whole duck.
     Winding sign × exact distance to what is there is a strong baseline where the faces that are left are exact and lie
-    everywhere: it wins in the last two rows. With holes and noise sharpened GSD is the better one. `sh.solid_distance`
+    everywhere: it wins in the last two rows. With holes and noise sharpened GSD is the better one. `sh.signed_distance`
     measures to the faces as well; it differs at 51 vertices alone, where beak and head overlap: the truth here counts
     the faces inside, and the union has none.
     """
@@ -236,13 +236,13 @@ def broken_geometry_on_tets(page: Page) -> None:
         exact = to_duck(points) * np.where(inside, -1, 1)
         near = baselines.to_faces(points, broken)
         signed = near * np.where(baselines.solid_winding(points, broken) > 0.5, -1, 1)
-        field = sh.signed_distance(broken, mesh)
+        field = sh.SignedHeatSolver(mesh).distance(broken)
         page.add(
             input=name,
             tets=mesh.n_tets,
             **{"GSD ε %": baselines.error(field.values, exact)},
             **{"sharpened ε %": baselines.error(sh.sharpen(field).values, exact)},
-            **{"solid distance ε %": baselines.error(sh.solid_distance(broken, mesh).values, exact)},
+            **{"solid distance ε %": baselines.error(sh.signed_distance(broken, mesh).values, exact)},
             **{"GWN sign × distance ε %": baselines.error(signed, exact)},
         )
         if name.startswith("8 holes"):
@@ -270,7 +270,7 @@ def natural_completion(page: Page) -> None:
     winding = baselines.solid_winding(grid.points.reshape(-1, 3), cup).reshape(grid.shape)
     fields = {"GWN, level ½": sh.GridField(grid, 0.5 - winding)}
     for diffusion in (1.0, 10.0, 100.0):
-        fields[f"GSD, t = {diffusion:g} h²"] = sh.signed_distance(cup, grid, diffusion=diffusion)
+        fields[f"GSD, t = {diffusion:g} h²"] = sh.SignedHeatSolver(grid, diffusion=diffusion).distance(cup)
     picture = new_figure(15, 4)
     for k, (name, field) in enumerate(fields.items()):
         surface = field.contour(0.0)

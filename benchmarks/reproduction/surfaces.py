@@ -157,10 +157,10 @@ def curves_that_bound_nothing(page: Page) -> None:
 @figure("17", "Failing gracefully")
 def failing_gracefully(page: Page) -> None:
     """One closed curve on a bumpy sphere, damaged in the three ways of the figure, more and more. ε against exact
-    distance from the whole curve (the paper gives its own as colours only). Beside it `sh.curve_distance`, which also
+    distance from the whole curve (the paper gives its own as colours only). Beside it `sh.signed_distance`, which also
     turns pieces and leaves out what belongs to no other; and a baseline that nobody can have: exact distance to what is
     left, with the true sign of the whole curve. It beats heat alone where little is gone, since most of the surface is
-    nearer to what is left than to a gap, and where curves were shifted; `sh.curve_distance` is as good there, and
+    nearer to what is left than to a gap, and where curves were shifted; `sh.signed_distance` is as good there, and
     better elsewhere.
     """
     mesh = shapes.subdivided(shapes.organic(4, 700), 1)
@@ -189,7 +189,7 @@ def failing_gracefully(page: Page) -> None:
         field = solver.distance(curves)
         found = {
             "heat ε %": field.values,
-            "curve_distance ε %": sh.curve_distance(mesh, curves).values,
+            "signed_distance ε %": sh.signed_distance(curves, mesh).values,
             "exact to what is left, true sign ε %": np.copysign(baselines.to_curves(mesh, curves), exact),
         }
         page.add(damage=name, **{way: baselines.error(values, exact, weights) for way, values in found.items()})

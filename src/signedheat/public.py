@@ -5,7 +5,6 @@ from .batches.manifest import Outcome
 from .batches.run import Batch, batch
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.close import close_curves
-from .curves.distance import curve_distance
 from .curves.orientation import CurveOrientation, curve_orientation
 from .diagnostics import Diagnostics
 from .domains.common_subdivision import common_subdivision
@@ -42,7 +41,6 @@ from .extensions.piecewise import piecewise_distance
 from .extensions.sampling import Samples, sample
 from .extensions.sharpening import sharpen
 from .extensions.sharpening_methods import Convex, Geodesic
-from .extensions.solid_distance import solid_distance
 from .extensions.tetrahedralize import tetrahedralize
 from .extrapolation import Extrapolated
 from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
@@ -67,9 +65,10 @@ from .io import (
     write_polylines,
     write_vdb,
 )
+from .signed_distance import signed_distance
 from .solids.complete import complete
 from .solids.solid import Solid
-from .solver import SignedHeatSolver, signed_distance
+from .solver import SignedHeatSolver
 from .view import new_figure as _new_figure  # noqa: F401  provides notebooks and windows
 
 __all__ = [
@@ -125,7 +124,6 @@ __all__ = [
     "closing",
     "common_subdivision",
     "complete",
-    "curve_distance",
     "curve_orientation",
     "dilate",
     "erode",
@@ -152,7 +150,6 @@ __all__ = [
     "smooth_difference",
     "smooth_intersection",
     "smooth_union",
-    "solid_distance",
     "tetrahedralize",
     "thicken",
     "transform",

@@ -16,7 +16,7 @@ from .domains.foreign import ForeignShape, as_shapes, converted
 from .domains.given_curves import given_curves
 from .domains.grid import Dimension, Grid
 from .domains.intrinsic_triangulation import triangle_mesh
-from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources
+from .domains.kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .domains.tet_mesh import TetMesh
 from .domains.validation import positive_number
 from .errors import SignedHeatError, SourceError, UnsupportedTypeError
@@ -26,7 +26,6 @@ from .fields.tet_field import TetField
 from .fields.to_field import Field, to_field, warned
 from .fields.vertex_field import VertexField
 from .frozen import Frozen
-from .lowering.area_elements import grid_around
 from .lowering.surface.intrinsic import Retriangulated, lowered_by_angles
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .progress import Progress, Stopwatch
@@ -254,125 +253,3 @@ def as_list(sources: One | Sequence[One]) -> list[One]:
             remedy="pass at least one curve, point or shape",
         )
     return listed
-
-
-@overload
-def signed_distance(
-    source: Shapes,
-    domain: None = None,
-    *,
-    resolution: int = 128,
-    padding: float | None = None,
-    constraint: Constraint | None = None,
-    diffusion: Diffusion | None = None,
-    progress: Progress | None = None,
-) -> GridField[Literal[3]]: ...
-@overload
-def signed_distance(
-    source: Polylines,
-    domain: None = None,
-    *,
-    resolution: int = 128,
-    padding: float | None = None,
-    constraint: Constraint | None = None,
-    diffusion: Diffusion | None = None,
-    progress: Progress | None = None,
-) -> GridField[Literal[2]]: ...
-@overload
-def signed_distance(
-    source: SpaceSources,
-    domain: Grid[Dimension],
-    *,
-    constraint: Constraint | None = None,
-    diffusion: Diffusion | None = None,
-    progress: Progress | None = None,
-) -> GridField[Dimension]: ...
-@overload
-def signed_distance(
-    source: Shapes,
-    domain: TetMesh,
-    *,
-    constraint: Constraint | None = None,
-    diffusion: Diffusion | None = None,
-    progress: Progress | None = None,
-) -> TetField: ...
-@overload
-def signed_distance(
-    source: CurvesAndPoints,
-    domain: AnySurface,
-    *,
-    constraint: Constraint | None = None,
-    diffusion: Diffusion | None = None,
-    progress: Progress | None = None,
-) -> VertexField[AnySurface]: ...
-@overload
-def signed_distance(
-    source: Sources,
-    domain: Domain | ForeignShape | None,
-    *,
-    resolution: int = 128,
-    padding: float | None = None,
-    constraint: Constraint | None = None,
-    diffusion: Diffusion | None = None,
-    progress: Progress | None = None,
-) -> Field: ...
-def signed_distance(
-    source: Sources,
-    domain: Domain | ForeignShape | None = None,
-    *,
-    resolution: int = 128,
-    padding: float | None = None,
-    constraint: Constraint | None = None,
-    diffusion: Diffusion | None = None,
-    progress: Progress | None = None,
-) -> Field:
-    """Signed distance to a shape, however broken, in one call.
-
-    Parameters
-    ----------
-    source : TriangleMesh, PolygonMesh, PointCloud with normals or Polyline, or a sequence of them
-        The shape; in the plane a `Polyline`. Objects of trimesh, PyVista, meshio and Open3D and pairs (vertices, faces)
-        are taken wherever a shape is. If a domain is given, any source of `SignedHeatSolver.distance` on it.
-    domain : Grid, TetMesh, TriangleMesh, …, optional
-        Where distance is measured; by default on a grid of cubic cells around the shape.
-    resolution : int
-        Number of nodes along the longest side of that grid.
-    padding : float, optional
-        Least distance between the shape and the boundary of that grid; by default a fifth of its longest side.
-    constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-        Imposed on φ at the source; `ZeroSet` by default.
-    diffusion : float or Extrapolated, optional
-        τ in ``t = τ h²``. Larger values close gaps in broken shapes along rounder surfaces. By default as that of
-        `SignedHeatSolver`.
-    progress : callable, optional
-        Called as ``progress(fraction, step)``; an exception that it raises cancels.
-
-    Returns
-    -------
-    GridField, TetField or VertexField
-        φ > 0 on the side that the normals point to: negative inside a shape whose normals point outwards.
-
-    Raises
-    ------
-    GeometryError
-        If resolution or padding are out of range.
-    SourceError
-        If the shape cannot be a source, for instance points without normals.
-    MemoryLimitError
-        If the grid does not fit in memory; raised before anything is allocated.
-
-    Examples
-    --------
-    >>> from signedheat import TriangleMesh
-    >>> octahedron = TriangleMesh(
-    ...     [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]],
-    ...     [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
-    ... )
-    >>> sdf = signed_distance(octahedron, resolution=24)
-    >>> sdf([[0, 0, 0], [1.2, 0, 0]]) > 0
-    array([False,  True])
-    """
-    if domain is None:
-        source = as_list(source)
-        domain = grid_around(source, resolution, padding)
-    return warned(SignedHeatSolver(domain, diffusion, progress)._distance(source, constraint))

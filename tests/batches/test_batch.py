@@ -118,7 +118,7 @@ def test_results_do_not_depend_on_the_number_of_workers(tmp_path):
     figures = batch.outcomes[1].figures
     assert figures["surfaces"][0]["distance"] == 0.1 and figures["samples"]["samples"] == 300
     assert figures["info"]["kind"] == "TriangleMesh" and figures["field"]["notes"]["shape_oriented"]
-    field = sh.solid_distance(sh.read(tmp_path / "in1.ply"), sh.load_field(one / "in1.npy").grid)
+    field = sh.signed_distance(sh.read(tmp_path / "in1.ply"), sh.load_field(one / "in1.npy").grid)
     np.testing.assert_array_equal(sh.load_field(one / "in1.npy").values, field.values)
 
 

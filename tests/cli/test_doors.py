@@ -71,7 +71,7 @@ def test_a_measure_of_ones_own(tmp_path):
 
     def measure(shape, grid):
         asked.append(shape)
-        return sh.solid_distance(shape, grid)
+        return sh.signed_distance(shape, grid)
 
     ball = samples.sphere(2)
     same = sh.closing(ball, 0.1, resolution=20, measure=measure)

@@ -60,7 +60,7 @@ def folder(tmp_path_factory):
     ball = samples.sphere(1)
     sh.save(ball, made / "ball.stl")
     (made / "curves.csv").write_text("1,0,0\n0,1,0\n")
-    sh.signed_distance(ball, resolution=6).save(made / "field.npz")
+    sh.SignedHeatSolver(sh.Grid.around(ball, 6)).distance(ball).save(made / "field.npz")
     return made
 
 

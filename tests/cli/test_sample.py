@@ -22,7 +22,7 @@ def test_samples_of_a_shape(tmp_path, ball, capsys):
     options = ["-n", "2000", "--near", "0.5", "--widths", "0.1", "0.01", "--seed", "3", "--resolution", "32"]
     assert main(["sample", ball, "-o", output, *options, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    field = sh.solid_distance(sh.read(ball), resolution=32)
+    field = sh.signed_distance(sh.read(ball), resolution=32)
     same = sh.sample(field, 2000, near=0.5, widths=[0.1, 0.01], seed=3)
     with np.load(output) as arrays:
         np.testing.assert_array_equal(arrays["points"], same.points)

@@ -66,7 +66,7 @@ def test_volume_is_sharpened_unless_plain(tmp_path, ball):
     plain = sh.load_field(papers)
     grid = plain.grid
     np.testing.assert_array_equal(plain.values, sh.SignedHeatSolver(grid, diffusion=4.0).distance(sh.read(ball)).values)
-    solid = sh.solid_distance(sh.read(ball), grid, diffusion=4.0)
+    solid = sh.signed_distance(sh.read(ball), grid, diffusion=4.0)
     np.testing.assert_array_equal(sh.load_field(ours).values, solid.values)
 
 
@@ -271,7 +271,7 @@ def test_bad_shapes_raise_in_python(tmp_path, name, error):
     (tmp_path / name).write_bytes(BAD_SHAPES[name][0])
     shape = sh.read(tmp_path / name)
     with pytest.raises(sh.SignedHeatError) as caught:
-        sh.signed_distance(shape, resolution=16)
+        sh.SignedHeatSolver(sh.Grid.around(shape, 16)).distance(shape)
     assert isinstance(caught.value, (error, sh.SourceError))
 
 
@@ -283,7 +283,7 @@ def test_grids_that_cannot_be(tmp_path, ball, capsys):
     assert "GB" in fail(capsys, "volume", ball, "-o", str(output), "--spacing", "1e-9")
     assert time.perf_counter() - begin < 5
     with refused(sh.MemoryLimitError):
-        sh.signed_distance(sh.read(ball), resolution=40_000)
+        sh.SignedHeatSolver(sh.Grid.around(sh.read(ball), 40_000)).distance(sh.read(ball))
     assert output.read_text() == "precious"
 
 

@@ -49,7 +49,7 @@ def test_a_shape_goes_through_a_pipe(tmp_path):
     assert np.linalg.norm(sh.read(tmp_path / "grown.obj").vertices, axis=1) == pytest.approx(1.5, abs=0.05)
     done = run("volume", "-", "-o", "-", "--json", *arguments, data=ball.read_bytes())
     with np.load(io.BytesIO(done.stdout)) as arrays:
-        same = sh.solid_distance(sh.read(ball), resolution=20)
+        same = sh.signed_distance(sh.read(ball), resolution=20)
         np.testing.assert_array_equal(arrays["values"], same.values)
     told = run("info", "-", data=ball.read_bytes()).stdout
     assert b"162" in told and b"standard input" in told and b"input.ply" not in told

@@ -35,7 +35,7 @@ def test_no_signs_cost_less_than_the_minimum_cut(seed):
 def wrong_share(drawing: strokes.Drawing, values: np.ndarray) -> float:
     """Share of the area on the wrong side, two edges or more from the curves: they are drawn by hand."""
     mesh = drawing.mesh
-    exact = np.abs(sh.curve_distance(mesh, drawing.whole, as_oriented=True).values)
+    exact = np.abs(sh.signed_distance(drawing.whole, mesh, as_oriented=True).values)
     areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), mesh.n_vertices)
     wrong = (np.sign(values) != drawing.sides) & (exact > 2 * strokes.edge_length(mesh))
     return float(areas[wrong].sum() / areas.sum())
@@ -45,7 +45,7 @@ def wrong_share(drawing: strokes.Drawing, values: np.ndarray) -> float:
 @pytest.mark.parametrize("seed", range(3))
 def test_strokes_are_right_without_a_warning(damage, seed):
     drawing = strokes.drawing(np.random.default_rng(seed), damage, 3)
-    assert wrong_share(drawing, sh.curve_distance(drawing.mesh, drawing.given).values) < 0.03
+    assert wrong_share(drawing, sh.signed_distance(drawing.given, drawing.mesh).values) < 0.03
 
 
 @pytest.mark.parametrize("damage", ["long_strays", "scribbles", "loop_turned"])
@@ -54,7 +54,7 @@ def test_what_belongs_nowhere_is_left_out_or_told(damage, seed):
     drawing = strokes.drawing(np.random.default_rng(seed), damage, 3)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        phi = sh.curve_distance(drawing.mesh, drawing.given)
+        phi = sh.signed_distance(drawing.given, drawing.mesh)
     assert told or wrong_share(drawing, phi.values) < 0.06
 
 

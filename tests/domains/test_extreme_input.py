@@ -69,7 +69,7 @@ def test_sizes_beyond_computing_are_refused(make, scale):
 def test_sizes_within_give_the_same_distances(scale):
     mesh = sh.TriangleMesh(scale * BALL.vertices, BALL.faces)
     ring = BALL.level_set(BALL.vertices[:, 2], 0.1)
-    one, other = sh.signed_distance(ring, BALL), sh.signed_distance(ring, mesh)
+    one, other = sh.SignedHeatSolver(BALL).distance(ring), sh.SignedHeatSolver(mesh).distance(ring)
     np.testing.assert_allclose(other.values / scale, one.values, rtol=1e-9, atol=1e-12)
 
 
@@ -123,7 +123,7 @@ def test_wide_neighbourhoods_of_voxels_cost_no_memory(radius):
     outward = surface.vertices[surface.surfels.corners].mean(axis=1)
     outward -= outward.mean(axis=0)
     assert ((surface.normals * outward).sum(axis=1) / np.linalg.norm(outward, axis=1)).min() > 0.9
-    field = sh.signed_distance(surface.points_at(0), surface)
+    field = sh.SignedHeatSolver(surface).distance(surface.points_at(0))
     assert np.isfinite(field.values).all()
 
 
@@ -210,7 +210,9 @@ def test_grids_whose_spacing_is_lost_in_rounding_are_refused(origin):
     with refused(sh.GeometryError, "spacing"):
         sh.DigitalSurface(np.ones((2, 2, 2), dtype=bool), origin=(0, origin, 0))
     with pytest.raises(sh.GeometryError):
-        sh.signed_distance(sh.TriangleMesh(BALL.vertices + origin, BALL.faces), resolution=16)
+        sh.SignedHeatSolver(sh.Grid.around(sh.TriangleMesh(BALL.vertices + origin, BALL.faces), 16)).distance(
+            sh.TriangleMesh(BALL.vertices + origin, BALL.faces)
+        )
 
 
 def test_flat_tets_among_others_do_no_harm():
@@ -220,7 +222,7 @@ def test_flat_tets_among_others_do_no_harm():
     flat = sh.TetMesh(vertices, lattice.tets)
     source = sh.TriangleMesh([[0.2, 0.3, -1], [1.6, 0.4, -1], [0.9, 0.8, 1]], [[0, 1, 2]])
     try:
-        field = sh.signed_distance(source, flat)
+        field = sh.SignedHeatSolver(flat).distance(source)
         sharp = sh.sharpen(field)
     except sh.SignedHeatError as error:
         assert error.remedy or error.element
@@ -274,9 +276,9 @@ def test_solids_of_any_size_are_the_same_or_refused(scale, whole):
     """Squares in single precision left its range: wrong distances, and at last a crash."""
     ball = sphere(2)
     faces = ball.faces if whole else ball.faces[np.arange(ball.n_faces) % 7 > 0]
-    one = sh.solid_distance(sh.TriangleMesh(ball.vertices, faces), resolution=16)
+    one = sh.signed_distance(sh.TriangleMesh(ball.vertices, faces), resolution=16)
     try:
-        other = sh.solid_distance(sh.TriangleMesh(scale * ball.vertices, faces), resolution=16)
+        other = sh.signed_distance(sh.TriangleMesh(scale * ball.vertices, faces), resolution=16)
     except sh.GeometryError as error:
         assert error.remedy and not 1e-15 <= scale <= 1e15
     else:
@@ -298,7 +300,7 @@ def test_the_nearest_place_is_right_however_far_a_point_is(size, times):
 
 def test_points_whose_squares_cannot_be_computed_are_refused():
     ball = sphere(2)
-    field = sh.solid_distance(ball, resolution=12)
+    field = sh.signed_distance(ball, resolution=12)
     for measure in (complete(ball).closest, complete(ball).distance, field.closest):
         with pytest.raises(sh.GeometryError):
             measure([[1e160, 0.0, 0.0]])

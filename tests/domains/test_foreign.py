@@ -67,7 +67,6 @@ def test_shapes_of_other_packages_keep_vertices_and_faces(make):
 TAKERS = {
     "signed_distance": lambda shape: sh.signed_distance(shape, resolution=12).values,
     "signed_distance of several": lambda shape: sh.signed_distance([shape], resolution=12).values,
-    "solid_distance": lambda shape: sh.solid_distance(shape, resolution=12).values,
     "solver": lambda shape: sh.SignedHeatSolver(sh.Grid.around(BALL.bounds, 12)).distance(shape).values,
     "many": lambda shape: sh.SignedHeatSolver(sh.Grid.around(BALL.bounds, 12)).distance_many([shape])[0].values,
     "grid": lambda shape: sh.Grid.around(shape, 12).origin,
@@ -77,8 +76,8 @@ TAKERS = {
     "shell": lambda shape: sh.shell(shape, -0.3, 0.3, resolution=16).vertices,
     "thicken": lambda shape: sh.thicken(shape, 0.4, resolution=16).vertices,
     "tetrahedralize": lambda shape: sh.tetrahedralize(shape, resolution=2).vertices,
-    "domain": lambda shape: sh.signed_distance(BALL.points_at(0), shape).values,
-    "curve_distance": lambda shape: sh.curve_distance(shape, RING).values,
+    "domain": lambda shape: sh.SignedHeatSolver(shape).distance(BALL.points_at(0)).values,
+    "signed_distance of curves": lambda shape: sh.signed_distance(RING, shape).values,
     "piecewise_distance": lambda shape: sh.piecewise_distance(shape, RING).values,
     "close_curves": lambda shape: sh.close_curves(shape, ARCS)[0].barycentric,
     "orient curves": lambda shape: sh.orient(ARCS, shape)[1].faces,
@@ -104,7 +103,7 @@ def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
         again = sh.read_curves(tmp_path / f"{name}.txt", given)
         assert np.abs(places_of(again[1]) - places_of(ARCS[1])).max() < 1e-12
         view.save_scene(given, tmp_path / f"{name}.png")
-        view.save_slices(sh.solid_distance(BALL, resolution=12), tmp_path / f"{name}-slices.png", given)
+        view.save_slices(sh.signed_distance(BALL, resolution=12), tmp_path / f"{name}-slices.png", given)
         view.save_row(tmp_path / f"{name}-row.png", ("ball", given))
         pictures[name] = [(tmp_path / f"{name}{end}.png").read_bytes() for end in ("", "-slices", "-row")]
     assert pictures["own"] == pictures["trimesh"] == pictures["arrays"]
@@ -162,7 +161,7 @@ def test_points_and_meshes_go_to_open3d_and_back():
     assert told.value.element == "LineSet" and told.value.remedy
 
 
-@pytest.mark.parametrize("take", [sh.as_shape, sh.signed_distance, sh.solid_distance, sh.TriangleMesh.from_trimesh])
+@pytest.mark.parametrize("take", [sh.as_shape, sh.signed_distance, sh.TriangleMesh.from_trimesh])
 def test_what_is_no_shape_is_refused_with_a_remedy(take):
     lines = trimesh.load_path(np.array([[0.0, 0], [1, 1]]))
     for wrong in ("ball.stl", 3.0, lines):
@@ -201,7 +200,7 @@ def test_meshes_of_meshio_without_faces_are_points():
 
 @pytest.mark.parametrize(("thing", "named"), [("part.stl", "sh.read"), (np.zeros((4, 3)), "PointCloud")])
 def test_paths_and_bare_points_are_told_what_to_pass(thing, named):
-    for take in (sh.solid_distance, sh.as_shape):
+    for take in (sh.signed_distance, sh.as_shape):
         with refused(sh.SignedHeatError) as caught:
             take(thing)
         assert named in caught.value.remedy
@@ -210,7 +209,7 @@ def test_paths_and_bare_points_are_told_what_to_pass(thing, named):
 @pytest.mark.parametrize(("kind", "corners"), [("line", 2), ("hexahedron", 8)])
 def test_lines_and_other_cells_of_meshio_are_no_points(kind, corners):
     cells = meshio.Mesh(BALL.vertices, [(kind, np.arange(2 * corners).reshape(2, corners))])
-    for take in (sh.as_shape, sh.solid_distance, sh.TriangleMesh.from_meshio):
+    for take in (sh.as_shape, sh.signed_distance, sh.TriangleMesh.from_meshio):
         with refused(sh.UnsupportedTypeError, "Mesh") as caught:
             take(cells)
         assert kind in caught.value.remedy

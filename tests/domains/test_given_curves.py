@@ -40,7 +40,7 @@ def test_elements_are_numbered_as_potpourri3d_does():
     theirs = solver.compute_distance([path], preserve_source_normals=False, level_set_constraint="ZeroSet")
     ours = sh.SignedHeatSolver(BALL, 1.0, intrinsic=False).distance(path, sh.ZeroSet(hard=True)).values
     np.testing.assert_allclose(ours, theirs, atol=1e-8)
-    assert sh.curve_distance(BALL, [curve]).values.shape == (BALL.n_vertices,)
+    assert sh.signed_distance([curve], BALL).values.shape == (BALL.n_vertices,)
 
 
 def pp3d_path(pp3d):
@@ -61,11 +61,11 @@ def pp3d_path(pp3d):
 def test_points_of_elements_lie_where_they_should():
     elements, places = as_elements(BALL, 7, 33, 100)
     np.testing.assert_allclose(BALL.positions(curve_of_elements(BALL, elements)), places, atol=1e-15)
-    one = sh.curve_distance(BALL, elements)
-    for other in (sh.curve_distance(BALL, [elements]), sh.curve_distance(BALL, curve_of_elements(BALL, elements))):
+    one = sh.signed_distance(elements, BALL)
+    for other in (sh.signed_distance([elements], BALL), sh.signed_distance(curve_of_elements(BALL, elements), BALL)):
         np.testing.assert_array_equal(one.values, other.values)
     with refused(sh.SourceError, "point 1"):
-        sh.curve_distance(BALL, [(3, []), (10**6, [0.5])])
+        sh.signed_distance([(3, []), (10**6, [0.5])], BALL)
 
 
 def test_positions_of_curves():
@@ -81,7 +81,11 @@ def test_positions_of_curves():
     sh.Curve([3, 3], [[0.2, 0.3, 0.5]] * 2), BALL.path([5, 5]), BALL.polyline([[0, 0, 1], [0, 0, 1]]),
 ])  # fmt: skip
 @pytest.mark.parametrize(
-    "measure", [sh.curve_distance, lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves)]
+    "measure",
+    [
+        lambda mesh, curves: sh.signed_distance(curves, mesh),
+        lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
+    ],
 )
 def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):
     alone, with_click = measure(BALL, [RING]), measure(BALL, [RING, click])
@@ -94,10 +98,12 @@ def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):
 
 def test_what_is_misplaced_is_named():
     with refused(sh.UnsupportedTypeError):
-        sh.curve_distance(BALL.vertices, BALL.faces, RING)
+        sh.signed_distance(BALL, RING)
+    with refused(sh.UnsupportedTypeError, "band"):
+        sh.signed_distance(RING, BALL, band=0.1)
     for intrinsic in ("yes", 3, None):
         with refused(sh.SignedHeatError, "intrinsic"):
-            sh.curve_distance(BALL, RING, intrinsic=intrinsic)
+            sh.signed_distance(RING, BALL, intrinsic=intrinsic)
 
 
 def test_masks_are_not_ignored():
@@ -105,6 +111,6 @@ def test_masks_are_not_ignored():
     with refused(sh.GeometryError):
         sh.as_shape((hidden, BALL.faces))
     with refused(sh.GeometryError):
-        sh.solid_distance((BALL.vertices, np.ma.masked_equal(BALL.faces, 3)), resolution=8)
+        sh.signed_distance((BALL.vertices, np.ma.masked_equal(BALL.faces, 3)), resolution=8)
     with refused(sh.GeometryError):
         sh.VertexField(BALL, hidden[:, 0])

@@ -41,7 +41,7 @@ def test_great_circles_are_even_and_lie_in_a_plane():
 
 def test_distance_to_the_equator_is_the_latitude(globe):
     circle = sh.globe_curve(globe, parallel(0.0), closed=True)
-    phi = sh.curve_distance(globe, circle).values
+    phi = sh.signed_distance(circle, globe).values
     _, latitude = places(globe)
     # eastwards, north is left; the polyhedron is a little smaller than its sphere
     assert np.abs(phi - np.radians(latitude) * 6371).max() < 0.01 * np.pi / 2 * 6371
@@ -103,7 +103,7 @@ def test_what_is_no_curve_on_a_globe_is_refused(globe, tmp_path):
 def test_a_globe_may_be_of_quadrangles_and_of_another_package():
     quads = sh.PolygonMesh(*cases.globe(18))
     curve = sh.globe_curve(quads, parallel(0.0), closed=True)
-    phi = sh.curve_distance(quads, curve).values
+    phi = sh.signed_distance(curve, quads).values
     latitude = np.arcsin(np.clip(quads.vertices[:, 2], -1, 1))
     assert np.abs(phi - latitude).max() < 0.02 * np.pi / 2  # chords are shorter than arcs by (5°)² / 6, and less
     triangles = samples.sphere(3)

@@ -288,6 +288,6 @@ def test_commands(folder, monkeypatch, capsys, words, status, message):
     assert all((folder / name).read_text() == "precious" for name in ("out.stl", "out.obj"))
 
 
-def test_curve_distance_off_surfaces():
-    with refused(sh.SourceError, "domain"):
-        sh.curve_distance(GRID, RING)
+def test_curves_are_not_measured_on_grids():
+    with refused(sh.SourceError, "source 0"):
+        sh.signed_distance(RING, GRID)

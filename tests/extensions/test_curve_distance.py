@@ -43,7 +43,7 @@ def inside(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 def test_closed_polygons_in_the_plane(rings, seed):
     """However coarse the triangles, and however the polygon crosses them: exact, with the right sides."""
     mesh, corners = disk(rings), star(seed)
-    phi = sh.curve_distance(mesh, mesh.polyline(corners, closed=True))
+    phi = sh.signed_distance(mesh.polyline(corners, closed=True), mesh)
     exact = to_polygon(mesh.vertices, corners, True)
     assert np.abs(np.abs(phi.values) - exact).max() < 2e-5
     clear = exact > 1e-9
@@ -62,7 +62,7 @@ def test_loops_inside_single_faces(as_oriented):
     assert len(np.unique(loop.faces)) == 1
     with refused(CancellingNormalsError, "curves"):
         sh.SignedHeatSolver(mesh).distance(loop)
-    phi = sh.curve_distance(mesh, loop, as_oriented=as_oriented)
+    phi = sh.signed_distance(loop, mesh, as_oriented=as_oriented)
     assert np.abs(phi.values + to_polygon(mesh.vertices, corners, True)).max() < 2e-5
 
 
@@ -75,8 +75,8 @@ def test_pieces_of_curves_smaller_than_the_triangles_are_completed(radius, seed)
     cube = sh.TriangleMesh(corners, [face for a, b, c, d in quads for face in ([a, b, c], [a, c, d])])
     angle = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, 28))
     ring = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + [0.4, -0.1, 2]
-    whole = sh.curve_distance(cube, cube.polyline(ring, closed=True)).values
-    pieces = sh.curve_distance(cube, [cube.polyline(ring[7 * k : 7 * k + 5]) for k in range(4)]).values
+    whole = sh.signed_distance(cube.polyline(ring, closed=True), cube).values
+    pieces = sh.signed_distance([cube.polyline(ring[7 * k : 7 * k + 5]) for k in range(4)], cube).values
     assert (whole < 0).all()
     assert np.abs(pieces - whole).max() < 6 * radius
 
@@ -92,14 +92,14 @@ def test_loops_smaller_than_triangles_are_told():
     for measured in (
         lambda: solver.distance(loops),
         lambda: solver.distance_many([loops])[0],
-        lambda: sh.signed_distance(loops, mesh),
+        lambda: sh.SignedHeatSolver(mesh).distance(loops),
     ):
         with pytest.warns(sh.InexactWarning, match="closed curves"):
             assert measured().diagnostics.note(SmallLoops).small_loops == 1
     assert solver.distance(loops[1]).diagnostics.note(SmallLoops) is None
     assert solver.distance(mesh.polyline(0.5 * radius * ring[:5])).diagnostics.note(SmallLoops) is None
     sh.SignedHeatSolver(mesh, intrinsic=True).distance(loops)
-    phi = sh.curve_distance(mesh, loops[0])
+    phi = sh.signed_distance(loops[0], mesh)
     away = np.linalg.norm(mesh.vertices - [0.31, 0.2, 0], axis=1)
     assert np.abs(phi.values - 0.5 * radius + away).max() < 0.1 * radius
 
@@ -130,7 +130,7 @@ def test_a_gap_is_completed():
     faces = np.concatenate([corner[:, None] + [0, 21, 22], corner[:, None] + [0, 22, 1]])
     mesh = sh.TriangleMesh(np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1), faces)
     pieces = [mesh.polyline([[0, 10.3, 0], [12, 10.3, 0]]), mesh.polyline([[18, 10.3, 0], [30, 10.3, 0]])]
-    phi = sh.curve_distance(mesh, pieces)
+    phi = sh.signed_distance(pieces, mesh)
     assert np.abs(phi.values - (y.ravel() - 10.3)).max() < 0.3
     note = phi.diagnostics.note(SharpenedToCurves)
     assert note.free_ends == 2
@@ -167,7 +167,7 @@ def test_turned_and_lost_pieces_on_every_surface(build, bound):
     """Two fifths of a parallel are missing and a quarter of the rest is turned: still the distance to the parallel."""
     surface, center = build()
     curves = pieces_of_a_parallel(surface, center, 0.3)
-    phi = sh.curve_distance(surface, curves).restrict()
+    phi = sh.signed_distance(curves, surface).restrict()
     vertices = surface.points if isinstance(surface, sh.PointCloud) else surface.vertices
     out = (vertices - center) / np.linalg.norm(vertices - center, axis=1, keepdims=True)
     exact = np.arcsin(out[:, 2].clip(-1, 1)) - np.arcsin(0.3)
@@ -180,7 +180,7 @@ def test_level_sets_are_measured_to_exactly(build):
     mesh = build()
     values = mesh.vertices @ [0.3, 0.2, 0.9] - 0.21
     curves = mesh.level_set(values)
-    phi = sh.curve_distance(mesh, curves)
+    phi = sh.signed_distance(curves, mesh)
     line = sh.sharpen(sh.VertexField(mesh, values))
     assert np.abs(phi.values - line.values).max() < 1e-3 * mesh.edge_lengths.mean()
 
@@ -188,7 +188,7 @@ def test_level_sets_are_measured_to_exactly(build):
 def test_turning_a_curve_turns_the_sign():
     mesh = sphere(3)
     curve = mesh.level_set(mesh.vertices[:, 2], 0.31)[0]
-    phi, turned = (sh.curve_distance(mesh, c).values for c in (curve, curve.reversed()))
+    phi, turned = (sh.signed_distance(c, mesh).values for c in (curve, curve.reversed()))
     assert np.abs(phi + turned).max() < 1e-12
 
 
@@ -196,7 +196,7 @@ def test_a_curve_that_bounds_nothing():
     """Round the tube of a torus: the curve tells no sides, and the method completes it on the far side."""
     mesh = torus(n_around=60, n_across=24)
     with pytest.warns(sh.InexactWarning, match="piecewise_distance"):
-        note = sh.curve_distance(mesh, mesh.path(np.arange(24), closed=True)).diagnostics.note(SharpenedToCurves)
+        note = sh.signed_distance(mesh.path(np.arange(24), closed=True), mesh).diagnostics.note(SharpenedToCurves)
     assert note.free_ends == 0
     assert note.sides_by_curves < 0.1
     assert note.completed_length > 0.3
@@ -206,7 +206,7 @@ def test_levels_of_their_own_are_refused():
     mesh = sphere(2)
     curve = mesh.level_set(mesh.vertices[:, 2], 0.3)
     with pytest.raises(sh.ConstraintError) as caught:
-        sh.curve_distance(mesh, curve, constraint=sh.EachComponent())
+        sh.signed_distance(curve, mesh, constraint=sh.EachComponent())
     assert caught.value.remedy
 
 
@@ -217,9 +217,9 @@ def test_lines_that_meet_on_a_spine_are_never_turned(pages):
     height = mesh.vertices[:, 2] - 0.37 - 0.2 * np.hypot(*mesh.vertices[:, :2].T)
     lines = mesh.level_set(height, 0.0)
     assert len(lines) == pages
-    phi = sh.curve_distance(mesh, lines)
+    phi = sh.signed_distance(lines, mesh)
     assert np.array_equal(np.sign(phi.values), np.sign(height))
-    assert np.allclose(phi.values, sh.curve_distance(mesh, lines, as_oriented=True).values, rtol=0, atol=1e-12)
+    assert np.allclose(phi.values, sh.signed_distance(lines, mesh, as_oriented=True).values, rtol=0, atol=1e-12)
 
 
 def test_circles_that_bound_together_are_completed_by_nothing():
@@ -227,7 +227,7 @@ def test_circles_that_bound_together_are_completed_by_nothing():
     mesh = torus(n_around=48, n_across=16)
     circles = mesh.level_set(mesh.vertices @ [1.0, 0.15, 0.1], 0.1)
     assert len(circles) == 2
-    both = sh.curve_distance(mesh, circles).diagnostics.note(SharpenedToCurves)
+    both = sh.signed_distance(circles, mesh).diagnostics.note(SharpenedToCurves)
     assert both.completed_length == 0
 
 
@@ -245,5 +245,5 @@ def test_pieces_with_normals_on_faces_that_look_either_way():
         sh.Curve(whole.faces[a : a + kept], whole.barycentric[a : a + kept], normals=whole.normals[a : a + kept - 1])
         for a in range(0, 4 * step, step)
     ]
-    phi = sh.curve_distance(mesh, pieces)
+    phi = sh.signed_distance(pieces, mesh)
     assert np.mean(np.sign(phi.values) != np.sign(height)) < 0.01

@@ -78,7 +78,7 @@ def test_curves_apart_face_each_other(opposite):
     else:
         assert (found[:4] != wrong[:4]).all() != (found[4:] != wrong[4:]).all()
         with pytest.warns(sh.InexactWarning, match="as a whole"):
-            sh.curve_distance(mesh, given)
+            sh.signed_distance(given, mesh)
 
 
 def test_what_has_no_direction_or_no_end_stays():

@@ -36,26 +36,26 @@ def taken(field: sh.VertexField) -> tuple[list[int], list[int]]:
 
 
 def test_turned_pieces_make_no_difference(mesh, pieces):
-    right = sh.curve_distance(mesh, pieces)
+    right = sh.signed_distance(pieces, mesh)
     given = [*pieces[:2], pieces[2].reversed(), *pieces[3:]]
-    phi = sh.curve_distance(mesh, given)
+    phi = sh.signed_distance(given, mesh)
     assert taken(right) == ([], [])
     assert taken(phi) == ([2], [])
     assert str(phi.diagnostics.note(CurvesTaken)) == "curves turned: 1, the first of them number 2"
     assert np.abs(phi.values - right.values).max() < 1e-9
     exact = 0.6 - np.linalg.norm(mesh.vertices, axis=1)
     assert np.abs(phi.values - exact).max() < 0.05
-    assert np.abs(sh.curve_distance(mesh, given, as_oriented=True).values - exact).max() > 0.2
+    assert np.abs(sh.signed_distance(given, mesh, as_oriented=True).values - exact).max() > 0.2
 
 
 def test_a_spurious_piece_is_left_out_with_a_note(mesh, pieces):
     spurious = mesh.polyline([[-0.1, 0.05, 0], [0.2, 0.1, 0]])
-    right = sh.curve_distance(mesh, pieces)
-    phi = sh.curve_distance(mesh, [*pieces[:3], spurious, *pieces[3:]])
+    right = sh.signed_distance(pieces, mesh)
+    phi = sh.signed_distance([*pieces[:3], spurious, *pieces[3:]], mesh)
     assert taken(phi) == ([], [3])
     assert np.abs(phi.values - right.values).max() < 1e-9
     for option in ("every_piece", "as_oriented"):
-        all_of_them = sh.curve_distance(mesh, [spurious, *pieces], **{option: True})
+        all_of_them = sh.signed_distance([spurious, *pieces], mesh, **{option: True})
         assert taken(all_of_them)[1] == []
         assert np.abs(all_of_them.values).min() < 0.02
         assert np.abs(all_of_them.values[np.linalg.norm(mesh.vertices, axis=1) < 0.05]).max() < 0.2
@@ -76,7 +76,7 @@ def test_what_is_part_of_nothing_larger_stays(mesh):
     for curves in (strokes, [ring, strokes[0]]):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            phi = sh.curve_distance(mesh, curves)
+            phi = sh.signed_distance(curves, mesh)
         assert taken(phi)[1] == []
         for curve in curves:
             assert np.abs(phi(curve)).max() < 0.06
@@ -93,7 +93,7 @@ def test_no_piece_is_left_out_where_half_of_the_curve_is_gone(seed):
         sh.Curve(curve.faces[a : b + 1], curve.barycentric[a : b + 1])
         for a, b in zip(ends[:-1:2], ends[1::2], strict=True)
     ]
-    assert taken(sh.curve_distance(mesh, pieces)) == ([], [])
+    assert taken(sh.signed_distance(pieces, mesh)) == ([], [])
 
 
 def test_lines_from_rim_to_rim_are_complete(mesh):
@@ -131,7 +131,7 @@ def test_rings_that_face_each_other_stay_so(apart, n, lost, wrong):
     """How their ends attract each other tells nothing of two rings; that φ has slope one between them does."""
     mesh = tube()
     given = [piece.reversed() if k in wrong else piece for k, piece in enumerate(rings(mesh, apart, n, lost))]
-    phi = sh.curve_distance(mesh, given)
+    phi = sh.signed_distance(given, mesh)
     exact = np.abs(mesh.vertices[:, 2]) - apart / 2
     assert (np.sign(phi.values) != np.sign(exact)).mean() < 0.03
     assert taken(phi) == (wrong, [])

@@ -66,7 +66,7 @@ def test_a_second_time_changes_nothing_beyond_a_cell(operation):
     grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=80, padding=0.5)
     once = operation(box_with_arms(), 0.2, grid)
     twice = operation(once, 0.2, grid)
-    distance = sh.sharpen(sh.signed_distance(once, grid))
+    distance = sh.sharpen(sh.SignedHeatSolver(grid).distance(once))
     assert np.abs(distance(twice.vertices)).max() < grid.spacing.max()
 
 

@@ -192,7 +192,7 @@ def test_distance_to_points_without_normals_is_that_with_them():
     x = grid.points
     exact = np.hypot(np.hypot(x[..., 0], x[..., 1]) - 1, x[..., 2]) - 0.4
     errors = [
-        float(np.sqrt(np.mean((sh.signed_distance(cloud, grid).values - exact) ** 2)))
+        float(np.sqrt(np.mean((sh.SignedHeatSolver(grid).distance(cloud).values - exact) ** 2)))
         for cloud in (truth, orient_points(sh.PointCloud(truth.points)).cloud)
     ]
     assert errors[1] < 1.15 * errors[0]
@@ -207,7 +207,7 @@ def test_few_points_keep_the_normals_that_they_are_given():
 def test_far_between_points_nothing_is_missing():
     """300 points on a ball, ten cells apart: its inside is solid, and it was taken for sheets."""
     cloud = samples.oriented_points(samples.sphere(5), 300)
-    field = sh.solid_distance(cloud, resolution=96)
+    field = sh.signed_distance(cloud, resolution=96)
     truth = np.linalg.norm(field.grid.points, axis=-1) - 1.0
     assert np.sqrt(np.mean((field.values - truth) ** 2)) < 0.02
     assert field.diagnostics.note(sh.diagnostics.BoundsNothing) is None

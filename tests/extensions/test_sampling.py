@@ -15,7 +15,7 @@ def box():
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     mesh = sh.PolygonMesh(CORNER + corners * SIZE, quads)
-    return sh.solid_distance(mesh, resolution=32)
+    return sh.signed_distance(mesh, resolution=32)
 
 
 CORNER, SIZE = np.array([5.0, -3.0, 1.0]), np.array([1.0, 2.0, 3.0])
@@ -28,7 +28,7 @@ def box_distance(points):
 
 @pytest.fixture(scope="module")
 def holed():
-    return sh.solid_distance(samples.without_faces(samples.sphere(4), 0.5, seed=3), resolution=40)
+    return sh.signed_distance(samples.without_faces(samples.sphere(4), 0.5, seed=3), resolution=40)
 
 
 def test_distances_are_exact_and_gradients_theirs(box):
@@ -84,7 +84,7 @@ def _above(mesh, height):
 
 def test_an_open_sheet_has_one_sign():
     sheet = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
-    taken = sh.sample(sh.solid_distance(sheet, resolution=24), 2000)
+    taken = sh.sample(sh.signed_distance(sheet, resolution=24), 2000)
     assert (taken.distances >= 0).all()
     np.testing.assert_allclose(
         taken.distances, np.linalg.norm(taken.points - np.clip(taken.points, 0, [1, 1, 0]), axis=1), atol=1e-12
@@ -129,7 +129,7 @@ def test_what_cannot_be_sampled_says_so(tmp_path, box):
     plain = sh.GridField(box.grid, box.values)
     with pytest.raises(sh.SourceError) as caught:
         sh.sample(plain, 10)
-    assert "solid_distance" in caught.value.remedy
+    assert "signed_distance" in caught.value.remedy
     for wrong in ({"n": 0}, {"near": 1.5}, {"widths": [-0.1]}, {"widths": [np.nan]}):
         with pytest.raises(sh.SignedHeatError):
             sh.sample(box, **{"n": 10, **wrong})

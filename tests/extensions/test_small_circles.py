@@ -52,7 +52,7 @@ def test_all_circles_face_the_same_way(radius, pieces):
     centers = centers_on_sphere(12, 3 * radius)
     given, wrong = circles(mesh, centers, radius, pieces, 0.25)
     assert (np.bincount(np.repeat(np.arange(12), pieces), wrong) >= pieces / 2).any()
-    phi = sh.curve_distance(mesh, given)
+    phi = sh.signed_distance(given, mesh)
     assert phi.diagnostics.note(CurvesTaken).turned.tolist() == np.flatnonzero(wrong).tolist()
     out = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
     exact = radius - np.arccos(np.clip(out @ centers.T, -1, 1)).min(axis=1)
@@ -92,7 +92,7 @@ def test_complete_circles_tell_how_broken_ones_face(pieces):
     assert found.turned.tolist() == [False] * 4 + [True] * len(broken)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        phi = sh.curve_distance(mesh, [*whole, *broken])
+        phi = sh.signed_distance([*whole, *broken], mesh)
     exact = 0.12 - np.linalg.norm(mesh.vertices[:, None] - centers[None], axis=2).min(axis=1)
     assert np.abs(phi.values - exact).max() < 0.06
 
@@ -108,7 +108,7 @@ def test_a_large_broken_curve_among_small_ones():
     given = [mesh.polyline(p) for p in outer] + [hole.reversed() for hole in holes]
     wrong = np.isin(np.arange(len(given)), [1, 5, 6, 9])
     given = [c.reversed() if w else c for c, w in zip(given, wrong, strict=True)]
-    phi = sh.curve_distance(mesh, given)
+    phi = sh.signed_distance(given, mesh)
     assert phi.diagnostics.note(CurvesTaken).turned.tolist() == np.flatnonzero(wrong).tolist()
     out = mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
     exact = np.minimum(

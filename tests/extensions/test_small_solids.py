@@ -11,7 +11,7 @@ from signedheat import samples
 
 @pytest.mark.parametrize(("resolution", "padding"), [(16, 5.25), (24, 2.0), (32, 0.3)])
 def test_a_ball_of_a_few_cells(resolution, padding):
-    field = sh.solid_distance(samples.sphere(3), resolution=resolution, padding=padding)
+    field = sh.signed_distance(samples.sphere(3), resolution=resolution, padding=padding)
     exact = np.linalg.norm(field.grid.points, axis=-1) - 1
     assert (np.sign(field.values) == np.sign(exact)).all()
     assert np.abs(field.values - exact).max() < 0.03
@@ -20,7 +20,7 @@ def test_a_ball_of_a_few_cells(resolution, padding):
 def test_a_plate_thinner_than_a_tenth_of_a_cell_is_solid():
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 0.002)], dtype=float)
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    field = sh.solid_distance(sh.PolygonMesh(corners, quads), resolution=32)
+    field = sh.signed_distance(sh.PolygonMesh(corners, quads), resolution=32)
     grown = field.offset(0.1)
     assert grown.bounds[0] == pytest.approx([-0.1, -0.1, -0.1], abs=0.005)
     assert grown.bounds[1] == pytest.approx([1.1, 1.1, 0.102], abs=0.005)
@@ -30,6 +30,6 @@ def test_a_plate_thinner_than_a_tenth_of_a_cell_is_solid():
 def test_what_lies_outside_the_grid_counts():
     ball = samples.sphere(3)
     grid = sh.Grid((0, -1.5, -1.5), 0.1, (16, 31, 31))
-    field = sh.solid_distance(ball, grid)
-    whole = sh.solid_distance(ball, sh.Grid((-1.5, -1.5, -1.5), 0.1, (31, 31, 31)))
+    field = sh.signed_distance(ball, grid)
+    whole = sh.signed_distance(ball, sh.Grid((-1.5, -1.5, -1.5), 0.1, (31, 31, 31)))
     np.testing.assert_allclose(field.values, whole.values[15:], atol=1e-12)

@@ -13,7 +13,6 @@ from signedheat import (
     TriangleMesh,
     samples,
     signed_distance,
-    solid_distance,
 )
 from signedheat.diagnostics import BoundsNothing, CompletedArea, LeftOut, ReachesBox, ShapeOriented
 
@@ -47,7 +46,7 @@ def offset_is_clear(field, mesh, distance):
 
 def test_a_box_is_exact():
     """Twelve faces, far larger than a cell: distance is that of the box to rounding, at edges and corners too."""
-    field = solid_distance(box((-1, -0.5, -0.3), (1, 0.5, 0.3)), resolution=48)
+    field = signed_distance(box((-1, -0.5, -0.3), (1, 0.5, 0.3)), resolution=48)
     assert np.abs(field.values - distance_to_boxes(field.grid.points, [((-1, -0.5, -0.3), (1, 0.5, 0.3))])).max() < 1e-6
 
 
@@ -55,10 +54,10 @@ def test_a_box_is_exact():
 def test_turned_faces_change_nothing(fraction):
     ball = samples.sphere(3)
     grid = Grid.around(ball.bounds, 32)
-    field = solid_distance(samples.with_flipped_faces(ball, fraction), grid)
-    assert np.array_equal(field.values, solid_distance(ball, grid).values)
+    field = signed_distance(samples.with_flipped_faces(ball, fraction), grid)
+    assert np.array_equal(field.values, signed_distance(ball, grid).values)
     assert field.diagnostics.note(ShapeOriented).turned_faces > 0
-    kept = solid_distance(turned(ball), grid, as_oriented=True)
+    kept = signed_distance(turned(ball), grid, as_oriented=True)
     assert (kept.values >= 0).mean() > 0.99
 
 
@@ -69,19 +68,19 @@ def test_bodies_unite():
         ((-0.2, -0.2, -0.2), (0.2, 0.2, 0.2)),
     ]
     shape = samples.union(*(box(*each) for each in boxes))
-    field = solid_distance(shape, resolution=64)
+    field = signed_distance(shape, resolution=64)
     truth = distance_to_boxes(field.grid.points, boxes)
     deep = np.abs(truth) > 2 * field.grid.spacing[0]
     assert np.array_equal((field.values < 0)[deep], (truth < 0)[deep])
     assert np.abs(field.values - truth)[truth > 0].max() < 0.5 * field.grid.spacing[0]
     assert field.diagnostics.note(LeftOut).covered_faces == 24
-    kept = solid_distance(shape, field.grid, keep_overlaps=True)
+    kept = signed_distance(shape, field.grid, keep_overlaps=True)
     assert kept.diagnostics.note(LeftOut) is None
 
 
 def test_cavities_stay():
     shell = samples.union(samples.sphere(3), turned(samples.sphere(3, radius=0.5)))
-    field = solid_distance(shell, resolution=48)
+    field = signed_distance(shell, resolution=48)
     radius = np.linalg.norm(field.grid.points, axis=-1)
     truth = np.maximum(radius - 1, 0.5 - radius)
     assert error(field, truth) < 0.5
@@ -91,7 +90,7 @@ def test_half_a_sphere_is_carried_on():
     """No more is missing than is there: the completed half is about as large as the other. Winding numbers end flat."""
     ball = samples.sphere(4)
     left = only(ball, ball.vertices[ball.faces][:, :, 0].mean(axis=1) < 0)
-    field = solid_distance(left, Grid.around(ball.bounds, 48))
+    field = signed_distance(left, Grid.around(ball.bounds, 48))
     radius = np.linalg.norm(field.grid.points, axis=-1)
     flat = np.where(field.grid.points[..., 0] < 0, radius - 1, np.hypot(field.grid.points[..., 0], radius - 1))
     assert error(field, radius - 1) < 0.5 * 100 * np.sqrt(np.mean((flat - radius + 1) ** 2)) / np.ptp(radius)
@@ -106,14 +105,14 @@ def test_half_a_bar_is_closed_where_it_ends():
         bar, (bar.vertices[bar.faces][:, :, 0] < 0).any(axis=1) & ~(bar.vertices[bar.faces][:, :, 0] > 0).all(1)
     )
     left = TriangleMesh(np.minimum(left.vertices, [0.0, np.inf, np.inf]), left.faces)
-    field = solid_distance(left, Grid.around(bar.bounds, 48))
+    field = signed_distance(left, Grid.around(bar.bounds, 48))
     np.testing.assert_allclose(field([[-0.1, 0, 0], [0.3, 0, 0]]), [-0.1, 0.3], atol=1e-12)
 
 
 def test_patches_are_completed_within_the_surface():
     ball = samples.sphere(4)
     holed = samples.without_patches(ball, 6, 0.45)
-    field = solid_distance(holed, Grid.around(ball.bounds, 48))
+    field = signed_distance(holed, Grid.around(ball.bounds, 48))
     truth = np.linalg.norm(field.grid.points, axis=-1) - 1
     caps = 1 - np.cos(0.45)  # how far flat caps lie inside; on a fifth of the surface, and as deep below it
     assert error(field, truth) < 100 * caps * np.sqrt(0.2) / np.ptp(truth)
@@ -126,12 +125,12 @@ def test_noise_is_averaged():
     grid = Grid.around(ball.bounds, 48)
     truth = np.linalg.norm(grid.points, axis=-1) - 1
     noisy = samples.soup(ball, jitter=0.02)
-    assert error(solid_distance(noisy, grid), truth) < 0.5  # the noise is .02, .8 %
+    assert error(signed_distance(noisy, grid), truth) < 0.5  # the noise is .02, .8 %
 
 
 def test_a_sheet_has_no_inside():
     flat = sheet([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    field = solid_distance(flat, resolution=40)
+    field = signed_distance(flat, resolution=40)
     x, y, z = np.moveaxis(np.abs(field.grid.points), -1, 0)
     away = np.linalg.norm([np.maximum(x - 1, 0), np.maximum(y - 1, 0), z], axis=0)
     assert np.abs(field.values - away).max() < 1e-6
@@ -140,7 +139,7 @@ def test_a_sheet_has_no_inside():
 
 def test_doubled_walls_have_no_inside():
     flat = sheet([[-1, -1, 0], [1, -1, 0], [1, 1, 0.3], [-1, 1, 0.3]])
-    field = solid_distance(samples.union(flat, turned(flat)), resolution=40)
+    field = signed_distance(samples.union(flat, turned(flat)), resolution=40)
     assert (field.values >= 0).all()
     assert offset_is_clear(field, flat, 0.2) < 0.02  # samples of the sheet are random
 
@@ -154,7 +153,7 @@ def test_furniture():
         sheet([[-1.2, -0.7, 0], [-1.2, 0.7, 0], [-1.2, 0.7, 0.9], [-1.2, -0.7, 0.9]]),
     ]
     shape = samples.union(*legs, *boards)
-    field = solid_distance(shape, resolution=64, padding=0.4)
+    field = signed_distance(shape, resolution=64, padding=0.4)
     assert (field([[x, y, -0.5] for x in (-0.8, 0.8) for y in (-0.5, 0.5)]) < 0).all()
     p = field.grid.points
     outside = (np.abs(p) > [1.2, 0.7, 1]).any(axis=-1)
@@ -166,16 +165,9 @@ def test_the_surface_may_reach_the_box():
     """A tube open at both ends is carried on through the walls of a box that leaves it no room."""
     tube = samples.union(box((-1, -0.4, -0.4), (1, 0.4, 0.4)))
     walls = only(tube, np.ptp(tube.vertices[tube.faces][:, :, 0], axis=1) > 1)
-    field = solid_distance(walls, Grid((-1.1, -0.8, -0.8), 0.05, (45, 33, 33)))
+    field = signed_distance(walls, Grid((-1.1, -0.8, -0.8), 0.05, (45, 33, 33)))
     assert (field.diagnostics.note(ReachesBox) is None) == (field.values[0].min() > 0)
     assert field([[0, 0, 0]])[0] == pytest.approx(-0.4, abs=0.01)
-
-
-def test_plain_is_the_method():
-    ball = samples.sphere(3)
-    grid = Grid.around(ball.bounds, 32)
-    plain = solid_distance(ball, grid, plain=True)
-    assert np.allclose(plain.values, signed_distance(ball, grid).values, atol=1e-6)
 
 
 def test_polygons_points_and_several_meshes():
@@ -183,22 +175,22 @@ def test_polygons_points_and_several_meshes():
         [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)],
         [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
     )
-    field = solid_distance(cube, resolution=32)
+    field = signed_distance(cube, resolution=32)
     assert np.abs(field.values - distance_to_boxes(field.grid.points, [((0, 0, 0), (1, 1, 1))])).max() < 1e-6
-    two = solid_distance([cube, box((2, 0, 0), (3, 1, 1))], resolution=32)
+    two = signed_distance([cube, box((2, 0, 0), (3, 1, 1))], resolution=32)
     assert two([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]]) == pytest.approx(
         [-0.5, 0.5, -0.5], abs=0.1
     )  # a cell is .135
     cloud = samples.oriented_points(samples.sphere(3), 3000)
-    points = solid_distance(cloud, resolution=40)
+    points = signed_distance(cloud, resolution=40)
     assert error(points, np.linalg.norm(points.grid.points, axis=-1) - 1) < 0.7
     with refused(SourceError, "shape 1"):
-        solid_distance([cube, cloud], resolution=32)
+        signed_distance([cube, cloud], resolution=32)
 
 
 def test_the_same_bits_again():
     holed = samples.without_patches(samples.torus(n_around=48, n_across=24), 4, 0.3)
-    one, other = (solid_distance(holed, resolution=40) for _ in range(2))
+    one, other = (signed_distance(holed, resolution=40) for _ in range(2))
     assert np.array_equal(one.values, other.values)
 
 
@@ -217,8 +209,8 @@ def test_small_holes_are_not_filled_to_the_walls_of_the_box(missing):
     """What φ < 0 fills through a missing face of an L may run on to the box, where winding numbers are small."""
     whole = bracket()
     grid = Grid.around(whole.bounds, 48)
-    truth = solid_distance(whole, grid).values
-    broken = solid_distance(only(whole, np.delete(np.arange(24), missing)), grid).values
+    truth = signed_distance(whole, grid).values
+    broken = signed_distance(only(whole, np.delete(np.arange(24), missing)), grid).values
     assert not (broken[truth > 0.25] < 0).any()
 
 
@@ -229,7 +221,7 @@ def test_points_on_a_plate_thinner_than_a_cell_invent_no_solid():
     flat = rng.uniform(-half, half, size=(4000, 3))
     flat[:, 2] = np.where(np.arange(4000) % 2, 1, -1) * half[2]
     normals = np.stack([np.zeros(4000), np.zeros(4000), np.sign(flat[:, 2])], axis=1)
-    field = solid_distance(PointCloud(flat @ turn.T, normals @ turn.T), resolution=48)
+    field = signed_distance(PointCloud(flat @ turn.T, normals @ turn.T), resolution=48)
     truth = distance_to_boxes(field.grid.points @ turn, [(-half, half)])
     cell = field.grid.spacing[0]
     assert not (field.values[truth > 2 * cell] < 0).any()
@@ -242,7 +234,7 @@ def test_half_of_the_points_of_a_ball_make_no_second_ball():
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     normals[:, 2] = -np.abs(normals[:, 2])
     grid = Grid.around([[-1.0] * 3, [1.0] * 3], 40)
-    field = solid_distance(PointCloud(normals, normals), grid)
+    field = signed_distance(PointCloud(normals, normals), grid)
     away = np.linalg.norm(grid.points, axis=-1) - 1.0
     assert not (field.values[away > 0.3] < 0).any()
     assert (field.values[(away < -0.2) & (grid.points[..., 2] < 0)] < 0).all()
@@ -253,7 +245,7 @@ def test_completed_surface_begins_at_the_rims_of_holes(band):
     """No groove lies between: contours of a ball look outwards as it does, at the surface and away from it."""
     broken = samples.without_patches(samples.sphere(5), 6, 0.15)
     grid = Grid.around(broken.bounds, 96)
-    field = solid_distance(broken, grid) if band is None else solid_distance(broken, grid, band=band)
+    field = signed_distance(broken, grid) if band is None else signed_distance(broken, grid, band=band)
     for level in (0.0, 2 * grid.spacing[0]):
         made = field.contour(level)
         corners = made.vertices[made.faces]

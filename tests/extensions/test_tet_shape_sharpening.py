@@ -28,7 +28,7 @@ def tets() -> sh.TetMesh:
 
 
 def test_a_cube_is_exact_at_its_edges_too(tets):
-    field = sh.signed_distance(cube(0.83), tets)
+    field = sh.SignedHeatSolver(tets).distance(cube(0.83))
     exact = distance_to_cube(tets.vertices, 0.83)
     sharp = sh.sharpen(field, cube(0.83))
     assert np.abs(sharp.values - exact).max() < 1e-12
@@ -41,7 +41,7 @@ def test_solids_on_tets_are_measured_to_the_shape(tets):
     """Whichever way its faces look, and though one was lost."""
     shape = cube(0.83)
     turned = np.where(np.isin(np.arange(12), [2, 5, 6])[:, None], shape.faces[:, ::-1], shape.faces)[1:]
-    field = sh.solid_distance(sh.TriangleMesh(shape.vertices, turned), tets)
+    field = sh.signed_distance(sh.TriangleMesh(shape.vertices, turned), tets)
     assert np.abs(field.values - distance_to_cube(tets.vertices, 0.83)).max() < 1e-12
     assert field.diagnostics.note(FacesRestored).restored_faces == 1
 
@@ -49,8 +49,8 @@ def test_solids_on_tets_are_measured_to_the_shape(tets):
 def test_where_surface_is_missing_its_zero_set_stands_in(tets):
     ball = sphere(4)
     holed = sh.TriangleMesh(ball.vertices, ball.faces[(ball.vertices[ball.faces].mean(axis=1) @ [1, 2, 2]) < 3 * 0.8])
-    field = sh.signed_distance(holed, tets)
-    exact = sh.solid_distance(ball, tets).values
+    field = sh.SignedHeatSolver(tets).distance(holed)
+    exact = sh.signed_distance(ball, tets).values
     sharp, own = sh.sharpen(field, holed), sh.sharpen(field)
     away = tets.vertices @ [1, 2, 2] / 3 / np.maximum(np.linalg.norm(tets.vertices, axis=1), 1e-9)
     there, missing = away < 0.5, away > 0.9
@@ -65,7 +65,7 @@ def test_lines_bend_round_the_corners_of_the_mesh():
     x, y, _ = mesh.vertices.T
     wall = rectangle([1.55, -0.5, -0.5], [0, 3, 0], [0, 0, 3])
     exact = np.where((x <= 1) & (y > 1), -(0.55 + np.hypot(x - 1, y - 1)), x - 1.55)
-    sharp = sh.sharpen(sh.signed_distance(wall, mesh), wall)
+    sharp = sh.sharpen(sh.SignedHeatSolver(mesh).distance(wall), wall)
     straight = (y <= 1) | (x > 1)
     assert np.abs(sharp.values - exact * np.sign(wall.face_area_vectors[0, 0]))[straight].max() < 1e-12
     assert np.abs(np.abs(sharp.values) - np.abs(exact)).max() < 1 / n
@@ -73,7 +73,7 @@ def test_lines_bend_round_the_corners_of_the_mesh():
 
 def test_a_plate_thinner_than_a_tet_keeps_its_sides(tets):
     plate = sh.TriangleMesh(cube(1.0).vertices * [1.0, 1.0, 0.01], cube(1.0).faces)
-    field = sh.solid_distance(plate, tets)
+    field = sh.signed_distance(plate, tets)
     points = tets.vertices
     beyond = np.abs(points) - [1.0, 1.0, 0.01]
     exact = np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
@@ -81,7 +81,7 @@ def test_a_plate_thinner_than_a_tet_keeps_its_sides(tets):
 
 
 def test_points_and_methods_beside_shapes_are_refused(tets):
-    field = sh.signed_distance(cube(0.8), tets)
+    field = sh.SignedHeatSolver(tets).distance(cube(0.8))
     cloud = sh.PointCloud(samples.sphere(2).vertices, samples.sphere(2).vertices)
     with refused(SourceError, "shape"):
         sh.sharpen(field, cloud)
@@ -97,4 +97,4 @@ def test_it_can_be_cancelled(tets):
         raise Stop
 
     with pytest.raises(Stop):
-        sh.sharpen(sh.signed_distance(cube(0.8), tets), cube(0.8), progress=stop)
+        sh.sharpen(sh.SignedHeatSolver(tets).distance(cube(0.8)), cube(0.8), progress=stop)

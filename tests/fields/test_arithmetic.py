@@ -17,9 +17,9 @@ KINDS = ["grid", "band", "vertices", "tets", "piecewise"]
 def field(kind):
     ball = samples.sphere(3)
     if kind == "grid":
-        return sh.signed_distance(ball, resolution=12)
+        return sh.SignedHeatSolver(sh.Grid.around(ball, 12)).distance(ball)
     if kind == "band":
-        return sh.solid_distance(ball, resolution=24, band=0.3)
+        return sh.signed_distance(ball, resolution=24, band=0.3)
     if kind == "tets":
         mesh = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
         return sh.TetField(mesh, mesh.vertices[:, 2] - 0.3)

@@ -90,7 +90,7 @@ def test_missing_values_stay_missing():
 
 
 def test_what_held_for_the_source_is_not_carried_on():
-    solid = sh.solid_distance(samples.sphere(2), sh.Grid((-2, -2, -2), 0.25, (17, 17, 17)))
+    solid = sh.signed_distance(samples.sphere(2), sh.Grid((-2, -2, -2), 0.25, (17, 17, 17)))
     assert solid.solid is not None and solid.confidence is not None
     both = solid | ~solid
     assert both.solid is None and both.confidence is None and both.diagnostics.notes == ()
@@ -117,11 +117,11 @@ def test_equal_grids_made_twice_are_one_domain():
 
 
 def test_bands_are_combined_where_they_are_the_same():
-    band = sh.solid_distance(samples.sphere(2), GRID, band=0.2)
+    band = sh.signed_distance(samples.sphere(2), GRID, band=0.2)
     assert np.array_equal((band | band).values, band.values, equal_nan=True)
     points = np.array([[0.9, 0.1, 0.0], [1.1, 0.0, 0.1]])
     np.testing.assert_allclose((~band).interpolate(points), -band.interpolate(points), rtol=1e-6)
     for wrong in (lambda: band - A, lambda: A & band):
         with refused(sh.GeometryError, "blocks"):
             wrong()
-    assert (sh.solid_distance(samples.sphere(2), GRID) | A)([[-1.4, 0.0, 0.0]])[0] < 0
+    assert (sh.signed_distance(samples.sphere(2), GRID) | A)([[-1.4, 0.0, 0.0]])[0] < 0

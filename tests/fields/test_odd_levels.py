@@ -11,10 +11,12 @@ from signedheat import samples
 
 BALL = samples.sphere(2)
 FIELDS = {
-    "grid": lambda: sh.signed_distance(BALL, resolution=12),
-    "plane": lambda: sh.signed_distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), resolution=12),
-    "tets": lambda: sh.signed_distance(BALL, sh.tetrahedralize(BALL, resolution=3)),
-    "band": lambda: sh.solid_distance(BALL, sh.Grid.around(BALL.bounds, 40), band=0.3),
+    "grid": lambda: sh.SignedHeatSolver(sh.Grid.around(BALL, 12)).distance(BALL),
+    "plane": lambda: sh.SignedHeatSolver(
+        sh.Grid.around(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), 12)
+    ).distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True)),
+    "tets": lambda: sh.SignedHeatSolver(sh.tetrahedralize(BALL, resolution=3)).distance(BALL),
+    "band": lambda: sh.signed_distance(BALL, sh.Grid.around(BALL.bounds, 40), band=0.3),
     "surface": lambda: sh.SignedHeatSolver(BALL).distance(BALL.level_set(BALL.vertices[:, 2], 0.1)),
 }
 ODD = [np.nan, np.inf, np.array([0.1, 0.2]), "x", None, True, 1j, 10**400]

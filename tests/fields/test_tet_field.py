@@ -176,7 +176,7 @@ def test_a_broken_shape_is_completed():
     whole = sphere(4)
     keep = np.random.default_rng(0).random(whole.n_faces) > 0.2
     broken = sh.TriangleMesh(whole.vertices, whole.faces[keep])
-    phi = sh.signed_distance(broken, sh.tetrahedralize(broken, resolution=14))
+    phi = sh.SignedHeatSolver(sh.tetrahedralize(broken, resolution=14)).distance(broken)
     exact = np.linalg.norm(phi.mesh.vertices, axis=1) - 1
     assert rms(phi.values - exact) < 0.02
     surface = phi.contour()
@@ -186,7 +186,7 @@ def test_a_broken_shape_is_completed():
 
 def test_open_level_sets_end_at_the_boundary():
     mesh = boxes((4, 4, 4), 0.5)
-    phi = sh.signed_distance(rectangle([0, 0, 0.8], [2, 0, 0], [0, 2, 0]), mesh)
+    phi = sh.SignedHeatSolver(mesh).distance(rectangle([0, 0, 0.8], [2, 0, 0], [0, 2, 0]))
     lid = phi.contour()
     assert is_closed_manifold(lid)
     assert trimesh.Trimesh(lid.vertices, lid.faces).volume == pytest.approx(4 * 0.8, rel=1e-6)
@@ -238,5 +238,5 @@ def test_tets_of_other_programs(package):
     broken = sh.TriangleMesh(whole.vertices, whole.faces[np.random.default_rng(0).random(whole.n_faces) > 0.1])
     mesh = mesher(broken, resolution=8)
     assert mesh.tet_volumes.sum() == pytest.approx(2.8**3, rel=2e-3)
-    phi = sh.signed_distance(broken, mesh)
+    phi = sh.SignedHeatSolver(mesh).distance(broken)
     assert rms(phi.values - (np.linalg.norm(mesh.vertices, axis=1) - 1)) < 0.05

@@ -23,7 +23,7 @@ def check_curves(given: Subject) -> str:
     sources = [source(random, domain) for _ in range(random.integers(1, 3))]
     asked = one_of(random, (None, None, sh.Free(), sh.ZeroSet(), constraint(random)))
     phi, warned = announced(
-        lambda: sh.curve_distance(domain, sources, constraint=asked, as_oriented=chance(random, 0.3))
+        lambda: sh.signed_distance(sources, domain, constraint=asked, as_oriented=chance(random, 0.3))
     )
     judge(phi.values, warned, length_of_edges(embedded(domain)))
     return "in part" if warned else "curves"
@@ -68,7 +68,7 @@ def check_labels(given: Subject) -> str:
     label = one_of(random, (None, 0, 1, *labels.ravel()[:2].tolist()))
     own = image.surface(label)
     grid = image.grid if chance(random, 0.5) else sh.Grid.around(own.bounds, int(random.integers(4, 12)))
-    phi, warned = announced(lambda: sh.solid_distance(own, grid))
+    phi, warned = announced(lambda: sh.signed_distance(own, grid))
     size = size_of(np.concatenate([own.bounds, [grid.origin, grid.upper]]), None)
     judge(phi.values, warned, size, "distance to a label")
     world, _ = announced(lambda: image.to_world(phi.contour()))

@@ -97,7 +97,7 @@ def check_solid(given: Subject) -> str:
     resolution = int(random.integers(4, 20))
     size = size_of(source.bounds, None)
     if kind == 0:
-        phi, warned = announced(lambda: sh.solid_distance(source, resolution=resolution))
+        phi, warned = announced(lambda: sh.signed_distance(source, resolution=resolution))
         judge(phi.values, warned, size, "solid")
         return "solid"
     if kind == 1:
@@ -167,7 +167,6 @@ def check_arguments(given: Subject) -> str:
         (sh.SignedHeatSolver, {"domain": ball, "diffusion": 1.0}),
         (sh.SignedHeatSolver(ball).distance, {"sources": ball.path([0, 1]), "constraint": sh.Free()}),
         (sh.signed_distance, {"source": ball, "resolution": 8, "padding": 0.1, "constraint": None, "diffusion": 1.0}),
-        (sh.solid_distance, {"shape": ball, "resolution": 8, "padding": 0.1}),
         (sh.sharpen, {"field": sh.VertexField(ball, ball.vertices[:, 2]), "method": sh.Geodesic()}),
         (sh.VertexField(ball, ball.vertices[:, 2]), {"points": ball.vertices[:3]}),
         (sh.VertexField(ball, ball.vertices[:, 2]).contour, {"level": 0.0}),

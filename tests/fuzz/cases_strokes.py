@@ -25,12 +25,12 @@ def check(drawing: strokes.Drawing) -> str:
     mesh = drawing.mesh
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        values = sh.curve_distance(mesh, drawing.given).values
+        values = sh.signed_distance(drawing.given, mesh).values
     if not np.isfinite(values).all():
         raise Wrong("not finite", str(np.flatnonzero(~np.isfinite(values))[:5]))
     if told:
         return "told"
-    exact = np.abs(sh.curve_distance(mesh, drawing.whole, as_oriented=True).values)
+    exact = np.abs(sh.signed_distance(drawing.whole, mesh, as_oriented=True).values)
     wrong = (np.sign(values) != drawing.sides) & (exact > 2 * strokes.edge_length(mesh))
     areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), mesh.n_vertices)
     share = areas[wrong].sum() / areas.sum()

@@ -32,7 +32,7 @@ def sharp(mesh):
 def field():
     """Two balls, 2.2 apart: their offset has a crease around the axis, which runs askew to the grid."""
     balls = samples.union(samples.sphere(4), samples.sphere(4, center=2.2 * np.array([0.6, 0.48, 0.64])))
-    return sh.solid_distance(balls, resolution=72, padding=0.6)
+    return sh.signed_distance(balls, resolution=72, padding=0.6)
 
 
 def test_the_crease_between_two_balls_has_no_teeth(field):

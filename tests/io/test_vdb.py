@@ -12,7 +12,7 @@ from signedheat.io.vdb_reader import read_vdb
 def band():
     grid = sh.Grid((-1.4, 0.1 + 0.2, 1e-9), (0.02, 0.021, 0.019), (145, 150, 160))
     middle = 0.5 * (grid.origin + grid.upper)
-    return sh.solid_distance(sphere(1500, center=middle), grid, band=0.1)
+    return sh.signed_distance(sphere(1500, center=middle), grid, band=0.1)
 
 
 def blocks_of_tinyvdb(path):

@@ -39,7 +39,7 @@ THINGS = {
     "tets": lambda: TETS,
     "line": lambda: SQUARE,
     "field on a grid": lambda: sh.GridField(GRID, np.linalg.norm(GRID.points, axis=-1) - 1),
-    "field in a band": lambda: sh.solid_distance(samples.sphere(3), spacing=0.1, band=0.2),
+    "field in a band": lambda: sh.signed_distance(samples.sphere(3), spacing=0.1, band=0.2),
     "field of one sign": lambda: sh.GridField(GRID, np.linalg.norm(GRID.points, axis=-1) + 1),
     "field in the plane": lambda: sh.GridField(PLANE, height(PLANE.points)),
     "field on tets": lambda: sh.TetField(TETS, height(TETS.vertices)),
@@ -62,7 +62,7 @@ def test_text_is_short(make):
 
 
 def test_notes_and_results_are_short_text_too():
-    field = sh.solid_distance(samples.with_flipped_faces(BALL, 0.2), resolution=16)
+    field = sh.signed_distance(samples.with_flipped_faces(BALL, 0.2), resolution=16)
     for thing in (field.diagnostics, *field.diagnostics.notes, sh.orientation(BALL), sh.LevelValues(np.arange(99) / 7)):
         assert not re.search(r"\d\.\d{9}|array\(|object at", repr(thing))
     assert repr(sh.LevelValues([1 / 3, 2.0])) == "LevelValues(values=(0.3333, 2), hard=False)"
@@ -114,7 +114,7 @@ def test_fields_go_to_pyvista_with_their_values(name):
 
 def test_confidence_goes_to_pyvista():
     pyvista = pytest.importorskip("pyvista")
-    sdf = sh.solid_distance(samples.without_patches(BALL, 1, 0.8), GRID)
+    sdf = sh.signed_distance(samples.without_patches(BALL, 1, 0.8), GRID)
     image = sdf.to_pyvista()
     places = np.array([[-1.1, 0.1, 0.3], [0.5, 0.9, 0.1], [0.1, -0.3, 0.9]])
     sampled = pyvista.PolyData(places).sample(image)

@@ -125,7 +125,7 @@ def gpytoolbox_winding(O: Any, V: Any, F: Any, **options: Any) -> Any:
 
 @ours
 def gpytoolbox_offset(V: Any, F: Any, iso: float, grid_size: int = 100) -> tuple[Any, Any]:
-    surface: Any = sh.solid_distance((V, np.asarray(F)), resolution=grid_size, padding=2.5 * abs(iso)).contour(iso)
+    surface: Any = sh.signed_distance((V, np.asarray(F)), resolution=grid_size, padding=2.5 * abs(iso)).contour(iso)
     return surface.vertices, surface.faces
 
 
@@ -148,7 +148,7 @@ class Geodesics:
 
     @ours
     def geodesicDistances(self, sources: Any, targets: Any = None) -> tuple[Any, Any]:
-        values = sh.curve_distance(self.mesh, self.mesh.points_at(sources)).values
+        values = sh.signed_distance(self.mesh.points_at(sources), self.mesh).values
         return (values if targets is None else values[targets]), None
 
     @ours

@@ -10,16 +10,19 @@ from ..constraints import Constraint, ZeroSet
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid, room_around
 from ..domains.kinds import ShapeLike
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError
 from ..extensions.figures import describe, shape_figures, told
+from ..extensions.orient import orient
 from ..extensions.sampling import WIDTHS, Layout, sample
-from ..extensions.solid_distance import solid_distance
 from ..fields.grid_field import GridField
 from ..io.bands import BAND_FORMATS
 from ..io.files import told_apart
 from ..io.shapes import read, save
 from ..lowering.area_elements import bounds_around
-from ..solver import as_list
+from ..solids.distance import distance_to_shapes
+from ..solver import SignedHeatSolver, as_list
 
 
 @dataclass(frozen=True)
@@ -67,11 +70,11 @@ class BatchJob:
     info : bool
         Report counts and defects of the shape, as ``signedheat info`` does, in the manifest.
     resolution, spacing, padding
-        The grid around each shape, as for `solid_distance`; by default with room for the offsets.
+        The grid around each shape, as for `signed_distance`; by default with room for the offsets.
     band : float, optional
-        Half width of a band, outside of which the grid is coarse, as for `solid_distance`.
+        Half width of a band, outside of which the grid is coarse, as for `signed_distance`.
     constraint, diffusion, as_oriented, keep_overlaps, plain
-        As for `solid_distance`.
+        As for `signed_distance`.
 
     Raises
     ------
@@ -152,15 +155,13 @@ class BatchJob:
         return {**figures, "told": told(phi), "field": describe(phi), **self._written(phi, stem)}
 
     def _distance(self, shape: ShapeLike, grid: Grid) -> GridField:
-        options: dict[str, Any] = {
-            "constraint": self.constraint,
-            "diffusion": self.diffusion,
-            "as_oriented": self.as_oriented,
-            "keep_overlaps": self.keep_overlaps,
-        }
-        if self.band is not None:
-            return solid_distance(shape, grid, band=self.band, **options)
-        return solid_distance(shape, grid, plain=self.plain, **options)
+        if self.plain:
+            if isinstance(shape, TriangleMesh | PolygonMesh) and not self.as_oriented:
+                shape = orient(shape)
+            return SignedHeatSolver(grid, self.diffusion).distance(shape, self.constraint)
+        options: dict[str, Any] = {"as_oriented": self.as_oriented, "keep_overlaps": self.keep_overlaps}
+        options |= {"constraint": self.constraint, "diffusion": self.diffusion}
+        return cast("GridField", distance_to_shapes(shape, grid, band=self.band, **options))
 
     def _written(self, phi: GridField, stem: Path) -> dict[str, object]:
         """Write what is wanted of a field, and tell its figures."""

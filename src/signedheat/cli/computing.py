@@ -9,21 +9,24 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from typing import Any, overload
 
-from .. import sharpen
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
+from ..curves.plane import distance_to_lines
 from ..diagnostics import SampledSource
 from ..domains.grid import Grid, room_around
+from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError
 from ..extensions.figures import describe as describe
 from ..extensions.figures import told
-from ..extensions.solid_distance import solid_distance
+from ..extensions.orient import orient
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import read_mask
 from ..lowering.area_elements import bounds_around
 from ..progress import Progress, within
 from ..solids.complete import complete
+from ..solids.distance import distance_to_shapes
 from ..solver import SignedHeatSolver, as_list
 from .progress import ProgressBar
 from .streams import say
@@ -94,19 +97,16 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
     with ProgressBar(arguments.quiet or arguments.json) as progress:
         if isinstance(domain, Grid) and arguments.band is not None:
             field = in_band(shape, domain, arguments, progress)
-        elif isinstance(domain, TetMesh) or domain.dimension == 3:
-            field = solid_distance(
-                shape,
-                domain,
-                constraint=constraint_of(arguments.constraint),
-                diffusion=arguments.diffusion,
-                as_oriented=arguments.as_oriented,
-                keep_overlaps=arguments.keep_overlaps,
-                plain=arguments.plain,
-                progress=progress,
-            )
+        elif arguments.plain or not isinstance(constraint_of(arguments.constraint), Free | ZeroSet | Soft):
+            field = plain_distance(shape, domain, arguments, progress)
         else:
-            field = planar_distance(shape, domain, arguments, progress)
+            shared = {"diffusion": arguments.diffusion, "progress": progress}
+            shared["constraint"] = constraint_of(arguments.constraint)
+            if isinstance(domain, Grid) and domain.dimension == 2:
+                field = distance_to_lines(shape, domain, **shared)
+            else:
+                shared |= {"as_oriented": arguments.as_oriented, "keep_overlaps": arguments.keep_overlaps}
+                field = distance_to_shapes(shape, domain, **shared)
     if not arguments.quiet:
         for line in told(field):
             say(f"signedheat: {line}")
@@ -132,16 +132,11 @@ def in_band(shape: Any, grid: Grid, arguments: Namespace, progress: Progress) ->
         return solid.field(scheduler=pool, **options)
 
 
-def planar_distance(lines: Any, grid: Grid, arguments: Namespace, progress: Progress) -> GridField:
-    """Distance to polylines, sharpened unless ``--plain`` is given or the grid has walls."""
-    plain = arguments.plain or grid.mask is not None
-    share = 1.0 if plain else 0.8
-    solver = SignedHeatSolver(grid, arguments.diffusion, lambda done, step: progress(share * done, step))
-    field: GridField = solver.distance(lines, constraint_of(arguments.constraint))
-    if plain:
-        return field
-    progress(share, "sharpen")
-    return sharpen(field)
+def plain_distance(shape: Any, domain: Grid | TetMesh, arguments: Namespace, progress: Progress) -> Any:
+    """φ as the method gives it, of meshes whose faces are turned outwards first."""
+    if isinstance(shape, TriangleMesh | PolygonMesh) and not arguments.as_oriented:
+        shape = orient(shape)
+    return SignedHeatSolver(domain, arguments.diffusion, progress).distance(shape, constraint_of(arguments.constraint))
 
 
 def hint(field: GridField) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..constraints import Free, Soft, ZeroSet
-from ..curves.distance import CurvesTaken, curve_distance
+from ..curves.distance import CurvesTaken, distance_to_curves
 from ..diagnostics import LargeAngles, SharpenedToCurves
 from ..domains.curves import Curve
 from ..domains.triangle_mesh import TriangleMesh
@@ -43,9 +43,9 @@ def measured(surface: Any, curves: Any, arguments: Namespace) -> VertexField:
         if arguments.plain or not isinstance(constraint, Free | ZeroSet | Soft):
             field = SignedHeatSolver(surface, arguments.diffusion, progress, intrinsic).distance(curves, constraint)
         else:
-            field = curve_distance(
-                surface,
+            field = distance_to_curves(
                 curves,
+                surface,
                 constraint=constraint,
                 diffusion=arguments.diffusion or 1.0,
                 intrinsic=intrinsic,

@@ -8,7 +8,6 @@ import numpy as np
 
 from .. import samples
 from ..curves.close import close_curves
-from ..curves.distance import curve_distance
 from ..domains.common_subdivision import common_subdivision
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid
@@ -21,10 +20,10 @@ from ..extensions.piecewise import piecewise_distance
 from ..extensions.sampling import sample
 from ..extensions.sharpening import sharpen
 from ..extensions.sharpening_methods import Convex, Geodesic
-from ..extensions.solid_distance import solid_distance
 from ..extensions.tetrahedralize import tetrahedralize
 from ..extensions.thickness import thickness
-from ..solver import SignedHeatSolver, signed_distance
+from ..signed_distance import signed_distance
+from ..solver import SignedHeatSolver
 from ..view import new_figure
 from ..view.scenes import draw_shape
 
@@ -34,15 +33,14 @@ def solids() -> None:
     ball = samples.sphere(2)
     broken = samples.with_flipped_faces(samples.without_faces(samples.union(ball, samples.sphere(2, center=(1, 0, 0))),
                                                               0.1), 0.1)  # fmt: skip
-    field = solid_distance(broken, Grid.around(broken.bounds, 20))
+    field = signed_distance(broken, Grid.around(broken.bounds, 20))
     field.offset(0.1)
     sample(field, 20)
     fine = Grid.around(ball.bounds, 48)
-    solid_distance(ball, fine, band=3 * float(fine.spacing.max())).offset(0.0)
+    signed_distance(ball, fine, band=3 * float(fine.spacing.max())).offset(0.0)
     points = PointCloud(ball.vertices)
-    solid_distance(points, Grid.around(ball.bounds, 20))
-    plain = signed_distance(broken, resolution=12)
-    sharpen(plain)
+    signed_distance(points, Grid.around(ball.bounds, 20))
+    sharpen(SignedHeatSolver(Grid.around(broken, 12)).distance(broken))
 
 
 def reports() -> None:
@@ -59,7 +57,7 @@ def plane() -> None:
     walls = np.zeros((9, 9), dtype=bool)
     walls[4, :6] = True
     signed_distance(line, Grid((0, 0), 1.0, (9, 9), walls))
-    sharpen(signed_distance(line, Grid((0, 0), 1.0, (9, 9)))).contour(0.0)
+    signed_distance(line, Grid((0, 0), 1.0, (9, 9))).contour(0.0)
     solid_walls = np.zeros((7, 7, 7), dtype=bool)
     solid_walls[3, :5] = True
     signed_distance(samples.sphere(1, 2.0, (3, 3, 3)), Grid((0, 0, 0), 1.0, (7, 7, 7), solid_walls))
@@ -73,7 +71,7 @@ def surfaces() -> None:
     field.contour(0.1)
     for how in (None, Convex(), Geodesic()):
         sharpen(field) if how is None else sharpen(field, method=how)
-    curve_distance(ball, curve)
+    signed_distance(curve, ball)
     close_curves(ball, curve)
     piecewise_distance(ball, curve)
 
@@ -100,10 +98,10 @@ def intrinsic() -> None:
 def tets() -> None:
     """Distance on tets."""
     ball = samples.sphere(1)
-    field = signed_distance(ball, tetrahedralize(ball, resolution=5))
+    field = SignedHeatSolver(tetrahedralize(ball, resolution=5)).distance(ball)
     field.contour(0.1)
     sharpen(field)
-    solid_distance(ball, field.mesh)
+    signed_distance(ball, field.mesh)
 
 
 JOBS: dict[str, Callable[[], None]] = {

@@ -44,7 +44,7 @@ def close_curves(
 
     On triangle meshes the method runs on an intrinsic triangulation along whose edges the curves run, so that curves
     may be smaller than the triangles, and the result follows them where they are there. Pieces are first turned until
-    they agree, and those left out that belong to no other, as by `curve_distance`.
+    they agree, and those left out that belong to no other, as by `signed_distance`.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from ..errors import (
     ConstraintError,
     GeometryError,
     InexactWarning,
-    UnsupportedTypeError,
     warn_user,
 )
 from ..extensions.sharpening import sharpen
@@ -31,9 +30,6 @@ from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .directions import Decision, Pieces, decide
 from .orientation import with_turned
 from .resolution import are_small, flattened, for_zero_set, surface_of, triangulated_once
-
-if TYPE_CHECKING:
-    from typing_extensions import Never
 
 APART = 0.1
 """Share of the area on whose side the shortest completion and that by heat differ where neither can be trusted."""
@@ -148,10 +144,10 @@ def told(numbers: NDArray[np.int64]) -> str:
     return f"curves number {some}" if len(numbers) > 1 else f"curve number {some}"
 
 
-def curve_distance(
-    domain: AnySurface,
+def distance_to_curves(
     curves: CurvesAndPoints | ElementList | Sequence[ElementList],
-    *misplaced: Never,
+    domain: AnySurface,
+    *,
     constraint: Free | ZeroSet | Soft | None = None,
     diffusion: float = 1.0,
     intrinsic: bool | Literal["auto"] = "auto",
@@ -159,62 +155,14 @@ def curve_distance(
     every_piece: bool = False,
     progress: Progress | None = None,
 ) -> VertexField[AnySurface]:
-    """Signed distance to curves and points on a surface, however broken, however they cross the faces.
+    """Signed distance to curves and points on a surface: see `signed_distance`, which calls this.
 
     Pieces of broken curves are turned until they bound something together (`orient`), and those are left out that do
-    not. The signed heat method (`SignedHeatSolver`) tells the sides and completes what is
-    missing; then distance is measured along the surface, exactly, to the curves themselves and to what completes them
-    (`sharpen`).
-
-    Parameters
-    ----------
-    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
-        The surface, with triangles of any shape.
-    curves : Curve, SurfacePoints or a sequence of them
-        Also lists of (element, barycentric coordinates), as potpourri3d has them. Curves without length are left out.
-        Oriented curves have a positive side, to their left; unoriented ones and points have none.
-    constraint : Free, ZeroSet or Soft, optional
-        Imposed on φ at the curves by the method; `ZeroSet` by default.
-    diffusion : float
-        τ in ``t = τ h²``: larger values close gaps along rounder lines.
-    intrinsic : "auto", True or False
-        On what triangles the method runs: see `SignedHeatSolver`.
-    as_oriented : bool
-        Turn no curve, and leave none out.
-    every_piece : bool
-        Leave no curve out.
-    progress : callable, optional
-        Called as ``progress(fraction, step)``; an exception that it raises cancels.
-
-    Returns
-    -------
-    VertexField
-        φ, with a note `diagnostics.SharpenedToCurves` in its diagnostics: how much was completed. If curves were turned
-        or left out, a note `CurvesTaken` says which. Where that was a close decision, or what is missing is a guess,
-        there is an `InexactWarning`.
-
-    Raises
-    ------
-    SourceError
-        If there is no source, or one does not fit the domain.
-    ConstraintError
-        If the constraint gives curves levels of their own: distance is then not that to all of them.
-
-    Examples
-    --------
-    A square, cut in two triangles, and a line across it that is no level set of a function linear on them.
-
-    >>> import signedheat as sh
-    >>> mesh = sh.TriangleMesh([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], [[0, 1, 2], [0, 2, 3]])
-    >>> across = mesh.polyline([[1, 0, 0], [1, 4, 0]])
-    >>> sh.curve_distance(mesh, across).values.round(6).tolist()
-    [1.0, -3.0, -3.0, 1.0]
+    not. The signed heat method (`SignedHeatSolver`) decides the sides and completes what is missing; then distance is
+    measured along the surface, exactly, to the curves themselves and to what completes them (`sharpen`). A note
+    `CurvesTaken` says which curves were turned or left out; where that was a close decision, or what is missing is a
+    guess, there is an `InexactWarning`.
     """
-    if misplaced:
-        raise UnsupportedTypeError(
-            f"curve_distance takes a surface and curves, not {2 + len(misplaced)} things",
-            remedy="pass vertices and faces as one: curve_distance((vertices, faces), curves)",
-        )
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(
             f"distance to curves is zero on all of them, which {constraint!r} denies",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Generic, Literal, overload
+from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,7 @@ from ..frozen import Frozen
 from ..packages import lazy_module
 from ..reprs import short
 from .display import Displayed
-from .foreign import ForeignShape, Shape, converted
+from .foreign import ForeignShape, Shape, as_shapes
 from .polyline import Polyline
 from .validation import (
     array_of,
@@ -124,17 +125,17 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
     @classmethod
     def around(
         cls: type[Grid[int]],
-        bounds: ArrayLike | Shape | Polyline | ForeignShape,
+        bounds: ArrayLike | Shape | Polyline | ForeignShape | Sequence[Shape | Polyline | ForeignShape],
         resolution: int = 128,
         padding: float | None = None,
         spacing: ArrayLike | None = None,
     ) -> Grid[int]:
-        """A grid centred on a shape or a box, with padding on every side.
+        """A grid centred on a shape, on several or on a box, with padding on every side.
 
         Parameters
         ----------
-        bounds : shape, or (2, d) float
-            A shape, or the lower and upper corner of a box.
+        bounds : shape, sequence of shapes, or (2, d) float
+            A shape or several, or the lower and upper corner of a box.
         resolution : int
             Number of nodes along the longest side; all axes have the same spacing.
         padding : float, optional
@@ -155,7 +156,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         >>> Grid.around(sphere(3), spacing=0.5).shape
         (7, 7, 7)
         """
-        box = coordinates(getattr(converted(bounds), "bounds", bounds), "bounds")
+        box = coordinates(_box(bounds), "bounds")
         if len(box) != 2 or not (box[0] <= box[1]).all():
             raise GeometryError(f"bounds must be a lower and an upper corner, not {box.tolist()}", element="bounds")
         lower, upper = box
@@ -258,3 +259,12 @@ def _solid_nodes(mask: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
             "all nodes of the grid are solid: True in the mask means that no way leads through", element="mask"
         )
     return frozen(solid)
+
+
+def _box(bounds: Any) -> Any:
+    """The box around a shape or several; anything else as it is."""
+    boxes = [getattr(shape, "bounds", None) for shape in as_shapes(bounds)]
+    if not boxes or any(box is None for box in boxes):
+        return bounds
+    corners = np.stack([np.asarray(box, dtype=float) for box in boxes])
+    return np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])

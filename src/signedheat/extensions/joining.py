@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,14 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
         raise SourceError("there is no shape", remedy="pass at least one")
     if len(shapes) == 1:
         whole = shapes[0]
-        return whole.boundary if isinstance(whole, TetMesh) else cast("Shape", whole)
+        if isinstance(whole, TetMesh):
+            return whole.boundary
+        if not isinstance(whole, TriangleMesh | PolygonMesh | PointCloud):
+            raise SourceError(
+                f"distance in space is measured to meshes and points, not to a {type(whole).__name__}",
+                element="source 0",
+            )
+        return whole
     meshes = []
     for index, each in enumerate(shapes):
         if not isinstance(each, TriangleMesh | PolygonMesh):

@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints
-from ..domains.foreign import converted
 from ..domains.grid import Grid, room_around
 from ..domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
-from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
@@ -30,9 +28,9 @@ from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..lowering.area_elements import area_elements, bounds_around
 from ..lowering.grid.discretization import refuse_beyond_memory
-from ..solver import as_list, signed_distance
+from ..signed_distance import signed_distance
+from ..solver import SignedHeatSolver, as_list
 from .sharpening import sharpen
-from .solid_distance import solid_distance
 
 RESOLUTION = 128
 ROOM = 0.15
@@ -107,8 +105,8 @@ def dilate(
     resolution : int
         Number of nodes along the longest side of that default grid.
     measure : callable, optional
-        Called as ``measure(shape, domain)`` in place of what is usual there, which is `solid_distance` on grids in
-        space, to choose its options: ``partial(solid_distance, keep_overlaps=True)``.
+        Called as ``measure(shape, domain)`` in place of `signed_distance`, to choose its options:
+        ``partial(signed_distance, keep_overlaps=True)``.
 
     Returns
     -------
@@ -287,16 +285,14 @@ def thicken(
 
 def _field(shape: Sources, domain: Domain) -> Field:
     """The distance whose level sets are the offsets: that to a solid, where the domain is a grid in space."""
-    shape = converted(shape)
     if isinstance(domain, Grid) and domain.dimension == 3 and domain.mask is None:
-        if isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | TetMesh):
-            return solid_distance(shape, domain)
+        return signed_distance(shape, domain)
     return _sided(domain, shape)
 
 
 def _sided(domain: Domain, shape: Sources) -> Field:
     """The signed distance to a shape that may have two sides and no inside; on grids sharpened."""
-    field = signed_distance(shape, domain)
+    field = SignedHeatSolver(domain).distance(shape)
     return sharpen(field) if isinstance(field, GridField) else field
 
 

@@ -54,8 +54,8 @@ class Samples:
 
     Examples
     --------
-    >>> from signedheat import samples, solid_distance
-    >>> taken = sample(solid_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
+    >>> from signedheat import samples, signed_distance
+    >>> taken = sample(signed_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
     >>> taken
     Samples(1000 points, 800 near the surface, distances from -3.82 to 3.07)
     >>> bool(np.abs(taken.normalized().points).max() < 1.3)
@@ -128,7 +128,7 @@ def sample(
     Parameters
     ----------
     field : GridField
-        Distance in space, from `solid_distance` or ``sharpen(field, shape)``.
+        Distance in space, from `signed_distance` or ``sharpen(field, shape)``.
     n : int
         Number of points.
     near : float
@@ -154,8 +154,8 @@ def sample(
 
     Examples
     --------
-    >>> from signedheat import samples, solid_distance
-    >>> field = solid_distance(samples.without_faces(samples.sphere(3), 0.3), resolution=32)
+    >>> from signedheat import samples, signed_distance
+    >>> field = signed_distance(samples.without_faces(samples.sphere(3), 0.3), resolution=32)
     >>> taken = sample(field, 2000, near=0.5, widths=[0.1, 0.01], seed=7)
     >>> away = np.abs(taken.distances - (np.linalg.norm(taken.points, axis=1) - 1))
     >>> bool(np.quantile(away, 0.9) < 0.01 and away.max() < 0.1)
@@ -170,7 +170,7 @@ def sample(
     if field.solid is None:
         raise SourceError(
             "the field does not know the solid that it is the distance to",
-            remedy="take it from solid_distance or Solid.field, not from a file",
+            remedy="take it from signed_distance or Solid.field, not from a file",
         )
     triangles = field.solid.triangles
     if not len(triangles):

@@ -133,7 +133,7 @@ def sharpen_field(field: object, *arguments: object, **options: object) -> Field
     """Sharpen a field; every kind of field registers a function of its own. `sharpen` is the public function."""
     raise UnsupportedTypeError(
         f"a {type(field).__name__} cannot be sharpened",
-        remedy="pass a field that signed_distance returned",
+        remedy="pass one that SignedHeatSolver.distance returned",
     )
 
 

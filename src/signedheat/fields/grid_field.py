@@ -199,7 +199,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         if self.solid is None:
             raise SourceError(
                 "the field does not know the solid that it is the distance to",
-                remedy="take it from solid_distance or Solid.field, not from a file",
+                remedy="take it from signed_distance or Solid.field, not from a file",
                 element="field",
             )
         return self.solid.closest(np.atleast_2d(self._checked(points)))

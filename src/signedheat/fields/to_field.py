@@ -127,7 +127,7 @@ def warned(field: AnyField) -> AnyField:
     note = field.diagnostics.note(SmallLoops)
     if note:
         warn_user(
-            f"{note}. The method hardly sees them: curve_distance measures to the curves themselves, as does, on "
+            f"{note}. The method hardly sees them: sh.signed_distance measures to the curves themselves, as does, on "
             "triangle meshes, intrinsic=True by triangles that have them along edges",
             InexactWarning,
         )

@@ -57,7 +57,7 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
     --------
     >>> import tempfile, signedheat as sh
     >>> from signedheat import samples
-    >>> ball = sh.solid_distance(samples.sphere(3), resolution=48, band=0.2)
+    >>> ball = sh.signed_distance(samples.sphere(3), resolution=48, band=0.2)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_vdb(ball, f"{folder}/ball.vdb")
     ...     back = sh.load_field(f"{folder}/ball.vdb")

@@ -16,7 +16,7 @@ SIDES = 100
 NARROW = 0.03
 """Width of a rim, over the diagonal of its part, up to which that is so."""
 SLIT = 1e-3
-"""Width of an opening, over the length of its rim, up to which its lid is flat: to see it bend costs samples without end."""
+"""Width of an opening, over the length of its rim, up to which its lid is flat: its strip has no end of samples."""
 HIGHEST = 1.0
 """Rise of a lid over the width of its opening from which on the plate has run away: on a third of a ball it is .8."""
 

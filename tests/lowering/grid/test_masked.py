@@ -40,7 +40,7 @@ def test_distance_bends_around_a_wall_and_converges():
     errors = []
     for n in sizes:
         grid = room(n)
-        phi = sh.signed_distance(LEFT_OF_WALL, grid)
+        phi = sh.SignedHeatSolver(grid).distance(LEFT_OF_WALL)
         assert (np.isnan(phi.values) == grid.mask).all()
         errors.append(error(grid, phi, exact(grid)))
         assert errors[-1] < 0.8 * grid.spacing[0]
@@ -52,7 +52,7 @@ def test_without_bending_the_error_would_be_of_the_size_of_the_room():
     grid = room(65)
     straight = grid.points[..., 0] - 0.3
     assert np.abs((exact(grid) - straight)[~grid.mask]).max() > 0.8
-    phi = sh.signed_distance(LEFT_OF_WALL, grid)
+    phi = sh.SignedHeatSolver(grid).distance(LEFT_OF_WALL)
     assert np.nanmax(np.abs(phi.values - exact(grid))) < 0.06
 
 
@@ -64,7 +64,7 @@ def test_distance_bends_in_space():
         grid = sh.Grid((0, 0, 0), flat.spacing[0], (n, n, depth), np.repeat(flat.mask[..., None], depth, axis=2))
         z = grid.upper[2]
         sheet = sh.TriangleMesh([[0.3, 0, 0], [0.3, 2, 0], [0.3, 2, z], [0.3, 0, z]], [[0, 1, 2], [0, 2, 3]])
-        phi = sh.signed_distance(sheet, grid)
+        phi = sh.SignedHeatSolver(grid).distance(sheet)
         errors.append(error(grid, phi, exact(flat)[..., None]))
     assert errors[1] < 0.65 * errors[0]
     assert errors[1] < 0.55 * grid.spacing[0]
@@ -73,17 +73,17 @@ def test_distance_bends_in_space():
 
 def test_the_other_side_is_negative_and_turning_the_source_over_changes_the_sign():
     grid = room(49)
-    phi = sh.signed_distance(LEFT_OF_WALL, grid)
+    phi = sh.SignedHeatSolver(grid).distance(LEFT_OF_WALL)
     assert phi.values[0, 10] == pytest.approx(-0.3, abs=0.01)
-    turned = sh.signed_distance(LEFT_OF_WALL.reversed(), grid)
+    turned = sh.SignedHeatSolver(grid).distance(LEFT_OF_WALL.reversed())
     np.testing.assert_allclose(turned.values, -phi.values, atol=1e-9)
 
 
 def test_distance_scales_with_the_room():
     grid = room(33)
     large = sh.Grid(1000 * grid.origin, 1000 * grid.spacing, grid.shape, grid.mask)
-    phi = sh.signed_distance(sh.Polyline(1000 * LEFT_OF_WALL.points), large)
-    np.testing.assert_allclose(phi.values, 1000 * sh.signed_distance(LEFT_OF_WALL, grid).values, rtol=1e-7)
+    phi = sh.SignedHeatSolver(large).distance(sh.Polyline(1000 * LEFT_OF_WALL.points))
+    np.testing.assert_allclose(phi.values, 1000 * sh.SignedHeatSolver(grid).distance(LEFT_OF_WALL).values, rtol=1e-7)
 
 
 def test_a_door_opens_into_a_room_like_a_fan():
@@ -94,7 +94,7 @@ def test_a_door_opens_into_a_room_like_a_fan():
     solid = (np.abs(x - 0.5) < 1.01 * h) & (np.abs(y - 1) > 0.2 - 1e-9)
     grid = sh.Grid((0, 0), h, (n, n), solid)
     post = 0.5 + 0.01 * h  # the door leads down the middle of the wall, and so does its end
-    phi = sh.signed_distance(sh.Polyline([[post, 1.2], [post, 0.8]]), grid)
+    phi = sh.SignedHeatSolver(grid).distance(sh.Polyline([[post, 1.2], [post, 0.8]]))
     wall, edge = 0.5 + 1.5 * h, 0.8 + 0.5 * h
     behind = (x > wall) & (y < edge)
     wanted = wall - post + np.hypot(x - wall, y - edge)
@@ -108,7 +108,7 @@ def test_a_grid_without_solid_nodes_measures_as_one_without_a_mask():
     plain = sh.Grid((-1.6, -1.6), 0.05, (65, 65))
     masked = sh.Grid(plain.origin, plain.spacing, plain.shape, np.zeros(plain.shape, dtype=bool))
     for constraint in (sh.ZeroSet(), sh.Free(), sh.ZeroSet(hard=True), sh.Soft(10.0), sh.EachComponent()):
-        here, there = (sh.signed_distance(circle, grid, constraint=constraint).values for grid in (plain, masked))
+        here, there = (sh.SignedHeatSolver(grid).distance(circle, constraint).values for grid in (plain, masked))
         away = np.linalg.norm(plain.points, axis=-1) - 1
         assert np.abs(here - there)[np.abs(away) < 0.3].max() < 0.12 * 0.05
         assert np.abs(here - there).max() < 0.6 * 0.05  # far away the one is diffused on coarser grids
@@ -118,21 +118,21 @@ def test_a_grid_without_solid_nodes_measures_as_one_without_a_mask():
 def test_levels_and_components():
     grid = room(49)
     sources = [LEFT_OF_WALL, sh.Polyline([[0.6, 2.0], [0.6, 0.0]])]
-    phi = sh.signed_distance(sources, grid, constraint=sh.LevelValues([0.0, 0.3]))
+    phi = sh.SignedHeatSolver(grid).distance(sources, sh.LevelValues([0.0, 0.3]))
     np.testing.assert_allclose(phi([[0.3, 1.5], [0.6, 1.5]]), [0, 0.3], atol=0.01)
-    each = sh.signed_distance(sources, grid, constraint=sh.EachComponent())
+    each = sh.SignedHeatSolver(grid).distance(sources, sh.EachComponent())
     np.testing.assert_allclose(np.diff(each([[0.3, 1.5], [0.6, 1.5]])), 0.3, atol=0.01)
     with refused(sh.ConstraintError):
-        sh.signed_distance(sources, grid, constraint=sh.LevelValues([0.0, 0.3, 1.0]))
+        sh.SignedHeatSolver(grid).distance(sources, sh.LevelValues([0.0, 0.3, 1.0]))
 
 
 def test_conjugate_gradients_find_what_factors_find(monkeypatch):
     grid = room(65)
     constraints = (sh.ZeroSet(), sh.ZeroSet(hard=True))
-    direct = [sh.signed_distance(LEFT_OF_WALL, grid, constraint=c).values for c in constraints]
+    direct = [sh.SignedHeatSolver(grid).distance(LEFT_OF_WALL, c).values for c in constraints]
     monkeypatch.setitem(masked_grid.DIRECT_NODES, 2, 0)
     for found, constraint in zip(direct, constraints, strict=True):
-        again = sh.signed_distance(LEFT_OF_WALL, grid, constraint=constraint).values
+        again = sh.SignedHeatSolver(grid).distance(LEFT_OF_WALL, constraint).values
         np.testing.assert_allclose(again, found, atol=1e-4)
 
 
@@ -141,7 +141,7 @@ def test_a_room_without_a_source_is_nan_and_says_so():
     solid[18:20] = True
     grid = sh.Grid((0, 0), 1.0, solid.shape, solid)
     with pytest.warns(sh.UnreachedWarning, match="200 of 560 free nodes are cut off"):
-        phi = sh.signed_distance(sh.Polyline([[5.0, 19.0], [5.0, 0.0]]), grid)
+        phi = sh.SignedHeatSolver(grid).distance(sh.Polyline([[5.0, 19.0], [5.0, 0.0]]))
     assert np.isnan(phi.values[18:]).all() and np.isfinite(phi.values[:18]).all()
     assert len(phi.diagnostics.unreached) == 200
     assert np.isnan(phi([[25.0, 3.0]]))[0] and phi([[10.0, 3.0]])[0] == pytest.approx(5, abs=1e-4)
@@ -158,7 +158,7 @@ def test_corridors_have_no_end_where_numbers_underflow():
     solid[:, 1:3] = solid[:, 4:6] = False
     solid[-3:, 3] = False
     grid = sh.Grid((0, 0), 1.0, solid.shape, solid)
-    phi = sh.signed_distance(sh.Polyline([[5.3, 2.5], [5.3, 0.5]]), grid)
+    phi = sh.SignedHeatSolver(grid).distance(sh.Polyline([[5.3, 2.5], [5.3, 0.5]]))
     np.testing.assert_allclose(phi.values[[1400, 0], 1], [1394.7, -5.3], atol=1e-3)
     assert phi.values[0, 5] == pytest.approx(1496 - 5.3 + 1496, abs=10)  # there and back again
 
@@ -198,7 +198,7 @@ def test_contours_in_space_are_closed_along_solid_nodes():
     solid[4:7, 4:7, :] = True
     grid = sh.Grid((0, 0, 0), 1.0, solid.shape, solid)
     source = sh.TriangleMesh([[1.3, -1, -1], [1.3, 12, -1], [1.3, 12, 12], [1.3, -1, 12]], [[0, 1, 2], [0, 2, 3]])
-    surface = sh.signed_distance(source, grid).offset(4.2)
+    surface = sh.SignedHeatSolver(grid).distance(source).offset(4.2)
     assert_closed_manifold(surface)
     assert surface.vertices[:, 0].max() == pytest.approx(5.5, abs=0.05)
     assert enclosed_volume(surface) == pytest.approx((5.5 * 10 - 2.5 * 4 + 2 * 0.5) * 10, rel=0.01)
@@ -222,11 +222,11 @@ def test_masks_are_checked():
     solid = np.zeros((10, 10), dtype=bool)
     solid[4:8] = True
     with refused(sh.SourceError, "source 0"):
-        sh.signed_distance(sh.Polyline([[5.2, 1.0], [5.2, 8.0]]), sh.Grid((0, 0), 1.0, (10, 10), solid))
+        sh.SignedHeatSolver(sh.Grid((0, 0), 1.0, (10, 10), solid)).distance(sh.Polyline([[5.2, 1.0], [5.2, 8.0]]))
 
 
 def test_the_mask_is_saved(tmp_path):
-    phi = sh.signed_distance(LEFT_OF_WALL, room(17))
+    phi = sh.SignedHeatSolver(room(17)).distance(LEFT_OF_WALL)
     phi.save(tmp_path / "phi.npz")
     again = sh.load_field(tmp_path / "phi.npz")
     np.testing.assert_array_equal(again.grid.mask, phi.grid.mask)

@@ -35,9 +35,9 @@ def rms(values):
 
 def test_distance_to_a_line_is_exact_and_positive_to_its_left():
     grid = sh.Grid((-1, -1), 0.05, (41, 31))
-    phi = sh.signed_distance(sh.Polyline([[-1.0, -0.23], [1.0, -0.23]]), grid)
+    phi = sh.SignedHeatSolver(grid).distance(sh.Polyline([[-1.0, -0.23], [1.0, -0.23]]))
     np.testing.assert_allclose(phi.values, grid.points[..., 1] + 0.23, atol=1e-5)
-    back = sh.signed_distance(sh.Polyline([[1.0, -0.23], [-1.0, -0.23]]), grid)
+    back = sh.SignedHeatSolver(grid).distance(sh.Polyline([[1.0, -0.23], [-1.0, -0.23]]))
     np.testing.assert_allclose(back.values, -phi.values, atol=1e-12)
 
 
@@ -45,7 +45,7 @@ def test_distance_to_a_circle_converges():
     sizes = (32, 64, 128)
     errors = []
     for n in sizes:
-        phi = sh.signed_distance(circle(8 * n), resolution=n)
+        phi = sh.SignedHeatSolver(sh.Grid.around(circle(8 * n), n)).distance(circle(8 * n))
         assert max(phi.grid.shape) == n and phi.grid.dimension == 2
         assert rms(phi.values - away_from(phi)) < 0.25 * phi.grid.spacing[0]
         errors.append(rms(sh.sharpen(phi).values - away_from(phi)))
@@ -53,7 +53,7 @@ def test_distance_to_a_circle_converges():
 
 
 def test_distance_to_a_square():
-    phi = sh.sharpen(sh.signed_distance(SQUARE, resolution=128))
+    phi = sh.sharpen(sh.SignedHeatSolver(sh.Grid.around(SQUARE, 128)).distance(SQUARE))
     error = phi.values - distance_to_square(phi.grid.points)
     assert rms(error) < 0.3 * phi.grid.spacing[0]
     assert np.abs(error).max() < 1.0 * phi.grid.spacing[0]
@@ -62,17 +62,19 @@ def test_distance_to_a_square():
 def test_broken_and_doubled_circles():
     whole = circle()
     arcs = [sh.Polyline(whole.points[k : k + 30]) for k in range(0, 400, 50)]
-    phi = sh.sharpen(sh.signed_distance(arcs, resolution=96))
+    phi = sh.sharpen(sh.SignedHeatSolver(sh.Grid.around(arcs, 96)).distance(arcs))
     assert rms(phi.values - away_from(phi)) < 0.01
-    twice = sh.signed_distance([whole, whole], resolution=64)
-    np.testing.assert_allclose(twice.values, sh.signed_distance(whole, resolution=64).values, atol=1e-4)
+    twice = sh.SignedHeatSolver(sh.Grid.around([whole, whole], 64)).distance([whole, whole])
+    np.testing.assert_allclose(
+        twice.values, sh.SignedHeatSolver(sh.Grid.around(whole, 64)).distance(whole).values, atol=1e-4
+    )
 
 
 def test_a_line_that_crosses_itself():
     """A figure eight: one loop clockwise, the other counter-clockwise."""
     t = 2 * np.pi * np.arange(400) / 400
     eight = sh.Polyline(np.stack([np.sin(t), 0.5 * np.sin(2 * t)], axis=1), closed=True)
-    phi = sh.signed_distance(eight, resolution=64)
+    phi = sh.SignedHeatSolver(sh.Grid.around(eight, 64)).distance(eight)
     left, right = phi([[-0.6, 0.0], [0.6, 0.0]])
     assert left == pytest.approx(-right, abs=0.01)
     assert abs(left) == pytest.approx(np.linalg.norm(eight.points - [0.6, 0], axis=1).min(), abs=0.02)
@@ -80,24 +82,26 @@ def test_a_line_that_crosses_itself():
 
 def test_several_components_and_levels():
     inner, outer = circle(radius=0.5), circle(radius=1.0)
-    phi = sh.signed_distance([inner, outer], resolution=64, constraint=sh.LevelValues([0.0, 0.5]))
+    phi = sh.SignedHeatSolver(sh.Grid.around([inner, outer], 64)).distance([inner, outer], sh.LevelValues([0.0, 0.5]))
     assert rms(phi.values - (away_from(phi) + 0.5)) < 0.01
-    each = sh.signed_distance([inner, outer], resolution=64, constraint=sh.EachComponent())
+    each = sh.SignedHeatSolver(sh.Grid.around([inner, outer], 64)).distance([inner, outer], sh.EachComponent())
     assert np.ptp(each([[1.0, 0.0], [0.0, 1.0]]) - each([[0.5, 0.0], [0.0, 0.5]])) < 0.01
     assert each([[1.0, 0.0]]) - each([[0.5, 0.0]]) == pytest.approx(0.5, abs=0.02)
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_distance_scales(scale):
-    small = sh.signed_distance(circle(), resolution=32)
-    large = sh.signed_distance(sh.Polyline(scale * circle().points, closed=True), resolution=32)
+    small = sh.SignedHeatSolver(sh.Grid.around(circle(), 32)).distance(circle())
+    large = sh.SignedHeatSolver(sh.Grid.around(sh.Polyline(scale * circle().points, closed=True), 32)).distance(
+        sh.Polyline(scale * circle().points, closed=True)
+    )
     np.testing.assert_allclose(large.values, scale * small.values, atol=1e-6 * scale)
 
 
 def test_points_on_a_line():
     ends = np.array([[-0.52], [0.73]])
     grid = sh.Grid([-1.0], 0.05, [61])
-    phi = sh.signed_distance(sh.PointCloud(ends, normals=[[-1.0], [1.0]]), grid)
+    phi = sh.SignedHeatSolver(grid).distance(sh.PointCloud(ends, normals=[[-1.0], [1.0]]))
     x = grid.points[:, 0]
     exact = np.maximum(-0.52 - x, x - 0.73)
     assert np.abs(phi.values - exact).max() < 0.5 * 0.05  # at the ridge between both
@@ -109,7 +113,9 @@ def test_a_sphere_in_four_dimensions():
     rng = np.random.default_rng(1)
     points = rng.normal(size=(8000, 4))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    phi = sh.signed_distance(sh.PointCloud(points, normals=points), resolution=18, padding=0.4)
+    phi = sh.SignedHeatSolver(sh.Grid.around(sh.PointCloud(points, normals=points), 18, padding=0.4)).distance(
+        sh.PointCloud(points, normals=points)
+    )
     assert phi.grid.dimension == 4
     assert rms(phi.values - away_from(phi)) < 0.1 * phi.grid.spacing[0]
     assert phi([[0.7, 0.7, 0.7, 0.7]])[0] == pytest.approx(0.4, abs=0.02)
@@ -117,12 +123,12 @@ def test_a_sphere_in_four_dimensions():
 
 
 def test_lines_of_equal_distance_are_oriented_and_close():
-    phi = sh.sharpen(sh.signed_distance(circle(), resolution=96))
+    phi = sh.sharpen(sh.SignedHeatSolver(sh.Grid.around(circle(), 96)).distance(circle()))
     [line] = phi.contour(0.15)
     assert line.closed and line.signed_area < 0
     np.testing.assert_allclose(np.linalg.norm(line.points, axis=1), 1.15, atol=1e-3)
     assert line.length == pytest.approx(2 * np.pi * 1.15, rel=1e-3)
-    again = sh.signed_distance(line, phi.grid)  # oriented so that φ grows to the left
+    again = sh.SignedHeatSolver(phi.grid).distance(line)  # oriented so that φ grows to the left
     assert again([[0, 0]])[0] < 0 < again([[1.4, 0]])[0]
     [out] = phi.offset(-0.5)
     assert -out.signed_area == pytest.approx(np.pi * 0.25, rel=2e-3)
@@ -134,13 +140,13 @@ def test_lines_of_equal_distance_are_oriented_and_close():
 
 def test_open_lines_end_at_the_box():
     grid = sh.Grid((0, 0), 0.1, (21, 11))
-    [line] = sh.signed_distance(sh.Polyline([[0, 0.52], [2, 0.52]]), grid).contour(0.2)
+    [line] = sh.SignedHeatSolver(grid).distance(sh.Polyline([[0, 0.52], [2, 0.52]])).contour(0.2)
     assert not line.closed
     np.testing.assert_allclose(line.points[[0, -1]], [[0, 0.72], [2, 0.72]], atol=1e-4)
 
 
 def test_field_in_the_plane(tmp_path):
-    phi = sh.signed_distance(circle(), resolution=64)
+    phi = sh.SignedHeatSolver(sh.Grid.around(circle(), 64)).distance(circle())
     rng = np.random.default_rng(2)
     points = rng.uniform(-1.3, 1.3, (50, 2))
     radius = np.linalg.norm(points, axis=1)
@@ -162,7 +168,7 @@ def test_boolean_images():
     lines = sh.Polyline.from_mask(inside, (-2, -1.5), 4 / 160)
     assert len(lines) == 2 and all(line.closed and line.signed_area < 0 for line in lines)
     assert sum(-line.signed_area for line in lines) == pytest.approx(np.pi * (0.49 + 0.36), rel=0.01)
-    phi = sh.signed_distance(lines, resolution=96)
+    phi = sh.SignedHeatSolver(sh.Grid.around(lines, 96)).distance(lines)
     exact = np.minimum(
         *(np.hypot(phi.grid.points[..., 0] - a, phi.grid.points[..., 1]) - r for a, r in ((-0.8, 0.7), (0.8, 0.6)))
     )
@@ -187,16 +193,16 @@ def test_polylines_are_checked():
     assert sh.Polyline([[0, 0], [1, 0], [1, 1], [0, 0]], closed=True).n_points == 3
     repeated = sh.Polyline([[-1, 0], [0, 0], [0, 0], [1, 0]])  # ugly, but valid
     grid = sh.Grid((-1, -1), 0.1, (21, 21))
-    np.testing.assert_allclose(sh.signed_distance(repeated, grid).values, grid.points[..., 1], atol=1e-5)
+    np.testing.assert_allclose(sh.SignedHeatSolver(grid).distance(repeated).values, grid.points[..., 1], atol=1e-5)
 
 
 def test_sources_of_the_wrong_dimension_are_refused():
     with refused(sh.SourceError, "source 0"):
-        sh.signed_distance(SQUARE, sh.Grid((0, 0, 0), 0.1, (4, 4, 4)))
+        sh.SignedHeatSolver(sh.Grid((0, 0, 0), 0.1, (4, 4, 4))).distance(SQUARE)
     with refused(sh.SourceError, "source 0"):
-        sh.signed_distance(sh.TriangleMesh(np.eye(3), [[0, 1, 2]]), sh.Grid((0, 0), 0.1, (4, 4)))
+        sh.SignedHeatSolver(sh.Grid((0, 0), 0.1, (4, 4))).distance(sh.TriangleMesh(np.eye(3), [[0, 1, 2]]))
     with refused(sh.SourceError):
-        sh.signed_distance(SQUARE, sh.Grid((5, 5), 0.1, (4, 4)))
+        sh.SignedHeatSolver(sh.Grid((5, 5), 0.1, (4, 4))).distance(SQUARE)
 
 
 @pytest.mark.parametrize(("diffusion", "least", "most"), [(1.0, 0.01, 0.04), (10.0, 0.04, 0.07), (100.0, 0.13, 0.19)])
@@ -209,7 +215,7 @@ def test_long_diffusion_rounds_corners_as_the_exact_solution_does(diffusion, lea
     masked = sh.Grid(plain.origin, plain.spacing, plain.shape, np.zeros(plain.shape, dtype=bool))
     cuts = []
     for grid in (plain, masked):
-        [line] = sh.signed_distance(sides, grid, diffusion=diffusion).contour(0.0)
+        [line] = sh.SignedHeatSolver(grid, diffusion=diffusion).distance(sides).contour(0.0)
         cuts.append(np.linalg.norm(line.points - [1, 1], axis=1).min())
     assert cuts[0] == pytest.approx(cuts[1], abs=0.02, rel=0.15)
     assert least < cuts[0] < most

@@ -46,7 +46,7 @@ def test_sweeps_do_not_depend_on_the_number_of_threads(monkeypatch):
     for threads, results in (("1", one), ("7", many)):
         monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
         monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
-        field = sh.signed_distance(shape, box(40))
+        field = sh.SignedHeatSolver(box(40)).distance(shape)
         results += [field.values, sh.sharpen(field).values]
     assert all(np.array_equal(a, b) for a, b in zip(one, many, strict=True))
 

@@ -17,7 +17,7 @@ def test_parts_make_the_same_surface(tmp_path, cut):
     whole = sphere(1500)
     middles = whole.vertices[whole.faces].mean(axis=1)
     part = sh.TriangleMesh(whole.vertices, whole.faces[middles[:, 2] < cut])  # leaves the box, or not
-    band = sh.solid_distance(part, resolution=150, band=0.08)
+    band = sh.signed_distance(part, resolution=150, band=0.08)
     for level in (0.0, 0.05):
         path = tmp_path / "contour.ply"
         counts = band.save_contour(path, level)
@@ -28,7 +28,7 @@ def test_parts_make_the_same_surface(tmp_path, cut):
 
 
 def test_levels_and_files_that_cannot_be_are_refused(tmp_path):
-    band = sh.solid_distance(sphere(300), resolution=40, band=0.2)
+    band = sh.signed_distance(sphere(300), resolution=40, band=0.2)
     with refused(sh.OutsideError, element="level 0.5"):
         band.save_contour(tmp_path / "a.ply", 0.5)
     with refused(sh.FileFormatError, file="a.stl"):

@@ -1,0 +1,218 @@
+"""The one verb: signed distance to broken shapes in space, to curves on surfaces, and to drawings in the plane."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, get_args, overload
+
+from numpy.typing import ArrayLike
+
+from .constraints import Constraint, Free, Soft, ZeroSet
+from .curves.distance import distance_to_curves
+from .curves.plane import distance_to_lines
+from .domains.curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
+from .domains.foreign import ForeignShape, as_shapes, converted
+from .domains.grid import Dimension, Grid
+from .domains.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
+from .domains.polyline import Polyline
+from .domains.tet_mesh import TetMesh
+from .errors import SourceError, UnsupportedTypeError
+from .extrapolation import Diffusion
+from .fields.grid_field import GridField
+from .fields.tet_field import TetField
+from .fields.to_field import Field
+from .fields.vertex_field import VertexField
+from .progress import Progress
+from .solids.distance import distance_to_shapes
+
+
+@overload
+def signed_distance(
+    source: Shapes,
+    domain: Grid[Literal[3]] | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    band: float | None = None,
+    completion: Literal["lids", "heat"] = "lids",
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    progress: Progress | None = None,
+) -> GridField[Literal[3]]: ...
+@overload
+def signed_distance(
+    source: Polylines,
+    domain: Grid[Literal[2]] | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    constraint: Constraint | None = None,
+    diffusion: Diffusion | None = None,
+    progress: Progress | None = None,
+) -> GridField[Literal[2]]: ...
+@overload
+def signed_distance(
+    source: SpaceSources,
+    domain: Grid[Dimension],
+    *,
+    band: float | None = None,
+    completion: Literal["lids", "heat"] = "lids",
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    progress: Progress | None = None,
+) -> GridField[Dimension]: ...
+@overload
+def signed_distance(
+    source: Shapes,
+    domain: TetMesh,
+    *,
+    completion: Literal["lids", "heat"] = "lids",
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    progress: Progress | None = None,
+) -> TetField: ...
+@overload
+def signed_distance(
+    source: CurvesAndPoints | ElementList | Sequence[ElementList],
+    domain: AnySurface,
+    *,
+    constraint: Free | ZeroSet | Soft | None = None,
+    diffusion: float = 1.0,
+    intrinsic: bool | Literal["auto"] = "auto",
+    as_oriented: bool = False,
+    every_piece: bool = False,
+    progress: Progress | None = None,
+) -> VertexField[AnySurface]: ...
+@overload
+def signed_distance(
+    source: Sources,
+    domain: Domain | ForeignShape | None,
+    *,
+    constraint: Constraint | None = None,
+    diffusion: float = 1.0,
+    progress: Progress | None = None,
+) -> Field: ...
+def signed_distance(source: Any, domain: Any = None, **options: Any) -> Field:
+    """Signed distance to a shape, however broken: exact where the shape is there, completed where it is missing.
+
+    Shapes in space are completed (`complete`), and distance is measured to what was given and to its completion. Of
+    curves on a surface, pieces are turned until they bound something together, and those that bound nothing are left
+    out; distance is measured along the surface. Of drawings in the plane, lines are taken as they are drawn. On
+    surfaces and in the plane, the zero set of the signed heat method stands where curves are missing. The method alone
+    is `SignedHeatSolver`.
+
+    Parameters
+    ----------
+    source : shape, curves or polylines; or a sequence of them
+        In space `TriangleMesh`, `PolygonMesh`, `TetMesh` or `PointCloud`, with normals or without; objects of trimesh,
+        PyVista, meshio and Open3D and pairs (vertices, faces) are taken wherever a shape is. On a surface `Curve` and
+        `SurfacePoints`, or lists of (element, barycentric coordinates), as potpourri3d has them. In the plane
+        `Polyline`.
+    domain : Grid, TetMesh or surface, optional
+        Where to measure: by default a grid of cubic cells around the shape or drawing. Curves need their surface: a
+        `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
+    resolution : int
+        Nodes along the longest side of the default grid; 128 by default.
+    spacing : float or (d,) float, optional
+        Distance between its nodes, in place of `resolution`.
+    padding : float, optional
+        Room around the shape, in its units; by default a fifth of its longest side.
+    band : float, optional
+        In space: only the nodes of the grid whose distance is at most this, in units of length: for fine grids.
+    completion : {"lids", "heat"}
+        In space: see `complete`.
+    constraint : Free, ZeroSet or Soft, optional
+        Imposed on φ, where it is computed, at the source; `ZeroSet` by default.
+    diffusion : float
+        τ in ``t = τ h²``, likewise; larger values close gaps along rounder lines.
+    as_oriented : bool
+        In space and on surfaces: turn nothing.
+    keep_overlaps : bool
+        In space: count what lies inside other bodies as surface.
+    every_piece : bool
+        On surfaces: leave no curve out.
+    intrinsic : "auto", True or False
+        On surfaces: on what triangles the method runs, see `SignedHeatSolver`.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; an exception that it raises cancels.
+
+    Returns
+    -------
+    GridField, TetField or VertexField
+        Negative inside a shape, and to the right of curves and lines; around sheets that bound nothing positive on
+        both sides. ``diagnostics.notes`` say what was turned, left out and completed.
+
+    Raises
+    ------
+    SourceError
+        If there is no source, or it does not fit the domain.
+    ConstraintError
+        If the constraint gives curves levels of their own: distance is then not that to all of them.
+    GeometryError
+        If resolution, spacing or padding make no grid.
+    MemoryLimitError
+        If the grid cannot fit in memory; nothing has been allocated then.
+    UnsupportedTypeError
+        If an option is not one of this kind of source.
+
+    Examples
+    --------
+    Two balls that overlap, and are united:
+
+    >>> import numpy as np
+    >>> import signedheat as sh
+    >>> from signedheat import samples
+    >>> ball, other = samples.sphere(3), samples.sphere(3, center=(1.0, 0, 0))
+    >>> field = sh.signed_distance(samples.union(ball, other), resolution=32)
+    >>> bool(np.abs(field([[0.5, 0, 0]]) + np.sqrt(0.75)) < 0.05)
+    True
+
+    A square of two triangles, and a line across it that is no level set of a function linear on them:
+
+    >>> mesh = sh.TriangleMesh([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> sh.signed_distance(mesh.polyline([[1, 0, 0], [1, 4, 0]]), mesh).values.round(6).tolist()
+    [1.0, -3.0, -3.0, 1.0]
+
+    A drawing in the plane:
+
+    >>> square = sh.Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
+    >>> sh.signed_distance(square, resolution=33)([[0.5, 0.75]]).round(2).tolist()
+    [-0.25]
+    """
+    domain = converted(domain)
+    measure = _measure(source, domain)
+    known = [name for name, each in inspect.signature(measure).parameters.items() if each.kind is each.KEYWORD_ONLY]
+    for option in options:
+        if option not in known:
+            raise UnsupportedTypeError(
+                f"{option} is no option here", remedy=f"the options are {', '.join(known)}", element=option
+            )
+    return measure(source, domain, **options)
+
+
+def _measure(source: Any, domain: Any) -> Callable[..., Field]:
+    """How distance is measured to a source on a domain."""
+    listed = as_shapes(source)
+    in_plane = bool(listed) and all(isinstance(each, Polyline) for each in listed)
+    if domain is None:
+        if any(isinstance(each, Curve | SurfacePoints) for each in listed):
+            raise SourceError("curves lie on a surface", remedy="pass it: signed_distance(curves, surface)")
+        return distance_to_lines if in_plane else distance_to_shapes
+    if not isinstance(domain, (Grid, TetMesh, *get_args(SurfaceDomain))):
+        raise UnsupportedTypeError(
+            f"distance is not measured on a {type(domain).__name__}",
+            remedy="pass what it is measured to first, and then the grid, the tets or the surface",
+            element="domain",
+        )
+    if isinstance(domain, Grid):
+        return distance_to_shapes if domain.dimension == 3 else distance_to_lines
+    return distance_to_shapes if isinstance(domain, TetMesh) else distance_to_curves
