@@ -10,8 +10,10 @@ import pytest
 
 import signedheat as sh
 from shapes import strokes
-from signedheat.geometry.minimum_cut import minimum_cut
-from signedheat.samples import sphere, with_flipped_faces
+from signedheat.curves.directions import Pieces
+from signedheat.discretization import discretize
+from signedheat.geometry.minimum_cut import CutGraph
+from signedheat.samples import sphere, torus, with_flipped_faces
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -26,10 +28,25 @@ def test_no_signs_cost_less_than_the_minimum_cut(seed):
         first, second = signs[edges].T
         return falling[(first > 0) & (second < 0)].sum() + rising[(first < 0) & (second > 0)].sum() - pull @ signs
 
-    found = minimum_cut(edges, falling, rising, pull)
+    found = CutGraph.of(edges, n).cut(falling, rising, pull)
     assert set(found) <= {-1.0, 1.0}
     least = min(cost(np.array(signs)) for signs in itertools.product([-1.0, 1.0], repeat=n))
     assert cost(found) <= least + 1e-6
+
+
+@pytest.mark.parametrize("around", [48, 96])
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_agreement_of_strokes_is_that_of_the_surface_whatever_its_diagonals(around, mirrored):
+    """Four pieces of a loop round a torus: neighbours agree, those across by a twentieth of that."""
+    ring = torus(n_around=around, n_across=around // 2)
+    mesh = sh.TriangleMesh(ring.vertices * [1, -1, 1], ring.faces[:, ::-1]) if mirrored else ring
+    step, n = around // 48, around // 2
+    pieces = [mesh.path(n * np.arange(begin * step, (begin + 8) * step + 1)) for begin in (0, 12, 24, 36)]
+    pieces.append(pieces[0])
+    found = Pieces.of(discretize(mesh), pieces).strokes.agreed
+    assert found[0, 4] > 20 * found[0, 1]
+    np.testing.assert_allclose(found[[0, 1, 2, 3], [1, 2, 3, 0]], 0.05, rtol=0.03)
+    np.testing.assert_allclose(found[[0, 1], [2, 3]], 0.0022, atol=5e-4)
 
 
 def wrong_share(drawing: strokes.Drawing, values: np.ndarray) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,8 @@ from scipy import sparse
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.geodesics.sources import PlacedSegments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.minimum_cut import minimum_cut
+from ..geometry.minimum_cut import CutGraph
+from ..linear import factorize
 from ..lowering.surface.discretization import SurfaceDiscretization
 
 REWARD = 1.0
@@ -71,12 +72,19 @@ class Strokes:
         Half the mean over the vertices left of a stroke, less that over those right of it.
     crossed : (k, e) sparse
         1 where the first vertex of an edge is left of a stroke that crosses it, −1 where the second is.
+    fluxes : (k, n) sparse
+        Integrals along each stroke of the slopes of hat functions towards its left.
+    width : float
+        Distance up to which strokes beside each other are drawn for one.
     """
 
     surface: SurfaceDiscretization
     lengths: NDArray[np.float64]
     means: sparse.csr_matrix
     crossed: sparse.csr_matrix
+    fluxes: sparse.csr_matrix
+    width: float
+    _found: dict[bytes, Inside] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float) -> Strokes:
@@ -94,12 +102,18 @@ class Strokes:
         width = min(EDGES * edge, OF_ALL * float(lengths.sum()))
         beside = widened(triangles, seen, np.maximum(OF_ONE * lengths, width))
         left, right = (_means(beside.multiply(beside * side > 0), areas) for side in (1, -1))
-        return cls(surface, lengths, sparse.csr_matrix(0.5 * (left - right)), crossed)
+        means = sparse.csr_matrix(0.5 * (left - right))
+        return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width)
 
     @cached_property
     def areas(self) -> NDArray[np.float64]:
         """(n,) area that belongs to each vertex."""
         return areas_of_vertices(self.surface.triangles)
+
+    @cached_property
+    def graph(self) -> CutGraph:
+        """The vertices and edges of the surface."""
+        return CutGraph.of(self.surface.triangles.edges.vertices, self.surface.triangles.n_vertices)
 
     @cached_property
     def costs(self) -> NDArray[np.float64]:
@@ -114,17 +128,21 @@ class Strokes:
 
     @cached_property
     def agreed(self) -> NDArray[np.float64]:
-        """(k, k) how much of the jump across one stroke another causes, if sides are smooth elsewhere.
+        """(k, k) minus the energy that sides with a jump of 1 across two strokes have more than across each alone.
 
-        That is the energy of sides with squares of slopes in place of lengths: strokes that follow each other and those
-        drawn twice agree, lines behind each other that face the same way do not.
+        Energy is ∫ |∇u|² of sides u that are smooth but for the jumps: those across strokes that follow each other
+        have less together. It is the same on all triangles of a surface, except that jumps within a width of each other
+        count as one: a stroke agrees with its copy.
         """
-        rows = sparse.csr_matrix(sparse.diags(self.lengths) @ self.means)
-        k, factor = rows.shape[0], self.surface.integration.factor
+        surface, fluxes = self.surface, self.fluxes
+        masses = sparse.diags(self.areas)
+        blur = factorize(sparse.csr_matrix(masses + self.width**2 * surface.stiffness), order=surface.vertex_order)
+        k = fluxes.shape[0]
         result = np.empty((k, k))
         for begin in range(0, k, BLOCK):
-            right = np.asfortranarray(rows[begin : begin + BLOCK].T.toarray())
-            result[:, begin : begin + BLOCK] = rows @ factor.solve(right)
+            right = np.asfortranarray(fluxes[begin : begin + BLOCK].T.toarray())
+            sides = surface.integration.factor.solve(right)
+            result[:, begin : begin + BLOCK] = fluxes @ blur.solve(np.asfortranarray(masses @ sides))
         symmetric: NDArray[np.float64] = 0.5 * (result + result.T)
         return symmetric
 
@@ -133,11 +151,18 @@ class Strokes:
 
         With other rewards, (k,) or one, than those of the energy, the sides of what would be best then.
         """
+        rewards = np.broadcast_to(np.asarray(rewards, dtype=np.float64), signs.shape)
+        key = np.stack([signs, rewards]).tobytes()
+        if key not in self._found:
+            self._found[key] = self._least(signs, rewards)
+        return self._found[key]
+
+    def _least(self, signs: NDArray[np.float64], rewards: NDArray[np.float64]) -> Inside:
         along = self.crossed.multiply(signs[:, None]).tocsr()
         free = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
         falling, rising = (np.where(each, 0.0, self.costs) for each in free)
         edges = self.surface.triangles.edges.vertices
-        sides = minimum_cut(edges, falling, rising, self.means.T @ (rewards * self.lengths * signs))
+        sides = self.graph.cut(falling, rising, self.means.T @ (rewards * self.lengths * signs))
         explained = signs * (self.means @ sides)
         first, second = sides[edges].T
         boundary = falling[(first > 0) & (second < 0)].sum() + rising[(first < 0) & (second > 0)].sum()
@@ -151,6 +176,22 @@ def areas_of_vertices(triangles: IntrinsicMesh) -> NDArray[np.float64]:
         np.float64
     )
     return result
+
+
+def fluxes_across(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:
+    """(k, n) sparse integrals along curves of the slopes of hat functions in the direction in which φ grows.
+
+    Along an edge the mean of the slopes in its faces is taken.
+    """
+    placed = PlacedSegments.of(triangles, parts)
+    owners = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])[placed.given]
+    grows = 1j * np.diff(placed.positions, axis=1) * placed.sides[:, None]
+    corners, faces = triangles.corner_positions[placed.faces], placed.faces
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    slopes = (np.conj(1j * opposite) * grows).real / (2 * triangles.face_areas[faces, None])
+    values = slopes / np.bincount(placed.given)[placed.given, None]
+    at = np.repeat(owners, 3), triangles.corner_vertices[faces].ravel()
+    return sparse.csr_matrix((values.ravel(), at), shape=(len(parts), triangles.n_vertices))
 
 
 def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:

@@ -44,6 +44,15 @@ def orient(
     >>> sphere = samples.with_flipped_faces(samples.sphere(3), 0.4)
     >>> bool((orient(sphere).faces == samples.sphere(3).faces).all())
     True
+
+    Of four quarters of a loop round a torus, one that runs backwards.
+
+    >>> import numpy as np
+    >>> mesh = samples.torus(n_around=48, n_across=24)
+    >>> pieces = [mesh.path(24 * np.arange(begin, begin + 9)) for begin in (0, 12, 24, 36)]
+    >>> pieces[1] = pieces[1].reversed()
+    >>> [bool(piece.faces[0] == given.faces[0]) for piece, given in zip(orient(pieces, mesh), pieces)]
+    [True, False, True, True]
     """
     if domain is None:
         return orientation(cast("Mesh | ForeignShape", shape)).shape

@@ -2,50 +2,71 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
-UNITS = 5e8
-"""What all pulls to one side count together, as integers: flows add up to less than 2³¹."""
+from .cut_kernels import source_side
+
+UNITS = 2.0**40
+"""What all pulls to one side count together, as integers, so that a flow that ends ends exactly."""
 
 
-def minimum_cut(
-    edges: NDArray[np.int64], falling: NDArray[np.float64], rising: NDArray[np.float64], pull: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(n,) signs s = ±1 of nodes with the least cost of edges that are cut, less Σ pull s.
+@dataclass(frozen=True, eq=False)
+class CutGraph:
+    """A graph that is cut again and again, with other costs.
 
-    Parameters
+    Attributes
     ----------
-    edges : (e, 2) int
-        The nodes that each edge joins.
-    falling, rising : (e,) float
-        Cost of an edge whose first node is positive and whose second is negative; and of the reverse.
-    pull : (n,) float
-        How much each node gains by being positive rather than neither.
-
-    Examples
-    --------
-    >>> chain = np.array([[0, 1], [1, 2], [2, 3]])
-    >>> minimum_cut(chain, np.array([1.0, 0.2, 1.0]), np.ones(3), np.array([3.0, 0, 0, -3.0]))
-    array([ 1.,  1., -1., -1.])
+    starts : (n + 1,) int
+        Where the arcs of each node begin.
+    heads : (2 e,) int
+        Where each arc leads.
+    reverse : (2 e,) int
+        The arc back.
+    order : (2 e,) int
+        Edge of each arc, plus e if it runs backwards.
     """
-    n = len(pull)
-    towards, away = np.maximum(2 * pull, 0.0), np.maximum(-2 * pull, 0.0)
-    total = max(float(towards.sum()), float(away.sum()))
-    if total == 0:
-        return np.ones(n)
-    nodes = np.arange(n)
-    first = np.concatenate([edges[:, 0], edges[:, 1], np.full(n, n), nodes])
-    second = np.concatenate([edges[:, 1], edges[:, 0], nodes, np.full(n, n + 1)])
-    costs = np.minimum(np.concatenate([falling, rising, towards, away]) / total, 1.0)
-    capacity = np.rint(UNITS * costs).astype(np.int32)
-    graph = sparse.csr_matrix((capacity, (first, second)), shape=(n + 2, n + 2))
-    graph.eliminate_zeros()
-    left = graph - maximum_flow(graph, n, n + 1).flow
-    left.data = (left.data > 0).astype(np.int8)
-    left.eliminate_zeros()
-    signs = np.full(n + 2, -1.0)
-    signs[breadth_first_order(left, n, return_predecessors=False)] = 1.0
-    return signs[:n]
+
+    starts: NDArray[np.int64]
+    heads: NDArray[np.int64]
+    reverse: NDArray[np.int64]
+    order: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, edges: NDArray[np.int64], n: int) -> CutGraph:
+        """The graph of n nodes and these (e, 2) edges."""
+        tails, heads = np.concatenate([edges, edges[:, ::-1]]).T
+        order = np.argsort(tails, kind="stable")
+        place = np.empty(len(order), dtype=np.int64)
+        place[order] = np.arange(len(order))
+        starts = np.concatenate([[0], np.cumsum(np.bincount(tails, minlength=n))])
+        return cls(starts, np.ascontiguousarray(heads[order]), place[(order + len(edges)) % len(order)], order)
+
+    def cut(
+        self, falling: NDArray[np.float64], rising: NDArray[np.float64], pull: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(n,) signs s = ±1 of nodes with the least cost of edges that are cut, less Σ pull s.
+
+        Of several such signs, those with the fewest positive.
+
+        Parameters
+        ----------
+        falling, rising : (e,) float
+            Cost of an edge whose first node is positive and whose second is negative; and of the reverse.
+        pull : (n,) float
+            How much each node gains by being positive rather than neither.
+
+        Examples
+        --------
+        >>> chain = CutGraph.of(np.array([[0, 1], [1, 2], [2, 3]]), 4)
+        >>> chain.cut(np.array([1.0, 0.2, 1.0]), np.ones(3), np.array([3.0, 0, 0, -3.0]))
+        array([ 1.,  1., -1., -1.])
+        """
+        total = 2 * max(float(pull[pull > 0].sum()), -float(pull[pull < 0].sum()))
+        if total == 0:
+            return np.ones(len(pull))
+        costs = np.minimum(np.concatenate([falling, rising])[self.order] / total, 1.0)
+        residual, pulls = (np.rint(UNITS * each).astype(np.int64) for each in (costs, 2 * pull / total))
+        return np.where(source_side(self.starts, self.heads, self.reverse, residual, pulls), 1.0, -1.0)

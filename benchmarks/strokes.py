@@ -1,0 +1,137 @@
+"""Curves as people draw them: how often distance to them is wrong, and how often it is announced.
+
+Closed curves on random surfaces are damaged in each of the ways of `shapes.strokes`, and `sh.signed_distance` of what
+is left is compared with the sides that were meant. Of every seed and damage there is one case; it is wrong if more than
+6 % of the area, farther than two edges from the curves, has the wrong sign. Seeds from 1000 on are not used to choose
+numbers of the package.
+
+    python benchmarks/strokes.py [--seeds 1000 1025] [--fine 3] [--processes 2] [--worst 20 --picture worst.png]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import warnings
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import signedheat as sh
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from shapes import strokes
+
+MOST = 0.06
+"""Share of the area that may be on the wrong side."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one case."""
+
+    damage: str
+    seed: int
+    share: float
+    warned: str
+    seconds: float
+
+    @property
+    def wrong(self) -> bool:
+        return self.share > MOST
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, nargs=2, default=(1000, 1025))
+    parser.add_argument("--damages", nargs="+", default=list(strokes.DAMAGES))
+    parser.add_argument("--fine", type=int, default=3, help="fineness of the surfaces")
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--worst", type=int, default=20, help="how many of the worst are named")
+    parser.add_argument("--picture", help="where to draw them")
+    arguments = parser.parse_args()
+    cases = [(d, s, arguments.fine) for d in arguments.damages for s in range(*arguments.seeds)]
+    if arguments.processes > 1:
+        with ProcessPoolExecutor(arguments.processes) as pool:
+            outcomes = list(pool.map(outcome, *zip(*cases, strict=True), chunksize=4))
+    else:
+        outcomes = [outcome(*case) for case in cases]
+    table(outcomes)
+    bad = [o for o in outcomes if o.wrong != bool(o.warned)]
+    bad.sort(key=lambda o: -o.share if o.wrong else 0.0)
+    for o in bad[: arguments.worst]:
+        print(f"{o.damage:>14} {o.seed:5d}: {o.share:6.1%} wrong, {o.warned[:100] or 'no warning'}")
+    if arguments.picture:
+        draw(bad[: arguments.worst], arguments.fine, arguments.picture)
+
+
+def drawn(damage: str, seed: int, fine: int) -> strokes.Drawing:
+    """The case of a seed and a damage."""
+    return strokes.drawing(np.random.default_rng([seed, list(strokes.DAMAGES).index(damage)]), damage, fine)
+
+
+def outcome(damage: str, seed: int, fine: int) -> Outcome:
+    """Share of the area on the wrong side, and the warning."""
+    drawing = drawn(damage, seed, fine)
+    begin = time.perf_counter()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        values = sh.signed_distance(drawing.given, drawing.mesh).values
+    seconds = time.perf_counter() - begin
+    return Outcome(damage, seed, wrong_share(drawing, values), "; ".join(str(w.message) for w in told), seconds)
+
+
+def wrong_share(drawing: strokes.Drawing, values: np.ndarray) -> float:
+    """Share of the area with another sign than was meant, two edges or more from the curves."""
+    mesh = drawing.mesh
+    exact = np.abs(sh.signed_distance(drawing.whole, mesh, as_oriented=True).values)
+    areas = np.bincount(mesh.faces.ravel(), np.repeat(mesh.face_areas / 3, 3), mesh.n_vertices)
+    wrong = (np.sign(values) != drawing.sides) & (exact > 2 * strokes.edge_length(mesh))
+    return float(areas[wrong].sum() / areas.sum())
+
+
+def table(outcomes: list[Outcome]) -> None:
+    """The confusion matrix, by damage and of all."""
+    print(f"{'':>14} {'cases':>6} {'right':>7} {'wrong, warned':>14} {'right, warned':>14} {'wrong in silence':>17}  s")
+    for name in [*dict.fromkeys(o.damage for o in outcomes), "all"]:
+        of = [o for o in outcomes if name in (o.damage, "all")]
+        counts = [sum(o.wrong == w and bool(o.warned) == t for o in of) for w, t in ((0, 0), (1, 1), (0, 1), (1, 0))]
+        right, both, needless, silent = (f"{count / len(of):.1%}" for count in counts)
+        seconds = np.median([o.seconds for o in of])
+        print(f"{name:>14} {len(of):6d} {right:>7} {both:>14} {needless:>14} {silent:>17}  {seconds:.2f}")
+
+
+def draw(outcomes: list[Outcome], fine: int, file: str) -> None:
+    """The signs of distance, what was given (black) and what was meant (yellow), from two sides."""
+    import pyvista as pv
+
+    rows = -(-len(outcomes) // 5)
+    plotter = pv.Plotter(shape=(rows, 10), window_size=(2600, 300 * rows), off_screen=True)
+    for k, o in enumerate(outcomes):
+        drawing = strokes.drawing(
+            np.random.default_rng([o.seed, list(strokes.DAMAGES).index(o.damage)]), o.damage, fine
+        )
+        mesh = drawing.mesh
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            values = sh.signed_distance(drawing.given, mesh).values
+        size = strokes.edge_length(mesh)
+        for side in (1, -1):
+            plotter.subplot(k // 5, 2 * (k % 5) + (side < 0))
+            surface = pv.PolyData.from_regular_faces(mesh.vertices, mesh.faces)
+            plotter.add_mesh(surface, scalars=np.sign(values), cmap="coolwarm", show_scalar_bar=False, clim=(-1.5, 1.5))
+            for curves, color, radius in ((drawing.whole, "yellow", 0.06), (drawing.given, "black", 0.1)):
+                for curve in curves:
+                    line = pv.lines_from_points(strokes.positions(mesh, curve))
+                    plotter.add_mesh(line.tube(radius=radius * size), color=color)
+            plotter.add_text(f"{o.damage} {o.seed}: {o.share:.0%}{' w' * bool(o.warned)}", font_size=7)
+            middle, reach = mesh.vertices.mean(axis=0), np.ptp(mesh.vertices)
+            plotter.camera_position = [middle + side * reach * np.array([1.2, -1.0, 1.0]), middle, (0, 0, 1)]
+    plotter.screenshot(file)
+
+
+if __name__ == "__main__":
+    main()
