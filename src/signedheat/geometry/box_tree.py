@@ -7,8 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import compiled
+
 LEAF = 4
 """Boxes per leaf."""
+FEW = 64
+"""Points that are not worth ordering: it takes as long as the searches of some of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,25 +63,32 @@ class BoxTree:
         return cls(bounds, items)
 
 
+def order_in_space(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) numbers of (n, 3) points along a space-filling curve; few points stay as they are."""
+    if len(points) < FEW:
+        return np.arange(len(points))
+    return np.argsort(morton_codes(points), kind="stable")
+
+
 def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
     """(n,) Morton codes of (n, 3) points: their positions along a space-filling curve, with 21 bits per axis."""
     lower = points.min(axis=0)
     extent = max(float((points.max(axis=0) - lower).max()), 1e-290)
-    cells = ((points - lower) * ((2**21 - 1) / extent)).astype(np.uint64)
-    codes = np.zeros(len(points), dtype=np.uint64)
-    for axis in range(3):
-        codes |= _spread(cells[:, axis]) << np.uint64(axis)
+    codes: NDArray[np.uint64] = _codes(np.ascontiguousarray(points), lower, (2**21 - 1) / extent)
     return codes
 
 
-def _spread(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """The 21 low bits of x, spread so that each is followed by two zero bits."""
-    for shift, mask in (
-        (32, 0x1F00000000FFFF),
-        (16, 0x1F0000FF0000FF),
-        (8, 0x100F00F00F00F00F),
-        (4, 0x10C30C30C30C30C3),
-        (2, 0x1249249249249249),
-    ):
-        x = (x | (x << np.uint64(shift))) & np.uint64(mask)
-    return x
+@compiled
+def _codes(points: NDArray[np.float64], lower: NDArray[np.float64], scale: float) -> NDArray[np.uint64]:
+    """The 21 low bits of each cell are spread so that each is followed by two zero bits."""
+    codes = np.zeros(len(points), dtype=np.uint64)
+    for p in range(len(points)):
+        for axis in range(3):
+            x = np.uint64((points[p, axis] - lower[axis]) * scale)
+            x = (x | (x << np.uint64(32))) & np.uint64(0x1F00000000FFFF)
+            x = (x | (x << np.uint64(16))) & np.uint64(0x1F0000FF0000FF)
+            x = (x | (x << np.uint64(8))) & np.uint64(0x100F00F00F00F00F)
+            x = (x | (x << np.uint64(4))) & np.uint64(0x10C30C30C30C30C3)
+            x = (x | (x << np.uint64(2))) & np.uint64(0x1249249249249249)
+            codes[p] |= x << np.uint64(axis)
+    return codes

@@ -44,8 +44,8 @@ class FaceFeatures:
     """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
 
     An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
-    a vertex is, if all edges around it are. There the sign of ``(x − foot) · normal`` tells the side of a point x whose
-    nearest place the foot is.
+    a vertex is, if all edges around it are and its faces make one fan. There the sign of ``(x − foot) · normal`` tells
+    the side of a point x whose nearest place the foot is.
 
     Attributes
     ----------
@@ -151,6 +151,8 @@ class FaceFeatures:
         n_edges = len(table.vertices)
         normals = _normals(corners, faces, table.face_edges, table.forward, n_edges, len(vertices))
         face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular, across = normals
+        around = _corners_around(faces, starts)
+        vertex_regular &= _one_fan(faces, across, starts, around)
         return cls(
             corners,
             triangle_rows(corners),
@@ -165,7 +167,7 @@ class FaceFeatures:
             across,
             np.where(across < 0, -1, faces[across].sum(axis=2) - faces - np.roll(faces, -1, axis=1)).astype(np.int32),
             starts,
-            _corners_around(faces, starts),
+            around,
             trusted,
             ids,
         )
@@ -212,6 +214,26 @@ def _corners_around(faces: NDArray[np.int64], starts: NDArray[np.int64]) -> NDAr
             corners[fill[v]] = 3 * f + c
             fill[v] += 1
     return corners
+
+
+@compiled
+def _one_fan(
+    faces: NDArray[np.int64], across: NDArray[np.int32], starts: NDArray[np.int64], around: NDArray[np.int32]
+) -> NDArray[np.bool_]:
+    """(n,) whether a walk around each vertex, over edges, comes to all of its faces: cones that touch are several."""
+    result = np.ones(len(starts) - 1, dtype=np.bool_)
+    for v in range(len(starts) - 1):
+        count = starts[v + 1] - starts[v]
+        if count == 0:
+            continue
+        face = around[starts[v]] // 3
+        for step in range(1, count + 1):
+            corner = 0 if faces[face, 0] == v else 1 if faces[face, 1] == v else 2
+            face = across[face, corner]
+            if face < 0 or (face == around[starts[v]] // 3) != (step == count):
+                result[v] = False
+                break
+    return result
 
 
 @compiled

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -169,7 +169,7 @@ def _noting(
     """A solid that names faces as the shape that was given does, with the notes of all steps."""
     origins = solid.origins if faces is None else np.where(solid.origins >= 0, faces[solid.origins], -1)
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
-    return Solid(solid.triangles, origins, solid.confidence, solid.windings, source, diagnostics)
+    return replace(solid, origins=origins, source=source, diagnostics=diagnostics)
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +307,8 @@ def united(
     confidence = _confidence(pieces.triangles[kept], given[kept], whole, points)
     found = _notes(pieces.triangles, areas, origins, kept, buried & ~kept, bounds)
     diagnostics = Diagnostics(notes=(*notes, *found))
-    return Solid(pieces.triangles[kept], origins[kept], confidence, windings, None, diagnostics)
+    bounding = (pieces.behind & ~pieces.ahead)[kept]
+    return Solid(pieces.triangles[kept], origins[kept], confidence, bounding, windings, None, diagnostics)
 
 
 def _notes(

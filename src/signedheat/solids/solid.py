@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 
@@ -17,9 +17,10 @@ from ..errors import SourceError
 from ..fields.grid_field import GridField
 from ..fields.known_solid import Closest
 from ..frozen import Frozen
-from ..geometry.box_tree import morton_codes
+from ..geometry.box_tree import order_in_space
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
+from ..geometry.nearest_faces import NearestFaces
 from ..parallel import in_chunks
 from ..progress import Progress
 from ..reprs import ShortRepr
@@ -29,6 +30,10 @@ from .winding import Windings
 
 MANY = 1 << 18
 """Points that are put in order together."""
+CLEAR = 1e-9
+"""Distance to a surface, over how far from the origin it is, from which on rounding leaves the side clear."""
+SLANT = 1e-3
+"""Cosine between normal and direction from the foot, above which the side is clear too."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,6 +50,8 @@ class Solid(Frozen, ShortRepr):
         Face of the shape that each is part of; −1 for the completion.
     confidence : (m,) float
         Of each triangle.
+    bounding : (m,) bool
+        Whether it is inside behind each and outside in front.
     windings : Windings
         What tells the inside.
     source : TriangleMesh, optional
@@ -56,15 +63,23 @@ class Solid(Frozen, ShortRepr):
     triangles: NDArray[np.float64]
     origins: NDArray[np.int64]
     confidence: NDArray[np.float32]
+    bounding: NDArray[np.bool_]
     windings: Windings
     source: TriangleMesh | None = None
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
 
     @cached_property
     def features(self) -> FaceFeatures:
-        """The triangles, and what lies around each."""
-        count = len(self.triangles)
-        return FaceFeatures.of(self.triangles.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3), self.confidence)
+        """The triangles, and what lies around each: regular are edges and vertices between those that bound only."""
+        corners = np.arange(3 * len(self.triangles)).reshape(-1, 3)
+        found = FaceFeatures.of(self.triangles.reshape(-1, 3), corners, self.confidence)
+        idle = ~self.bounding[found.ids]
+        if not idle.any():
+            return found
+        edges, vertices = found.edge_regular.copy(), found.vertex_regular.copy()
+        edges[found.edges[idle]] = False
+        vertices[found.faces[idle]] = False
+        return replace(found, edge_regular=edges, vertex_regular=vertices)
 
     @cached_property
     def tree(self) -> FaceTree:
@@ -120,7 +135,7 @@ class Solid(Frozen, ShortRepr):
             If a point is not finite.
         """
         places = _checked(points)
-        order = np.argsort(morton_codes(places), kind="stable") if len(places) else np.zeros(0, dtype=np.int64)
+        order = order_in_space(places)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         results = (
@@ -194,19 +209,35 @@ class Solid(Frozen, ShortRepr):
         return dense_field(self, where, progress)
 
     def _in_order(self, points: NDArray[np.float64], function) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
-        order = np.argsort(morton_codes(points), kind="stable")
+        order = order_in_space(points)
         result = np.empty(len(points))
         (result[order],) = in_chunks(function, points[order])
         return result
 
     def _distances(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64]]:
-        found = self.tree.search(points).distances
-        return (np.where(self.windings.inside(points), -found, found),)
+        found = self.tree.search(points)
+        return (np.where(self._inside(points, found), -found.distances, found.distances),)
+
+    def _inside(self, points: NDArray[np.float64], found: NearestFaces) -> NDArray[np.bool_]:
+        """(n,) whether points are inside, whose nearest faces are known.
+
+        No triangle is between a point and the nearest place. So where sides change across triangles only it is inside
+        where it is on that side of this place, which the normal there tells. Elsewhere winding numbers are counted.
+        """
+        beyond = self.windings.whole_beyond
+        if np.isinf(beyond):
+            return self.windings.inside(points)
+        clear = found.regular & self.bounding[self.features.ids[found.faces]] & (np.abs(found.cosines) > SLANT)
+        clear &= found.distances > max(beyond, CLEAR * float(np.abs(self.tree.tree.bounds[1]).max()))
+        inside = found.cosines < 0
+        if not clear.all():
+            inside[~clear] = self.windings.inside(points[~clear])
+        return inside
 
     def _closest(self, points: NDArray[np.float64]) -> tuple[NDArray, ...]:  # type: ignore[type-arg]
         found = self.tree.search(points)
         ids = self.features.ids[found.faces]
-        signs = np.where(self.windings.inside(points), -1.0, 1.0)
+        signs = np.where(self._inside(points, found), -1.0, 1.0)
         away = points - found.feet
         lengths = found.distances
         clear = lengths > 1e-12 * np.abs(points).max(initial=1e-290)

@@ -9,12 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frozen import Frozen
+from ..geometry.components import same_positions
+from ..geometry.edges import edge_table
 from ..geometry.winding_tree import WindingTree
 
 INSIDE = 0.5
 """Winding number above which a point is inside; it is near 0 or 1 but beside slits."""
 DEPTH = 1e-6
 """Size of a face by which places in front of it and behind it are off it."""
+TUBE = 1e-4
+"""Radius of the tubes around open edges in which winding numbers are looked at, over the size of all triangles."""
+WHOLE = 0.1
+"""What winding numbers may be off whole ones there: twice what the tree is off by at most."""
+AT_ONCE = 256
+"""Open edges that are looked at together: where some gap is wide, the first of them tell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +50,27 @@ class Windings(Frozen):
         """One for each set."""
         return tuple(WindingTree.of(triangles) for triangles in self.sets if len(triangles))
 
+    @cached_property
+    def whole_beyond(self) -> float:
+        """Distance to all triangles from which on the winding number is whole, so that sides change across them only.
+
+        It is 0 where each edge is run along as often in both directions. Where a lid has more vertices on an edge than
+        the face beside it, slits as wide as rounding are left; winding numbers are whole but inside of thin tubes
+        around them, since they are harmonic and so nowhere farther off than on these. Infinity where gaps are wider.
+        """
+        if not self.closed:
+            return np.inf
+        triangles = np.concatenate(self.sets)
+        if not len(triangles):
+            return 0.0
+        ends = _open_edges(triangles)
+        radius = TUBE * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+        for begin in range(0, len(ends), AT_ONCE):
+            numbers = self.numbers(_around(ends[begin : begin + AT_ONCE], radius))
+            if (np.abs(numbers - np.round(numbers)) > WHOLE).any():
+                return np.inf
+        return radius if len(ends) else 0.0
+
     def numbers(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) weighted sum of winding numbers."""
         total = np.zeros(len(points))
@@ -62,3 +91,27 @@ class Windings(Frozen):
         step = DEPTH * normals * (np.sqrt(areas) / np.where(areas > 0, areas, 1.0))[:, None]
         centres = triangles.mean(axis=1)
         return self.inside(centres - step), self.inside(centres + step)
+
+
+def _open_edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 2, 3) ends of the edges that triangles do not run along as often in one direction as in the other."""
+    corners = triangles.reshape(-1, 3)
+    faces = same_positions(corners)[np.arange(len(corners)).reshape(-1, 3)]
+    a, b, c = faces.T
+    table = edge_table(faces[(a != b) & (b != c) & (c != a)])
+    balance = np.bincount(table.face_edges.ravel(), np.where(table.forward, 1.0, -1.0).ravel(), len(table.vertices))
+    ends: NDArray[np.float64] = corners[table.vertices[balance != 0]]
+    return ends
+
+
+def _around(ends: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """(k, 3) places around edges, at a distance from them: at both ends and in the middle, on six sides."""
+    along = ends[:, 1] - ends[:, 0]
+    first = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    second = np.cross(along, first)
+    second /= np.linalg.norm(second, axis=1)[:, None]
+    angles = 0.3 + np.pi / 3 * np.arange(6)[:, None, None]
+    ring = radius * (np.cos(angles) * first + np.sin(angles) * second)
+    spots = np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]])
+    return np.asarray((spots[:, None] + ring).reshape(-1, 3))

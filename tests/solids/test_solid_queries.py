@@ -1,0 +1,72 @@
+"""Solids at points: signs by the nearest triangle's normal are those of winding numbers."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.bodies import box, sheet
+from signedheat import samples
+from signedheat.geometry.face_features import FaceFeatures
+from signedheat.solids.complete import complete
+
+
+def two_cones():
+    """Pyramids that touch at their tips, one of them sharp."""
+    base = np.array([[1, 1, 1], [-1, 1, 1], [-1, -1, 1], [1, -1, 1.0]])
+    faces = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])[:, ::-1]
+    upper = sh.TriangleMesh(np.concatenate([base, np.zeros((1, 3))]), faces)
+    lower = sh.TriangleMesh(upper.vertices * [0.1, 0.1, -1], faces[:, ::-1])
+    return samples.union(upper, lower)
+
+
+SHAPES = {
+    "ball": lambda: samples.sphere(3),
+    "lids": lambda: samples.without_patches(samples.sphere(3), 4, 0.4, seed=1),
+    "cut faces": lambda: samples.union(samples.sphere(3), samples.sphere(2, 0.6, (0.9, 0.2, 0))),
+    "box in a box": lambda: samples.union(box((-1, -1, -1), (1, 1, 1)), box((-0.5, -0.2, -0.3), (0.5, 0.2, 0.3))),
+    "with a sheet": lambda: samples.union(
+        box((-1, -1, -1), (1, 1, 1)), sheet([[0, 0, 0], [0, 3, 0], [0, 3, 1], [0, 0, 1]])
+    ),
+    "noise": lambda: samples.with_noise(samples.torus(0.8, 0.3, 40, 20), 0.02),
+    "two cones": two_cones,
+    "loose": lambda: samples.soup(samples.sphere(3), 0.01),
+}
+
+
+def points_around(solid):
+    rng = np.random.default_rng(0)
+    lower, upper = solid.bounds
+    size = float((upper - lower).max())
+    far = rng.uniform(lower - 0.3 * size, upper + 0.3 * size, (3000, 3))
+    corners = solid.triangles.reshape(-1, 3)
+    near = corners[rng.integers(0, len(corners), 3000)]
+    return np.concatenate([far, *(near + rng.normal(0, off * size, near.shape) for off in (1e-1, 1e-3, 1e-6))])
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("keep_overlaps", [False, True])
+def test_signs_are_those_of_winding_numbers(name, keep_overlaps):
+    solid = complete(SHAPES[name](), keep_overlaps=keep_overlaps)
+    points = points_around(solid)
+    numbers = solid.windings.numbers(points)
+    clear = np.abs(numbers - 0.5) > 0.2  # not on the surface, nor as near as the tree errs
+    assert clear.mean() > 0.9
+    np.testing.assert_array_equal((solid.distance(points) < 0)[clear], (numbers > 0.5)[clear])
+    np.testing.assert_array_equal(solid.closest(points).distances, solid.distance(points))
+
+
+def test_where_winding_numbers_are_whole_is_known():
+    closed, lids = complete(samples.sphere(3)), complete(SHAPES["lids"]())
+    assert closed.windings.whole_beyond == 0.0
+    assert 0.0 < lids.windings.whole_beyond < 1e-3  # slits as wide as rounding, between faces and lids
+    gaps = complete(SHAPES["lids"](), completion="heat")
+    assert gaps.windings.whole_beyond == np.inf
+    points = points_around(gaps)
+    np.testing.assert_array_equal(gaps.distance(points) < 0, gaps.inside(points))
+
+
+def test_vertices_at_which_cones_touch_are_not_regular():
+    cones = two_cones()
+    features = FaceFeatures.of(cones.vertices, cones.faces)
+    assert features.edge_regular.all()
+    np.testing.assert_array_equal(features.vertex_regular, np.linalg.norm(features.vertices, axis=1) > 0)
