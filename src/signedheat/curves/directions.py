@@ -37,13 +37,13 @@ GROUPS = 8
 """Groups of strokes, the longest first, that are turned together."""
 SINGLY = 16
 """Strokes, the longest first, that are turned one by one where they explain nothing."""
-
-
+FOLLOWING = 0.045
+"""How far strokes agree that follow each other with a gap as long as both, on a plane: ln(4/3) / 2π."""
 FEW = 0.3
 """Share of the length of all strokes below which whole loops are turned without doubt."""
 NEARLY = 0.06
 """Cost, beside the length of all strokes, by which a rival may be dearer that is nearly as good."""
-OTHERWISE = 0.03
+OTHERWISE = 0.05
 """Share of the area on whose side two ways differ that are not the same."""
 
 
@@ -112,6 +112,15 @@ class Decision:
         return mostly_loose(self.pieces.strokes, self.best)
 
     @property
+    def broken_in_vain(self) -> bool:
+        """Whether most of the length bounds nothing although there are pieces that follow each other."""
+        if not self.bounds_nothing:
+            return False
+        movable, signs = self.pieces.movable, self.best.signs
+        agreed = self.pieces.strokes.agreed * np.multiply.outer(signs, signs)
+        return bool((np.triu(agreed, 1)[np.ix_(movable, movable)] > FOLLOWING).any())
+
+    @property
     def all_bound(self) -> bool:
         """Whether every stroke that is not left out bounds the inside."""
         kept = ~np.isin(self.pieces.numbers, self.loose)
@@ -120,7 +129,7 @@ class Decision:
     def turned_loops(self) -> NDArray[np.int64]:
         """Numbers of the pieces that are turned against most of the length of their own loop.
 
-        None if they are few, or if there are complete curves that tell how the others face.
+        None if they are few, or if there are complete curves, not against their own loop, that tell how others face.
         """
         strokes, best = self.pieces.strokes, self.best
         triangles = strokes.surface.triangles
@@ -138,7 +147,7 @@ class Decision:
         total = np.bincount(own, explained, triangles.n_vertices)
         turned = np.bincount(own, explained * (best.signs < 0), triangles.n_vertices)
         wholly = (best.signs < 0) & (explained > 0) & (turned[own] > 0.5 * total[own])
-        complete = (~self.pieces.movable & (explained > 0)).any()
+        complete = (~self.pieces.movable & (explained > 0) & (turned[own] <= 0.5 * total[own])).any()
         few = explained[wholly].sum() < FEW * explained.sum()
         result: NDArray[np.int64] = self.pieces.numbers[wholly & (not few) & (not complete)]
         return result

@@ -107,6 +107,13 @@ def distance_to_pieces(
 
 def warn_of_doubt(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> None:
     """Warn if what the pieces bound is a guess."""
+    if decision.broken_in_vain:
+        warn_user(
+            "most of the curves bound nothing together: which side is which away from them is a guess. Draw what is "
+            "missing, or turn curves that face the wrong way; as_oriented=True takes curves as they are",
+            InexactWarning,
+        )
+        return
     against = decision.turned_loops()
     if len(against):
         warn_user(
