@@ -204,8 +204,9 @@ def test_environments_that_make_no_sense(tmp_path, variables):
 def distance():
     """Something on surfaces and grids, as numbers."""
     surface = sh.SignedHeatSolver(BALL).distance(BALL.path([0, 1, 2])).values
-    space = sh.signed_distance(BALL, sh.Grid.around(BALL.bounds, 16)).values
-    return np.concatenate([surface, space.ravel()])
+    grid = sh.Grid.around(BALL.bounds, 16)
+    space = [sh.signed_distance(BALL, grid).values, sh.SignedHeatSolver(grid).distance(BALL).values]
+    return np.concatenate([surface, np.ravel(space)])
 
 
 def test_eight_threads_at_once():
@@ -219,7 +220,7 @@ def test_spawned_processes_after_use():
     expected = distance()
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         np.testing.assert_array_equal(pool.submit(sh.signed_distance, BALL, resolution=8).result(timeout=200).values,
-                                      sh.SignedHeatSolver(sh.Grid.around(BALL, 8)).distance(BALL).values)  # fmt: skip
+                                      sh.signed_distance(BALL, resolution=8).values)  # fmt: skip
     np.testing.assert_array_equal(distance(), expected)
 
 
@@ -249,9 +250,7 @@ def test_one_processor_and_numbers_of_threads_give_the_same_bits(tmp_path, threa
     one = {min(os.sched_getaffinity(0))}
     command = [sys.executable, "-c", code, str(tmp_path / "values.npy")]
     subprocess.run(command, check=True, env=environment, preexec_fn=lambda: os.sched_setaffinity(0, one))
-    np.testing.assert_array_equal(
-        np.load(tmp_path / "values.npy"), sh.SignedHeatSolver(sh.Grid.around(BALL, 12)).distance(BALL).values
-    )
+    np.testing.assert_array_equal(np.load(tmp_path / "values.npy"), sh.signed_distance(BALL, resolution=12).values)
 
 
 def test_memory_that_is_not_free(tmp_path, monkeypatch):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, get_args, overload
+from typing import Literal, cast, get_args, overload
 
 from numpy.typing import ArrayLike
 
@@ -101,7 +101,11 @@ def signed_distance(
     diffusion: float = 1.0,
     progress: Progress | None = None,
 ) -> Field: ...
-def signed_distance(source: Any, domain: Any = None, **options: Any) -> Field:
+def signed_distance(
+    source: Sources | ElementList | Sequence[ElementList],
+    domain: Domain | ForeignShape | None = None,
+    **options: object,
+) -> Field:
     """Signed distance to a shape, however broken: exact where the shape is there, completed where it is missing.
 
     Shapes in space are completed (`complete`), and distance is measured to what was given and to its completion. Of
@@ -188,7 +192,7 @@ def signed_distance(source: Any, domain: Any = None, **options: Any) -> Field:
     >>> sh.signed_distance(square, resolution=33)([[0.5, 0.75]]).round(2).tolist()
     [-0.25]
     """
-    domain = converted(domain)
+    domain = cast("Domain | None", converted(domain))
     measure = _measure(source, domain)
     known = [name for name, each in inspect.signature(measure).parameters.items() if each.kind is each.KEYWORD_ONLY]
     for option in options:
@@ -199,7 +203,7 @@ def signed_distance(source: Any, domain: Any = None, **options: Any) -> Field:
     return measure(source, domain, **options)
 
 
-def _measure(source: Any, domain: Any) -> Callable[..., Field]:
+def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
     """How distance is measured to a source on a domain."""
     listed = as_shapes(source)
     in_plane = bool(listed) and all(isinstance(each, Polyline) for each in listed)

@@ -166,6 +166,7 @@ def check_arguments(given: Subject) -> str:
         (sh.Convex, {"tolerance": 0.01, "max_rounds": 3, "relaxation": 1.5}),
         (sh.SignedHeatSolver, {"domain": ball, "diffusion": 1.0}),
         (sh.SignedHeatSolver(ball).distance, {"sources": ball.path([0, 1]), "constraint": sh.Free()}),
+        (sh.complete, {"shape": ball, "keep_overlaps": False, "diffusion": 1.0}),
         (sh.signed_distance, {"source": ball, "resolution": 8, "padding": 0.1, "constraint": None, "diffusion": 1.0}),
         (sh.sharpen, {"field": sh.VertexField(ball, ball.vertices[:, 2]), "method": sh.Geodesic()}),
         (sh.VertexField(ball, ball.vertices[:, 2]), {"points": ball.vertices[:3]}),

@@ -70,8 +70,9 @@ def test_lids_of_a_ball_go_on_as_the_ball_bends():
 def test_what_is_gone_of_a_ball_shrinks_it_and_never_lets_it_jump():
     vertices, faces = ball()
     heights = vertices[faces].mean(axis=1)[:, 2]
-    volumes = [volume(sh.complete((vertices, faces[heights < z]))) for z in np.linspace(0.95, 0.0, 20)]
+    volumes = [volume(sh.complete((vertices, faces[heights < z]))) for z in np.linspace(0.95, -0.2, 24)]
     assert np.abs(np.diff(volumes)).max() < 0.06 * volumes[0]
+    assert volumes[19] > 0.95 * volumes[0]  # half of it
 
 
 @pytest.mark.parametrize("share", [0.3, 0.75])
@@ -174,7 +175,7 @@ def test_what_is_inside_does_not_depend_on_how_the_shape_is_given(name):
     points = np.random.default_rng(0).uniform(-1.2, 1.4, (4000, 3))
     for v, f in shapes:
         w, g, along = moved(name, v, f)
-        assert np.mean(sh.complete((w, g)).inside(along(points)) != sh.complete((v, f)).inside(points)) < 4e-3
+        assert np.mean(sh.complete((w, g)).inside(along(points)) != sh.complete((v, f)).inside(points)) < 6e-3
 
 
 def test_points_with_normals_and_noisy_soups_are_completed_by_heat():

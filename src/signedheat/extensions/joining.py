@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.foreign import as_shapes
+from ..domains.foreign import as_shape, as_shapes
 from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -28,8 +29,10 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
         if isinstance(whole, TetMesh):
             return whole.boundary
         if not isinstance(whole, TriangleMesh | PolygonMesh | PointCloud):
+            as_shape(cast("Shape", whole))  # which refuses paths and bare arrays
             raise SourceError(
                 f"distance in space is measured to meshes and points, not to a {type(whole).__name__}",
+                remedy="pass a mesh, or a point cloud; curves are measured on their surface",
                 element="source 0",
             )
         return whole

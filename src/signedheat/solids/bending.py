@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..geometry.components import connected_components
 from ..geometry.edges import edge_table
-from .lids import Lid, cut_to_pieces, lid_area
+from .lids import Lid, cut_to_pieces, lid_area, rim_normals, running_mean, smoothed
 
 REACH = 0.25
 """Share of an opening's width in which the surface behind its rim is looked at."""
@@ -20,14 +20,14 @@ SAMPLES = 4
 """Samples across that strip."""
 MOST = 4096
 """Samples around a rim at most, or nearly."""
-SMOOTH = 24
-"""Part of a rim over which its zigzags are averaged."""
 NEAR = 0.05
 """Part of that strip that is nearest to a place of the rim, and tells its normal."""
 STIFF = 0.1
 """Depth, over that strip's, of a wall whose bending is believed by half."""
 AGREEMENT = 0.5
 """Ratio of how far a surface bends and how far it would have to, from which on it is believed to go on: 1 on a ball."""
+FLAT = 0.05
+"""Turn of a surface, in radians, that is as good as none: a lid is then out by less than a hundredth of its width."""
 FREE = 0.01
 """How far a rim is held at most where the lid is as good as flat."""
 
@@ -44,9 +44,7 @@ class Samples:
 
 def width_of(lid: Lid) -> float:
     """Four areas over the length of the rim, the diameter of a circle; zigzags of the rim do not count."""
-    pieces = cut_to_pieces(lid.vertices[: lid.n_rim])
-    half = len(pieces) // (2 * SMOOTH)
-    smooth = np.stack([_smooth(column, np.ones(2 * half + 1) / (2 * half + 1)) for column in pieces.T], axis=1)
+    smooth = smoothed(cut_to_pieces(lid.vertices[: lid.n_rim]))
     length = np.linalg.norm(np.roll(smooth, -1, axis=0) - smooth, axis=1).sum()
     return 4.0 * lid_area(lid) / float(length)
 
@@ -96,8 +94,8 @@ def samples_near(
 
 def continuation(
     lid: Lid, samples: Samples, patches: NDArray[np.int64], width: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where the surface would go on over a rim, and how far that is to be believed.
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Where the surface would go on over a rim, how curved it is, and how far that is to be believed.
 
     Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
     circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.
@@ -117,19 +115,21 @@ def continuation(
     -------
     normals : (n, 3) float
         Unit normals of the surface at the rim.
+    curvatures : (n,) float
+        Sums of its principal curvatures there, positive on a ball.
     held : (n,) float
         1 where the surface bends as it must, 0 where it does not.
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
-    at_rim, held = np.zeros((n, 3)), np.zeros(n)
+    at_rim, curvatures, held = np.zeros((n, 3)), np.zeros(n), np.zeros(n)
     reach = REACH * width
     steps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     m = max(1, min(n // 4, round(reach / steps.mean())))
     along = np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
-    outside = lid_normals(lid, n)
+    outside = rim_normals(lid)
     if not len(samples.positions):
-        return at_rim, held
+        return at_rim, curvatures, held
     tree = scipy.spatial.cKDTree(samples.positions)
     for i, near in enumerate(tree.query_ball_point(loop, reach)):
         near = np.array(near)[samples.patches[near] == patches[i]] if near else near
@@ -146,41 +146,26 @@ def continuation(
         if (size := np.linalg.norm(way)) < 1e-6:
             continue
         way /= size
-        weights = areas / areas.sum()
-        at = x @ np.stack([way, np.cross(normal / length, way)], axis=1)
+        weights = areas * (1.0 - (lengths / reach) ** 2)  # what comes into reach weighs nothing yet
+        weights /= weights.sum()
+        frame = np.stack([way, np.cross(normal / length, way)])
+        at = x @ frame.T
         mean, middle = weights @ at, weights @ normals
         at = at - mean
         spread = (at * weights[:, None]).T @ at + (STIFF * reach) ** 2 * np.eye(2)
         slopes = np.linalg.solve(spread, (at * weights[:, None]).T @ (normals - middle))
-        slope = slopes[0]
+        slope, curvatures[i] = slopes[0], (slopes * frame).sum()
         normal = middle - mean @ slopes  # at the rim
         normal /= max(np.linalg.norm(normal), 1e-300)
         way = np.cross(normal, along[i])
         way /= max(np.linalg.norm(way), 1e-300)
         bends, must = width * (slope @ way), 2.0 * (way @ outside[i])
         at_rim[i], held[i] = normal, _agreement(bends, must)
-    window = np.ones(2 * m + 1) / (2 * m + 1)
-    return at_rim, np.where(at_rim.any(axis=1), _smooth(held, window), 0.0)
+    return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
 
 
 def _agreement(one: float, other: float) -> float:
-    """1 where two numbers are alike within a factor of 1 / `AGREEMENT`, 0 where they differ by its square."""
+    """1 where two numbers are alike within a factor of 1 / `AGREEMENT`, 0 where they differ by its square or are 0."""
     low, high = sorted((one, other), key=abs)
-    ratio = low / high if high != 0.0 else 1.0
+    ratio = low * np.sign(high) / max(abs(high), FLAT)
     return float(np.clip((ratio - AGREEMENT**2) / (AGREEMENT - AGREEMENT**2), 0.0, 1.0))
-
-
-def _smooth(values: NDArray[np.float64], window: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values along a loop, averaged."""
-    half = len(window) // 2
-    return np.convolve(np.concatenate([values[-half:], values, values[:half]]), window, mode="valid")
-
-
-def lid_normals(lid: Lid, n: int) -> NDArray[np.float64]:
-    """(n, 3) unit normals of a lid at its rim."""
-    a, b, c = lid.vertices[lid.faces].transpose(1, 0, 2)
-    areas = np.cross(b - a, c - a)
-    sums = np.stack([np.bincount(lid.faces.ravel(), np.repeat(areas[:, k], 3), len(lid.vertices)) for k in range(3)], 1)
-    sums = sums[:n]
-    normals: NDArray[np.float64] = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
-    return normals

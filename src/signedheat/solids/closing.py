@@ -17,8 +17,6 @@ NARROW = 0.03
 """Width of a rim, over the diagonal of its part, up to which that is so."""
 SLIT = 1e-3
 """Width of an opening, over the length of its rim, up to which its lid is flat: its strip has no end of samples."""
-HIGHEST = 1.0
-"""Rise of a lid over the width of its opening from which on the plate has run away: on a third of a ball it is .8."""
 
 
 def lids_of(
@@ -85,12 +83,10 @@ def _lid(
     if width <= SLIT * np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1).sum():
         return flat
     near = bending.samples_near(own, patches, scipy.spatial.cKDTree(rim), bending.REACH * width)
-    normals, held = bending.continuation(flat, near, ends[_edges_at(rim, corners)], width)
+    normals, curvatures, held = bending.continuation(flat, near, ends[_edges_at(rim, corners)], width)
     if held.max() <= bending.FREE:
         return flat
-    bent = lids.plate(flat, normals, held)
-    rise = float(np.linalg.norm(bent.vertices - flat.vertices, axis=1).max())
-    return bent if rise < HIGHEST * width else flat
+    return lids.plate(flat, normals, curvatures, held)
 
 
 def _edges_at(rim: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -16,7 +16,16 @@ PIECES = 64
 GROWTH = 0.35
 """How fast triangles grow with their distance from the rim, over that distance."""
 ROUNDS = 3
-"""How often a lid is solved for, each time with the lengths of the last."""
+"""How often a film is solved for, each time with the lengths of the last."""
+STEPS = 4
+"""Steps in which a plate is bent, each from the last."""
+STEEPEST = 0.7 * np.pi
+"""Angle with a flat lid at which a plate leaves its rim at most: from 0.8 π on, plates over zigzags do not settle."""
+AT_REST, SHORTER = 1e-3, 0.9
+"""Share of the diagonal of its rim by which a plate moves when it has come to rest, and share of its last move that it
+moves at most in each round: without that, plates over zigzags may jump forever."""
+SMOOTH = 24
+"""Part of a rim over which its zigzags are averaged."""
 SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
 
@@ -92,11 +101,13 @@ def _membrane(lid: Lid, matrix: sparse.csr_array) -> Lid:
     return Lid(vertices, lid.faces, n)
 
 
-def plate(lid: Lid, normals: NDArray[np.float64], held: NDArray[np.float64]) -> Lid:
-    """A lid bent as a thin plate: ``min Σ c_v |(L x)_v − Σ_e ½ |e| g_e|² / m_v``, with c = 1 but at hinges of the rim.
+def plate(lid: Lid, normals: NDArray[np.float64], curvatures: NDArray[np.float64], held: NDArray[np.float64]) -> Lid:
+    """A lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
 
-    L is the cotangent Laplacian, m the areas of vertices, and g_e = e × n / |e × n| the direction across the edge e of
-    the rim in the plane with the normal n: where the surface goes on smoothly, ∂x/∂g = g there.
+    ``min Σ c_v |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / m_v``, with c = 1 but at hinges of the rim. L is the
+    cotangent Laplacian, m the areas of vertices, κ twice the mean curvature at the rim and harmonic inside, and g_e =
+    e × n / |e × n| the direction across the edge e of the rim in the plane with the normal n: where the surface goes
+    on smoothly, ∂x/∂g = g there. Spheres and cylinders go on as they are. Each round takes m, L and n from the last.
 
     Parameters
     ----------
@@ -104,31 +115,68 @@ def plate(lid: Lid, normals: NDArray[np.float64], held: NDArray[np.float64]) -> 
         To begin with.
     normals : (n, 3) float
         Unit normals of the surface at the rim.
+    curvatures : (n,) float
+        Sums of its principal curvatures there, positive on a ball.
     held : (n,) float
         c at the rim: 0 at a hinge, 1 where it is clamped.
     """
     n = lid.n_rim
+    if n == len(lid.vertices):
+        return lid
     rim = lid.vertices[:n]
+    flat = rim_normals(lid)
+    rest = _harmonic(lid, held * curvatures)
+    size = float(np.linalg.norm(np.ptp(rim, axis=0)))
+    angles = np.arccos(np.clip((flat * normals).sum(axis=1), -1.0, 1.0))
+    for turned in np.linspace(0, 1, STEPS + 1)[1:]:
+        load = _load(rim, _rotated(flat, normals, turned * np.minimum(angles, STEEPEST)))
+        furthest = np.inf
+        while furthest > AT_REST * size:
+            up = vertex_normals(lid)
+            matrix = stiffness(lid.vertices, lid.faces)
+            areas = vertex_areas(lid.vertices, lid.faces)
+            weights = 1.0 / np.maximum(areas, 1e-3 * np.median(areas[n:]))
+            weights[:n] = held / np.maximum(areas[:n], smoothed(areas[:n, None])[:, 0])  # tips of zigzags weigh no more
+            given = matrix[:, :n] @ rim - (turned * areas * rest)[:, None] * up
+            given[:n] += load
+            inner = matrix[:, n:]
+            normal = (inner.T @ sparse.diags_array(weights) @ inner).tocsc()
+            vertices = lid.vertices.copy()
+            vertices[n:] = sparse.linalg.splu(normal).solve(-(inner.T @ (weights[:, None] * given)))
+            rises = ((vertices - lid.vertices) * up).sum(axis=1)  # what slides along the surface does not change it
+            rise = float(np.abs(rises).max())
+            lid = Lid(lid.vertices + min(1.0, furthest / max(rise, 1e-300)) * rises[:, None] * up, lid.faces, n)
+            furthest = SHORTER * min(rise, furthest)
+    return lid
+
+
+def _rotated(
+    vectors: NDArray[np.float64], towards: NDArray[np.float64], angles: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n, 3) unit vectors, each rotated by an angle towards another."""
+    across = towards - (towards * vectors).sum(axis=1, keepdims=True) * vectors
+    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
+    rotated: NDArray[np.float64] = np.cos(angles)[:, None] * vectors + np.sin(angles)[:, None] * across
+    return rotated
+
+
+def _load(rim: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) the sum over both edges at each point of a rim of half their length along −g, see `plate`."""
     sides = np.roll(rim, -1, axis=0) - rim
     lengths = np.linalg.norm(sides, axis=1)
-    load = np.zeros((n, 3))
+    load = np.zeros((len(rim), 3))
     for side, length in ((sides, lengths), (np.roll(sides, 1, axis=0), np.roll(lengths, 1))):
         across = np.cross(side, normals)
         across *= (0.5 * length / np.maximum(np.linalg.norm(across, axis=1), 1e-300))[:, None]
         load -= across
-    for _ in range(ROUNDS):
-        matrix = stiffness(lid.vertices, lid.faces)
-        areas = vertex_areas(lid.vertices, lid.faces)
-        weights = 1.0 / np.maximum(areas, 1e-3 * np.median(areas[n:]))
-        weights[:n] *= held
-        given = matrix[:, :n] @ rim
-        given[:n] += load
-        inner = matrix[:, n:]
-        normal = (inner.T @ sparse.diags_array(weights) @ inner).tocsc()
-        vertices = lid.vertices.copy()
-        vertices[n:] = sparse.linalg.splu(normal).solve(-(inner.T @ (weights[:, None] * given)))
-        lid = Lid(vertices, lid.faces, n)
-    return lid
+    return load
+
+
+def _harmonic(lid: Lid, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) values at the rim, and between them harmonic on the lid."""
+    n, matrix = lid.n_rim, stiffness(lid.vertices, lid.faces)
+    inner = sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))
+    return np.concatenate([values, inner])
 
 
 def _shadow(rim: NDArray[np.float64]) -> NDArray[np.float64] | None:
@@ -275,6 +323,33 @@ def vertex_areas(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDA
     a, b, c = vertices[faces].transpose(1, 0, 2)
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return np.bincount(faces.ravel(), np.repeat(areas / 6, 3), len(vertices)).astype(np.float64)
+
+
+def vertex_normals(lid: Lid) -> NDArray[np.float64]:
+    """(n, 3) unit normals, means by area of those of the triangles around each vertex."""
+    a, b, c = lid.vertices[lid.faces].transpose(1, 0, 2)
+    areas, n = np.cross(b - a, c - a), len(lid.vertices)
+    sums = np.stack([np.bincount(lid.faces.ravel(), np.repeat(areas[:, k], 3), n) for k in range(3)], axis=1)
+    normals: NDArray[np.float64] = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
+    return normals
+
+
+def rim_normals(lid: Lid) -> NDArray[np.float64]:
+    """(n, 3) unit normals at the rim, without its zigzags."""
+    normals = smoothed(vertex_normals(lid)[: lid.n_rim])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    return normals
+
+
+def smoothed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, k) values along a loop, each the mean over a part of 1 / `SMOOTH` of it."""
+    return np.stack([running_mean(column, len(values) // (2 * SMOOTH)) for column in values.T], axis=1)
+
+
+def running_mean(values: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
+    """(n,) values along a loop, each the mean of those up to so many places away."""
+    window = np.ones(2 * reach + 1) / (2 * reach + 1)
+    return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")
 
 
 def lid_area(lid: Lid) -> float:
