@@ -61,8 +61,9 @@ def test_on_grids_that_cut_the_solid_or_miss_it(solid):
 
 
 def test_on_coarse_grids_around_many_faces():
-    solid = complete(samples.sphere(5))
+    solid = complete(samples.sphere(6))
     assert_exact(solid.field(resolution=12), solid)
+    assert_exact(solid.field(spacing=0.15, padding=0.4), solid)
 
 
 def test_places_between_nodes_are_exact_too(solid):

@@ -82,7 +82,7 @@ class FaceTree:
         Each `RUN` of points is searched on its own: what comes before does not matter.
         """
         nearer = self._brought_near(points)
-        faces, _ = self._nearest(nearer)
+        faces, _ = self.nearest(nearer)
         found = search_from(self.features, nearer, faces[:, None])
         return found if nearer is points else replace(found, distances=np.linalg.norm(points - found.feet, axis=1))
 
@@ -90,7 +90,7 @@ class FaceTree:
         nearer = self._brought_near(points)
         if nearer is not points:
             return self.search(points).distances
-        distances: NDArray[np.float64] = np.sqrt(self._nearest(points)[1])
+        distances: NDArray[np.float64] = np.sqrt(self.nearest(points)[1])
         return distances
 
     def _brought_near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -106,7 +106,7 @@ class FaceTree:
         result[far] = middle + away[far] * (limit / distances[far])[:, None]
         return result
 
-    def _nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    def nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Nearest faces of points, and the squares of their distances."""
         faces, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
         descend(self.features.rows, self.tree.bounds, self.discs, self.tree.items, points, RUN, faces, squares)

@@ -23,6 +23,13 @@ from .winding import Windings
 
 SLACK = 1e-12
 """Of squares, by which rounding may be off."""
+CROWDED = 400
+"""Leaves that may be nearest to some node of a block, above which its nodes are searched for one by one. On meshes of
+5,000 to 1.3 million faces at 48 to 256 nodes, seconds differ by a fifth at most between half of it and twice."""
+ALONG_A_CURVE = np.stack(
+    [sum((np.arange(SIDE**3) >> (3 * bit + 2 - axis) & 1) << bit for bit in range(3)) for axis in range(3)], axis=1
+)
+"""(512, 3) nodes of a block along a space-filling curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +74,14 @@ def distances_in(
     centres = grid.origin + 0.5 * (ordered * SIDE + last) * steps
     near = tree.search(centres).faces
     boxes = tree.tree.bounds, tree.discs, tree.tree.items
-    _fill(tree.features.rows, *boxes, np.array(grid.origin), steps, limits, ordered * SIDE, near, first, squares, faces)
+    crowded = _fill(
+        tree.features.rows, *boxes, np.array(grid.origin), steps, limits, ordered * SIDE, near, first, squares, faces
+    )
+    if crowded.any():
+        nodes = (ordered[crowded, None] * SIDE + ALONG_A_CURVE).reshape(-1, 3)
+        nodes = nodes[(nodes < limits).all(axis=1)]
+        where = tuple((nodes - first).T)
+        faces[where], squares[where] = tree.nearest(grid.origin + nodes * steps)
     values = np.sqrt(squares, out=squares)
     inside = _inside(windings, grid, first, values)
     return Tile(np.negative(values, out=values, where=inside), faces)
@@ -143,8 +157,8 @@ def _fill(
     window: NDArray[np.int64],
     out_squares: NDArray[np.float64],
     out_faces: NDArray[np.int32],
-) -> None:
-    """Squares of the distances of the nodes of blocks to the nearest faces, and these.
+) -> NDArray[np.bool_]:
+    """Squares of the distances of the nodes of blocks to the nearest faces, and these; returns which are left out.
 
     Leaves of the tree are chosen for a block, faces for its eighths, fewer faces for the eighths of these.
 
@@ -168,13 +182,16 @@ def _fill(
     stack, box = np.empty(64, dtype=np.int64), np.empty(9)
     many, few, lows = np.empty((4, LEAF * leaves)), np.empty((4, LEAF * leaves)), np.empty(LEAF * leaves)
     many_faces, few_faces = np.empty(LEAF * leaves, dtype=np.int64), np.empty(LEAF * leaves, dtype=np.int64)
-    centre = np.empty(3)
+    centre, crowded = np.empty(3), np.zeros(len(firsts), dtype=np.bool_)
     for b in range(len(firsts)):
         i, j, k = firsts[b]
         face = np.int64(start[b])
         _box(i, j, k, 8, origin, steps, limits, box)
         _, _, box[6], box[7], box[8] = foot_on_triangle(rows, face, box[0], box[1], box[2])
         count = _leaves_of_tree(bounds, discs, box, stack, lists[0])
+        crowded[b] = count > CROWDED
+        if crowded[b]:
+            continue
         for eighth in range(8):
             i1, j1, k1 = i + 4 * (eighth >> 2), j + 4 * (eighth >> 1 & 1), k + 4 * (eighth & 1)
             if i1 >= limits[0] or j1 >= limits[1] or k1 >= limits[2]:
@@ -230,6 +247,7 @@ def _fill(
                                 best, face = square, few_faces[c]
                     p, q, r = i3 - window[0], j3 - window[1], k3 - window[2]
                     out_squares[p, q, r], out_faces[p, q, r] = best, face
+    return crowded
 
 
 @compiled
