@@ -52,6 +52,7 @@ from .fields.tet_field import TetField
 from .fields.vertex_field import VertexField
 from .io import (
     LabelImage,
+    load,
     load_field,
     read,
     read_curves,
@@ -129,6 +130,7 @@ __all__ = [
     "erode",
     "globe_curve",
     "intrinsic_delaunay",
+    "load",
     "load_field",
     "opening",
     "orient",

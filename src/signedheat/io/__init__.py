@@ -9,6 +9,7 @@ from .labels import LabelImage, read_labels
 from .polylines import POLYLINE_FORMATS, read_polylines, write_polylines
 from .samples import SAMPLE_FORMATS
 from .shapes import SHAPE_FORMATS, read, save
+from .solids import load
 from .surface_fields import VALUE_FORMATS, VERTEX_FIELD_FORMATS
 from .tets import TET_FIELD_FORMATS
 from .vdb import write_vdb
@@ -26,6 +27,7 @@ __all__ = [
     "LabelImage",
     "ensure_field_writable",
     "ensure_writable",
+    "load",
     "load_field",
     "read",
     "read_curves",

@@ -25,6 +25,7 @@ from ..parallel import in_chunks
 from ..progress import Progress
 from ..reprs import ShortRepr
 from .fields import band_field, dense_field
+from .files import save_solid
 from .stores import Scheduler
 from .winding import Windings
 
@@ -207,6 +208,10 @@ class Solid(Frozen, ShortRepr):
         if store is not None or scheduler is not None:
             raise SourceError("only bands are stored tile by tile", remedy="give a band, or save the field")
         return dense_field(self, where, progress)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write to a ``.npz`` file, without notes; `signedheat.load` reads it, and nothing is completed again."""
+        save_solid(self, path)
 
     def _in_order(self, points: NDArray[np.float64], function) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
         order = order_in_space(points)
