@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -82,6 +83,7 @@ sphinx_gallery_conf = {
     "backreferences_dir": "gallery/backreferences",
     "doc_module": ("signedheat",),
     "filename_pattern": r"\.py$",
+    "ignore_pattern": "__init__" if find_spec("torch") else "__init__|fit_to_distances",
     "image_scrapers": [scrape],
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,

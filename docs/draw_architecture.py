@@ -12,7 +12,7 @@ from PIL import Image
 
 FLOORS = [
     (
-        "__main__   cli   view   samples   public   batches   io",
+        "__main__   cli   view   samples   public   batches   io   torch",
         "commands, pictures, many shapes, files",
         "#f3d9c1",
     ),

@@ -34,7 +34,7 @@ FLOORS = [
     {"fields"},
     {"solver"},
     {"extensions", "curves", "solids", "signed_distance"},
-    {"io"},
+    {"io", "torch"},
     {"view"},
     {"batches"},
     {"", "public"},  # the package itself, with the public names

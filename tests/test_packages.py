@@ -22,6 +22,7 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg"><path d="M 0,0 L 1,0 L 1,1 Z"/></
 
 USES = {
     "nibabel": lambda folder: sh.read_labels(folder / "labels.nii"),
+    "torch": lambda folder: sh.torch.distance(sh.complete(CUBE), [[0, 0, 0]]),
     "trimesh": lambda folder: CUBE.to_trimesh(),
     "meshio": lambda folder: CUBE.to_meshio(),
     "pyvista": lambda folder: CUBE.to_pyvista(),

@@ -1,5 +1,6 @@
 """The public names, all of which importing this module imports; `signedheat` does when one is first asked for."""
 
+from . import torch as _torch  # noqa: F401  makes it sh.torch
 from .batches.job import BatchJob, Sampling
 from .batches.manifest import Outcome
 from .batches.run import Batch, batch

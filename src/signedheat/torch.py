@@ -1,0 +1,93 @@
+"""Distances that PyTorch differentiates: by points, and by the vertices of the mesh.
+
+``sh.torch.distance(solid, points, vertices)`` is `Solid.distance` of tensors. PyTorch is imported at the first call.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import SourceError
+from .packages import lazy_module
+from .solids.solid import Solid
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+torch = lazy_module("torch", "tensors")
+
+SAME = 1e-5
+"""Difference between vertices and those of the solid, over the greatest coordinate: what single precision rounds off,
+and no step of an optimiser."""
+
+
+def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Tensor:
+    """Signed distances of points, negative inside, that know their gradients.
+
+    The distance d at a point p has its nearest place q at weights w in a face with the corners v. It changes by
+    ``∇d · (δp − Σ w δv)``, since q moves along the surface only. Where q lies on the completion it does not depend on
+    the vertices: completion is held fixed. These are first derivatives; second ones are zero.
+
+    Parameters
+    ----------
+    solid : Solid
+        What `complete` has made of a mesh. Complete anew when an optimiser has moved the vertices.
+    points : (n, 3) tensor
+        Where, on any device.
+    vertices : (k, 3) tensor, optional
+        Those of the mesh that was completed, to be differentiated by.
+
+    Returns
+    -------
+    (n,) tensor
+        Of the points' type and device; computed on the processor in double precision.
+
+    Raises
+    ------
+    SourceError
+        If the solid was not completed from a triangle mesh with these vertices.
+    MissingPackageError
+        If PyTorch is not installed.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> import torch
+    >>> cube = torch.tensor([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)], requires_grad=True)
+    >>> faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    >>> triangles = [corners for a, b, c, d in faces for corners in ([a, b, c], [a, c, d])]
+    >>> solid = sh.complete((cube.detach().numpy(), triangles))
+    >>> points = torch.tensor([[0.3, 0.4, 1.5]], requires_grad=True)
+    >>> d = sh.torch.distance(solid, points, cube)
+    >>> d.backward()
+    >>> round(d.item(), 6), points.grad.tolist(), round(-cube.grad[:, 2].sum().item(), 6)
+    (0.5, [[0.0, 0.0, 1.0]], 1.0)
+    """
+    points = torch.as_tensor(points)
+    found = solid.closest(points.detach().cpu().double().numpy())
+    feet = torch.from_numpy(found.points)
+    if vertices is not None:
+        if solid.source is None:
+            raise SourceError(
+                "the solid was not completed from one triangle mesh", remedy="complete a triangle mesh", element="solid"
+            )
+        now, then = vertices.detach().cpu().double().numpy(), solid.source.vertices
+        if now.shape != then.shape or np.abs(now - then).max() > SAME * np.abs(then).max():
+            raise SourceError(
+                "the vertices are not those of the mesh that was completed",
+                remedy="complete the mesh again after each step",
+                element="vertices",
+            )
+        given = np.flatnonzero(found.faces >= 0)
+        corners = torch.from_numpy(solid.source.faces[found.faces[given]].astype(np.int64))
+        weights = torch.from_numpy(found.barycentric[given])
+        moves = vertices.cpu().double()
+        moves = moves - moves.detach()
+        feet = feet.index_add(0, torch.from_numpy(given), (weights[..., None] * moves[corners]).sum(dim=1))
+    exact = points.cpu().double()
+    slopes = torch.from_numpy(found.gradients)
+    values = torch.from_numpy(found.distances) + ((exact - exact.detach() - (feet - feet.detach())) * slopes).sum(dim=1)
+    result: Tensor = values.to(device=points.device, dtype=points.dtype)
+    return result
