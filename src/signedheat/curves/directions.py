@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..geometry.curve_segments import CurveSegments, interpolation_at
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.synchronization import best_signs, nested_groups
 from ..lowering.surface.discretization import SurfaceDiscretization
+from ..parallel import n_threads
 from .strokes import REWARD, Inside, Strokes
 
 AS_GIVEN = 0.5
@@ -192,21 +194,20 @@ def decide(pieces: Pieces) -> Decision:
     strokes, movable = pieces.strokes, pieces.movable
     k = len(movable)
     smooth = np.where(movable, smooth_signs(strokes, movable), 1.0)
-    found = []
-    for start in (np.ones(k), smooth):
-        for reward in (REWARD, GENEROUS):
-            found.append(settled(strokes, settled(strokes, start, movable, reward).signs, movable))
+    generous = [settled(strokes, start, movable, GENEROUS).signs for start in (np.ones(k), smooth)]
+    found = settled_from(strokes, [np.ones(k), smooth, *generous], movable)
     best = min(found, key=lambda inside: cost(strokes, inside))
     while True:
-        tried = [strokes.inside(np.where(movable, -best.signs, best.signs))]
-        tried += [settled(strokes, turned(best, rows), movable) for rows in turnable(strokes, best, movable)]
-        for group in groups_among(strokes, np.flatnonzero(movable & (best.explained < EXPLAINED))):
+        unexplained = np.flatnonzero(movable & (best.explained < EXPLAINED))
+        starts = [np.where(movable, -best.signs, best.signs)]
+        starts += [turned(best, rows) for rows in turnable(strokes, best, movable)]
+        for group in groups_among(strokes, unexplained):
             for way in (1, -1):
                 signs = best.signs.copy()
                 signs[group] = way * smooth[group]
-                tried.append(settled(strokes, signs, movable))
-        for group in groups_among(strokes, np.flatnonzero(movable)):
-            tried.append(settled(strokes, turned(best, group), movable))
+                starts.append(signs)
+        starts += [turned(best, group) for group in groups_among(strokes, np.flatnonzero(movable))]
+        tried = settled_from(strokes, starts, movable)
         found += tried
         better = min(tried, key=lambda inside: cost(strokes, inside))
         if cost(strokes, better) >= cost(strokes, best) - 1e-9 * strokes.lengths.sum():
@@ -266,6 +267,12 @@ def turnable(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> li
     others = np.flatnonzero(movable & (inside.explained >= EXPLAINED))
     order = others[np.argsort(-strokes.lengths[others], kind="stable")[:SINGLY]].tolist()
     return found + [[k] for k in order]
+
+
+def settled_from(strokes: Strokes, starts: list[NDArray[np.float64]], movable: NDArray[np.bool_]) -> list[Inside]:
+    """What `settled` finds from each start, on all cores."""
+    with ThreadPoolExecutor(n_threads()) as pool:
+        return list(pool.map(lambda signs: settled(strokes, signs, movable), starts))
 
 
 def settled(strokes: Strokes, signs: NDArray[np.float64], movable: NDArray[np.bool_], reward: float = REWARD) -> Inside:
