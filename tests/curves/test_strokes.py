@@ -10,6 +10,7 @@ import pytest
 
 import signedheat as sh
 from shapes import strokes
+from shapes.surfaces import disk
 from signedheat.curves.directions import Pieces
 from signedheat.discretization import discretize
 from signedheat.geometry.minimum_cut import CutGraph
@@ -73,6 +74,20 @@ def test_what_belongs_nowhere_is_left_out_or_told(damage, seed):
         warnings.simplefilter("always")
         phi = sh.signed_distance(drawing.given, drawing.mesh)
     assert told or wrong_share(drawing, phi.values) < 0.06
+
+
+@pytest.mark.parametrize(("gone", "guessed"), [(0.1, False), (0.2, False), (0.48, True), (0.6, True)])
+def test_a_wide_gap_of_a_single_stroke_is_told(gone, guessed):
+    """Most of a star on hills: what is shortest and what heat does differ where two of its arms are missing."""
+    mesh = disk(16, 1)
+    x, y = mesh.vertices[:, 0], mesh.vertices[:, 1]
+    mesh = sh.TriangleMesh(np.stack([x, y, 0.25 * np.sin(4 * x) * np.cos(3 * y)], axis=1), mesh.faces)
+    star = np.hypot(x, y) - 0.55 * (1 + 0.25 * np.cos(5 * np.arctan2(y, x)))
+    (curve,) = mesh.level_set(star + 1e-6, 0.0)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        sh.signed_distance(strokes.arc(mesh, curve, 0.12, 1.12 - gone), mesh)
+    assert bool(told) == guessed
 
 
 def test_the_side_does_not_depend_on_where_a_curve_starts():

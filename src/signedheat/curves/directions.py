@@ -69,11 +69,11 @@ class Pieces:
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> Pieces | None:
-        """The pieces; None if there are none, or no other curves that tell about the one that there is."""
+        """The pieces; None if there are none."""
         listed = {k: c for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented}
         parts = [part for (part,) in surface.segments([[curve] for curve in listed.values()])]
         movable = np.array([is_piece(surface.triangles, c, p) for c, p in zip(listed.values(), parts, strict=True)])
-        if len(parts) < 2 or not movable.any():
+        if not movable.any():
             return None
         return cls(np.array(list(listed), dtype=np.int64), movable, Strokes.of(surface, parts, drawn_edge(surface)))
 
