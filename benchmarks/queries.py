@@ -148,7 +148,7 @@ def broken() -> None:
 
     found = programs()
     print(f"{'wrong signs, %':<40}", *(f"{name:>23}" for name in found))
-    points = np.random.default_rng(1).uniform(-1.3, 1.3, (100_000, 3))
+    points = np.random.default_rng(1).uniform(-1.3, 1.3, (50_000, 3))
     for damage, wreck in DAMAGES.items():
         shares: dict[str, list[float]] = {name: [] for name in found}
         for mesh in shapes().values():

@@ -35,6 +35,7 @@ from .errors import (
     UnreachedWarning,
     UnsupportedTypeError,
 )
+from .extensions.deviation import Deviation, deviation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.orient import orient
 from .extensions.orientation import Orientation, orientation
@@ -81,6 +82,7 @@ __all__ = [
     "Convex",
     "Curve",
     "CurveOrientation",
+    "Deviation",
     "Diagnostics",
     "DigitalSurface",
     "EachComponent",
@@ -127,6 +129,7 @@ __all__ = [
     "common_subdivision",
     "complete",
     "curve_orientation",
+    "deviation",
     "dilate",
     "erode",
     "globe_curve",

@@ -96,12 +96,19 @@ def write_vtp(field: VertexField[SurfaceShape]) -> bytes:
     return vtp_of(field.domain, NAME, field.values)
 
 
-def ply_of(shape: SurfaceShape, name: str, values: NDArray[np.floating]) -> bytes:
-    """Binary PLY in double precision, with one named value at each vertex."""
+def ply_of(
+    shape: SurfaceShape, name: str, values: NDArray[np.floating], colors: NDArray[np.uint8] | None = None
+) -> bytes:
+    """Binary PLY in double precision, with one named value at each vertex, and its colour."""
     corners, counts = faces_of(shape)
-    table = np.column_stack([points_of(shape), values]).astype("<f8")
+    shown = [] if colors is None else ["red", "green", "blue"]
+    table = np.zeros(len(values), dtype=[("numbers", "<f8", 4), ("color", "u1", len(shown))])
+    table["numbers"] = np.column_stack([points_of(shape), values])
+    if colors is not None:
+        table["color"] = colors
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
     lines += [f"property double {column}" for column in ("x", "y", "z", name)]
+    lines += [f"property uchar {channel}" for channel in shown]
     lines += [f"element face {len(counts)}", "property list int int vertex_indices"] * (len(counts) > 0)
     listed = np.insert(corners, np.cumsum(counts) - counts, counts).astype("<i4")
     return ("\n".join([*lines, "end_header"]) + "\n").encode() + table.tobytes() + listed.tobytes()

@@ -2,6 +2,7 @@
 
 from . import notebook as _notebook  # noqa: F401  provides what notebooks show
 from . import windows as _windows  # noqa: F401  provides windows
+from .deviations import DEVIATION_FORMATS
 from .figures import PICTURE_FORMATS, ensure_picture_writable, new_figure
 from .rows import save_row
 from .scenes import draw_shape, save_scene
@@ -9,6 +10,7 @@ from .slices import draw_plane, draw_slices, save_slices
 from .surfaces import draw_surface, save_surface
 
 __all__ = [
+    "DEVIATION_FORMATS",
     "PICTURE_FORMATS",
     "draw_plane",
     "draw_shape",

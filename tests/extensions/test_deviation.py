@@ -1,0 +1,66 @@
+"""Deviations of scans from nominal parts."""
+
+import json
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.bodies import box
+from signedheat import samples
+from signedheat.cli import main
+from signedheat.io.ply import read_ply_values
+
+
+def test_of_a_box_that_is_too_high_and_shifted():
+    part = box((-1, -1, -1), (1, 1, 1))
+    scan = box((-1, -1, -1), (1, 1, 1.25))
+    points = np.array([[0, 0, 1.25], [0, 0, 0.5], [1.5, 0, 0], [0.0, 0.25, -1]])
+    np.testing.assert_allclose(sh.deviation(points, part).distances, [0.25, -0.5, 0.5, 0.0], atol=1e-12)
+    found = sh.deviation(scan, sh.complete(part))
+    np.testing.assert_allclose(np.sort(found.distances), np.repeat([0, 0.25], 4), atol=1e-12)
+    assert found.within(0.1) == 0.5 and found.percentiles((50,)) == pytest.approx(0.125)
+    assert found.rms == pytest.approx(0.25 / np.sqrt(2))
+    assert found.histogram()[0].sum() == 8
+
+
+def test_turned_faces_of_scan_and_part_do_not_matter():
+    part, scan = samples.sphere(3), samples.sphere(2, 1.1)
+    exact = sh.deviation(scan, part).distances
+    broken = samples.with_flipped_faces(part, 0.3, seed=1)
+    np.testing.assert_array_equal(sh.deviation(samples.with_flipped_faces(scan, 0.5), broken).distances, exact)
+
+
+def test_places_on_completion_are_marked():
+    half = samples.sphere(3)
+    half = sh.TriangleMesh(half.vertices, half.faces[half.vertices[half.faces].mean(axis=1)[:, 2] < 0.8])
+    found = sh.deviation(np.array([[0, 0, 1.5], [0, 0, -1.5]]), half)
+    assert found.completed.tolist() == [True, False]
+    assert found.figures["on_completion"] == 0.5
+
+
+@pytest.mark.parametrize("scan", [samples.sphere(2, 1.1), samples.oriented_points(samples.sphere(2, 0.9), 300)])
+def test_files(tmp_path, scan):
+    found = sh.deviation(scan, samples.sphere(3))
+    for kind in ("ply", "html", "csv"):
+        found.save(tmp_path / f"out.{kind}")
+    np.testing.assert_array_equal(read_ply_values(tmp_path / "out.ply", "deviation"), found.distances)
+    assert {"red", "green", "blue"} <= set((tmp_path / "out.ply").read_bytes()[:400].decode("latin1").split())
+    table = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
+    np.testing.assert_allclose(table, np.column_stack([found.points, found.distances, found.nearest]), atol=1e-8)
+    page = (tmp_path / "out.html").read_text()
+    assert page.count("<rect") == 40 and "data:image/png" in page
+    with pytest.raises(sh.errors.FileFormatError, match="deviations"):
+        found.save(tmp_path / "out.stl")
+
+
+def test_command(tmp_path, capsys):
+    sh.save(samples.sphere(2, 1.1), tmp_path / "scan.stl")
+    sh.save(samples.without_faces(samples.sphere(3), 0.1), tmp_path / "part.stl")
+    words = ["deviation", str(tmp_path / "scan.stl"), str(tmp_path / "part.stl"), "--tolerance", "0.2"]
+    assert main([*words, "--json", "-o", str(tmp_path / "out.html")]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["within"] == 1.0 and said["percentiles"]["50"] == pytest.approx(0.1, abs=0.02)
+    assert (tmp_path / "out.html").exists()
+    assert main(words) == 0
+    assert "100.00% within 0.2" in capsys.readouterr().out
