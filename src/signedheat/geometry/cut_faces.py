@@ -53,7 +53,7 @@ def cut_faces(
 
 
 @compiled
-def _overlap(p: NDArray[np.float64], q: NDArray[np.float64], slack: float, axis: NDArray[np.float64]) -> bool:
+def overlap(p: NDArray[np.float64], q: NDArray[np.float64], slack: float, axis: NDArray[np.float64]) -> bool:
     """Whether two triangles, (9,) each, overlap deeper than a slack along every axis that may separate them.
 
     Along their normals they may touch.
@@ -208,7 +208,7 @@ def _cut(
                 for i in range(3):
                     for j in range(3):
                         shared += ids[f, i] == knife_ids[g, j]
-                if not meets or shared > 1 or not _overlap(corners[f], knives[g], slack, axis):
+                if not meets or shared > 1 or not overlap(corners[f], knives[g], slack, axis):
                     continue
                 met[f] = True
                 q = knives[g]
@@ -225,7 +225,7 @@ def _cut(
                     flat &= abs(corners[f, c] * nx + corners[f, c + 1] * ny + corners[f, c + 2] * nz - height) <= slack
                 before = count
                 for at in range(before):
-                    if not alive[at] or not _overlap(pieces[at], q, slack, axis):
+                    if not alive[at] or not overlap(pieces[at], q, slack, axis):
                         continue
                     if not flat:
                         count = _halve(pieces, alive, count, at, nx, ny, nz, height, slack)
@@ -242,7 +242,7 @@ def _cut(
                         if alive[at]:
                             count = _halve(pieces, alive, count, at, ax / long, ay / long, az / long, level, slack)
                         for new in range(before, until):
-                            if alive[new] and _overlap(pieces[new], q, slack, axis):
+                            if alive[new] and overlap(pieces[new], q, slack, axis):
                                 count = _halve(pieces, alive, count, new, ax / long, ay / long, az / long, level, slack)
         if total + count > len(result):
             more = np.empty((2 * len(result) + count, 9))

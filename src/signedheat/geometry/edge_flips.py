@@ -26,7 +26,9 @@ MOST = 4_000_000
 """Faces beyond which creases stay as they are, lest looking for them takes more memory than the surface itself."""
 
 
-def flipped_along_creases(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+def flipped_along_creases(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], held: NDArray[np.bool_] | None = None
+) -> NDArray[np.int64]:
     """(m, 3) faces on the same vertices, with edges flipped wherever that makes the surface bend less.
 
     Parameters
@@ -35,6 +37,8 @@ def flipped_along_creases(vertices: NDArray[np.float64], faces: NDArray[np.int64
         Positions.
     faces : (m, 3) int
         A surface of which no edge has more than two faces, which agree. It stays so.
+    held : (n,) bool, optional
+        Vertices around which nothing is flipped.
 
     Examples
     --------
@@ -57,7 +61,7 @@ def flipped_along_creases(vertices: NDArray[np.float64], faces: NDArray[np.int64
     result: NDArray[np.int64] = faces.copy()
     for _ in range(ROUNDS):
         creases = _Creases.of(vertices, result[some])
-        first, second, one, other = _flips(vertices, creases, near)
+        first, second, one, other = _flips(vertices, creases, near, held)
         if not len(first):
             break
         result[some[first]], result[some[second]] = one, other
@@ -114,7 +118,7 @@ class _Creases:
 
 
 def _flips(
-    vertices: NDArray[np.float64], creases: _Creases, whole: NDArray[np.bool_]
+    vertices: NDArray[np.float64], creases: _Creases, whole: NDArray[np.bool_], held: NDArray[np.bool_] | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of faces to replace, (k,) each, none beside another, and what replaces them, (k, 3) each.
 
@@ -147,6 +151,8 @@ def _flips(
     keys = edge_keys(c, d)
     present = taken[np.minimum(np.searchsorted(taken, keys), len(taken) - 1)] == keys
     gain[present | ~(whole[c] | whole[d]) | (c == d)] = 0.0
+    if held is not None:
+        gain[held[a] | held[b] | held[c] | held[d]] = 0.0
     order = np.argsort(gain, kind="stable")
     rank = np.empty(len(gain), dtype=np.int64)
     rank[order] = np.arange(1, len(gain) + 1)

@@ -128,7 +128,7 @@ def band_field(
     blocks = Blocks.of(places, grid.shape)
     if not len(blocks):
         raise OutsideError("no node of the grid is as near to the surface as the band is wide", element="grid")
-    tiles, diagnostics = _tiles_of(blocks), solid.diagnostics
+    tiles, diagnostics = tiles_of(blocks), solid.diagnostics
     if store is None:
         values: NDArray[Any] = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
         confidence: NDArray[Any] = np.empty(values.shape, dtype=np.float16)
@@ -146,7 +146,7 @@ def band_field(
     return GridField(grid, values, diagnostics, confidence, solid=solid, blocks=blocks, coarse=coarse, width=width)
 
 
-def _tiles_of(blocks: Blocks) -> list[NDArray[np.int64]]:
+def tiles_of(blocks: Blocks) -> list[NDArray[np.int64]]:
     """Rows of the blocks of each tile."""
     tiles = blocks.places.astype(np.int64) // EDGE
     _, owners = np.unique(tiles, axis=0, return_inverse=True)

@@ -1,0 +1,219 @@
+"""Level sets of the distance to solids as closed surfaces with sharp edges: dual contouring with exact distances.
+
+Vertices lie within cells of a grid, not on its edges, where the planes of the surface meet (Ju, Losasso, Schaefer &
+Warren 2002). Each connected piece within a cell has one (Schaefer, Ju & Warren 2007), and triangles do not pass through
+each other (Ju & Udeshi 2006). Only blocks of the grid through which the level passes are computed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.grid import Grid
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import OutsideError
+from ..fields.levels import on_level
+from ..geometry.dual_cells import DualCells, cells_around, dual_cells, open_cells
+from ..geometry.dual_polygons import dual_triangles
+from ..geometry.edge_flips import flipped_along_creases
+from ..geometry.marching import CLEARANCE
+from ..geometry.self_intersections import self_intersections
+from ..operators.grid.blocks import SIDE, Blocks
+from ..progress import Progress
+from .features import Level, placed
+from .fields import Evaluated, in_threads, prepared, tiles_of
+from .nodes import solved
+
+ROUNDS = 8
+"""Times that vertices are moved where triangles pass through each other; twice is enough for nearly all shapes."""
+WINDOW = 8
+"""Blocks along each edge of a window in which crossed edges are looked for together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Edges of a grid that a level crosses.
+
+    Attributes
+    ----------
+    nodes, axes : (e, 3) int, (e,) int
+        First node of each, and what it runs along.
+    rising : (e,) bool
+        Whether the first node is below the level.
+    shares : (e,) float
+        How far from the first node the level is, by linear interpolation.
+    """
+
+    nodes: NDArray[np.int64]
+    axes: NDArray[np.int64]
+    rising: NDArray[np.bool_]
+    shares: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BlockValues:
+    """Distances at the nodes of blocks, indexed by nodes."""
+
+    blocks: Blocks
+    values: NDArray[np.float32]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Nodes of the grid."""
+        return self.blocks.shape
+
+    def __getitem__(self, nodes: tuple[NDArray[np.int64], ...]) -> NDArray[np.float64]:
+        return self.blocks.values_at(self.values, np.stack(nodes, axis=1))
+
+
+def sharp_surface(solid: Evaluated, grid: Grid, level: float, progress: Progress | None = None) -> TriangleMesh:
+    """The surface on which the distance to a solid has a level, closed and manifold, with its edges and corners.
+
+    Raises
+    ------
+    OutsideError
+        If no node of the grid lies on one of the two sides.
+    """
+    report = progress or (lambda fraction, step: None)
+    values, crossings, cells = _crossed(solid, grid, level)
+    report(0.4, "edges")
+    nodes, axes = crossings.nodes, crossings.axes
+    guesses = nodes.astype(np.float64)
+    guesses[np.arange(len(nodes)), axes] += np.clip(crossings.shares, CLEARANCE, 1 - CLEARANCE)
+    points = on_level(solid, grid.origin + guesses * grid.spacing, values, grid, level)
+    shares = ((points - grid.origin) / grid.spacing - nodes)[np.arange(len(nodes)), axes]
+    report(0.6, "vertices")
+    choices = placed(Level(solid, level), grid, cells, points)
+    report(0.9, "faces")
+    vertices, faces = _apart(cells, crossings, np.clip(shares, CLEARANCE, 1 - CLEARANCE), choices)
+    report(1.0, "faces")
+    return TriangleMesh(grid.origin + vertices * grid.spacing, faces)
+
+
+def _apart(
+    cells: DualCells, crossings: Crossings, shares: NDArray[np.float64], choices: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices in cells and faces, none of which pass through each other if that can be had.
+
+    Edges are flipped to run along creases. Vertices of faces that pass through each other go from one choice to the
+    next, (3, v, 3), the last of which are the middles of the pieces, and edges around them are flipped no more.
+    """
+    count = choices.shape[1]
+    chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(shares), dtype=bool)
+    for _ in range(ROUNDS):
+        vertices = choices[np.minimum(chosen, 2), np.arange(count)]
+        found, faces, centres = dual_triangles(
+            cells, crossings.nodes, crossings.axes, crossings.rising, shares, vertices, fanned
+        )
+        held = np.concatenate([chosen > 0, np.zeros(len(centres), dtype=bool)])
+        faces = flipped_along_creases(found, faces, held)
+        meeting = np.unique(faces[self_intersections(found, faces)])
+        if not len(meeting):
+            break
+        meeting = np.union1d(meeting[meeting < count], cells.quads[centres[meeting[meeting >= count] - count]])
+        chosen[meeting] += 1
+        fanned |= np.isin(cells.quads, meeting).sum(axis=1) > 1
+    return found, faces
+
+
+def _crossed(solid: Evaluated, grid: Grid, level: float) -> tuple[BlockValues, Crossings, DualCells]:
+    """Distances near a level, the edges that it crosses, and the pieces of it in cells.
+
+    Where the level goes on into blocks that are not there, they are added.
+    """
+    tree, windings = prepared(solid)
+    places = blocks_at(solid, grid, level)
+    done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, SIDE, SIDE, SIDE), dtype=np.float32))
+    while True:
+        new = Blocks.of(places, grid.shape)
+        values = np.empty((len(new), SIDE, SIDE, SIDE), dtype=np.float32)
+
+        def solve(
+            rows: NDArray[np.int64], new: Blocks = new, values: NDArray[np.float32] = values
+        ) -> NDArray[np.int64]:
+            values[rows] = solved(tree, windings, grid, new.places[rows].astype(np.int64))[0]
+            return rows
+
+        for _ in in_threads(solve, tiles_of(new)):
+            pass
+        both = Blocks.of(np.concatenate([done.blocks.places, new.places]), grid.shape)
+        merged = np.empty((len(both), SIDE, SIDE, SIDE), dtype=np.float32)
+        for part in (done, BlockValues(new, values)):
+            merged[both.rows(part.blocks.places)] = part.values
+        done = BlockValues(both, merged)
+        crossings = crossed_edges(done, level)
+        cells, edges, _, _ = cells_around(crossings.nodes, crossings.axes, grid.shape)
+        around = cells[open_cells(edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
+        places = np.unique(around.reshape(-1, 3) // SIDE, axis=0)
+        places = places[both.rows(places) < 0]
+        if not len(places):
+            break
+    inside = Level(solid, level).inside
+    found = dual_cells(
+        crossings.nodes,
+        crossings.axes,
+        crossings.rising,
+        grid.shape,
+        lambda at: inside(grid.origin + at * grid.spacing),
+    )
+    return done, crossings, found
+
+
+def blocks_at(solid: Evaluated, grid: Grid, level: float) -> NDArray[np.int64]:
+    """(n, 3) places of the blocks of a grid with nodes near a level, found from coarse to fine.
+
+    Distance changes by no more than one goes, so that its value at the middle of a block says how near the level is.
+
+    Raises
+    ------
+    OutsideError
+        If there are none.
+    """
+    n_blocks = -(-np.array(grid.shape) // SIDE)
+    side = 1 << max(0, int(np.ceil(np.log2(n_blocks.max()))))
+    places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
+    diagonal = float(np.linalg.norm(grid.spacing))
+    while True:
+        size = side * SIDE
+        centres = grid.origin + (places * size + 0.5 * (size - 1)) * grid.spacing
+        places = places[np.abs(solid.distance(centres) - level) <= (0.5 * (size - 1) + 1.0) * diagonal]
+        if not len(places):
+            raise OutsideError(f"the distance takes level {level:g} nowhere on the grid", remedy="choose another level")
+        if side == 1:
+            return places
+        side //= 2
+        places = (2 * places[:, None] + halves).reshape(-1, 3)
+        places = places[(places * side < n_blocks).all(axis=1)]
+
+
+def crossed_edges(known: BlockValues, level: float) -> Crossings:
+    """Edges whose ends lie on both sides of a level.
+
+    Raises
+    ------
+    OutsideError
+        If there are none.
+    """
+    blocks, nodes, axes, rising, shares = known.blocks, [], [], [], []
+    for window in np.unique(blocks.places // WINDOW, axis=0).astype(np.int64):
+        first, size = window * WINDOW * SIDE, WINDOW * SIDE
+        height = blocks.window(known.values, first, (size + 1,) * 3).astype(np.float64) - level
+        below, held = height < 0, ~np.isnan(height)
+        for axis in range(3):
+            ahead = tuple(slice(1, None) if k == axis else slice(0, size) for k in range(3))
+            here = (slice(0, size),) * 3
+            found = np.argwhere((below[here] != below[ahead]) & held[here] & held[ahead])
+            low, high = height[here][tuple(found.T)], height[ahead][tuple(found.T)]
+            nodes.append(first + found)
+            axes.append(np.full(len(found), axis))
+            rising.append(low < 0)
+            shares.append(low / (low - high))
+    if not sum(map(len, nodes)):
+        raise OutsideError(
+            f"the distance takes level {level:g} nowhere between the nodes of the grid",
+            remedy="choose another level, or smaller cells if the shape is thinner than they are",
+        )
+    return Crossings(np.concatenate(nodes), np.concatenate(axes), np.concatenate(rising), np.concatenate(shares))

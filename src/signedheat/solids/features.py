@@ -1,0 +1,176 @@
+"""Vertices of dual contouring: places in cells where the planes that touch a level set meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..domains.grid import Grid
+from ..geometry.dual_cells import DualCells
+from ..geometry.marching import CLEARANCE
+from ..geometry.quadrics import Quadrics, minimizers
+from .fields import Evaluated
+
+MANY = 1 << 17
+"""Pieces of the level whose vertices are found together."""
+BESIDE = 0.05
+"""Cells off a crease at which its ends are looked for."""
+ON = 1e-3
+"""Cells off the level from which on a vertex is moved onto it."""
+BEYOND = 0.6
+"""Cells beyond its own up to which a vertex may go."""
+APART = 0.2
+"""Cells between vertices that have left their own."""
+AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
+"""Cells along a crease at which its ends are looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A level of the distance to a solid.
+
+    Attributes
+    ----------
+    solid : Solid
+        What distance is to.
+    value : float
+        The distance.
+    """
+
+    solid: Evaluated
+    value: float
+
+    def inside(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) whether the distance is less."""
+        below: NDArray[np.bool_] = self.solid.distance(points) < self.value
+        return below
+
+    def planes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n, 3) places on the level near points, and its normals there; at level 0 those of the nearest triangles."""
+        if self.value == 0:
+            tree = self.solid.tree
+            found = tree.search(points)
+            return found.feet, tree.features.face_normals[found.faces]
+        closest = self.solid.closest(points)
+        return closest.points + self.value * closest.gradients, closest.gradients
+
+
+def placed(level: Level, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, v, 3) where the vertex of each piece of a level may be, in cells: at best; within its cell; at its middle.
+
+    At best it is on a crease or corner, even where the level goes beyond the cell without crossing its edges.
+
+    Parameters
+    ----------
+    level : Level
+        What.
+    grid : Grid
+        Where.
+    cells : DualCells
+        Its cells.
+    points : (e, 3) float
+        Where the crossed edges are crossed.
+    """
+    count = len(cells.owners)
+    vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    rows, sides = np.nonzero(cells.edges >= 0)
+    pieces = cells.pieces[rows, sides]
+    order = np.argsort(pieces, kind="stable")
+    pieces, edges = pieces[order], cells.edges[rows, sides][order]
+    alone = np.bincount(cells.owners)[cells.owners] == 1
+    for begin in range(0, count, MANY):
+        stop = min(begin + MANY, count)
+        here = slice(*np.searchsorted(pieces, [begin, stop]))
+        parts = _vertices(
+            level,
+            grid,
+            cells.places[cells.owners[begin:stop]],
+            alone[begin:stop],
+            pieces[here] - begin,
+            points[edges[here]],
+        )
+        for whole, part in zip((vertices, middles, wider), parts, strict=True):
+            whole[begin:stop] = (part - grid.origin) / grid.spacing
+    taken = _apart(cells, vertices, wider)
+    return np.stack([np.where(taken[:, None], wider, vertices), vertices, middles])
+
+
+def _apart(cells: DualCells, vertices: NDArray[np.float64], wider: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(v,) which vertices are taken from another list: of those near each other the one that moves the least."""
+    away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
+    taken: NDArray[np.bool_] = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
+    rows = np.flatnonzero(np.isfinite(away) & ~taken)
+    if len(rows):
+        rows = rows[np.argsort(away[rows], kind="stable")]
+        settled = np.where(taken[:, None], wider, vertices)
+        near = scipy.spatial.cKDTree(settled).query_ball_point(wider[rows], APART, workers=-1)
+        rows = rows[[set(others) <= {row} for row, others in zip(rows, near, strict=True)]]
+        first, second = scipy.spatial.cKDTree(wider[rows]).query_pairs(APART, output_type="ndarray").T
+        taken[np.delete(rows, np.maximum(first, second))] = True
+    return taken
+
+
+def _vertices(
+    level: Level,
+    grid: Grid,
+    places: NDArray[np.int64],
+    alone: NDArray[np.bool_],
+    owners: NDArray[np.int64],
+    points: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Those of some pieces, of which each point where an edge is crossed has one; their middles; and others.
+
+    The others are corners and creases that lie up to `BEYOND` outside of the cell, or were not found within it; NaN
+    where there are none.
+    """
+    count = len(places)
+    step = float(grid.spacing.max())
+    corners = grid.origin + places * grid.spacing
+    sums = np.stack([np.bincount(owners, points[:, k], count) for k in range(3)], axis=1)
+    room = CLEARANCE * grid.spacing
+    lower, upper = corners + room, corners + grid.spacing - room
+    middles = np.clip(sums / np.bincount(owners, minlength=count)[:, None], lower, upper)
+    lower, upper = lower - middles, upper - middles
+    on, normals = level.planes(points)
+    quadrics = Quadrics.of(owners, on - middles[owners], normals, count)
+    found, ranks, along = minimizers(quadrics, lower, upper)
+    off = level.solid.distance(middles + found) - level.value
+    wider = np.full((count, 3), np.nan)
+    creased = np.flatnonzero((ranks > 1) & alone)
+    if len(creased):
+        # planes that pass through a cell with a crease without crossing its edges there
+        low, high = lower[creased] - BEYOND * grid.spacing, upper[creased] + BEYOND * grid.spacing
+        probes = found[creased][:, None] + _probes(along[creased], quadrics.sides[creased], grid.spacing)
+        on, normals = level.planes((middles[creased][:, None] + probes).reshape(-1, 3))
+        which = np.repeat(np.arange(len(creased)), probes.shape[1])
+        on -= middles[creased][which]
+        within = ((on > low[which]) & (on < high[which])).all(axis=1)
+        more = Quadrics.of(which[within], on[within], normals[within], len(creased))
+        farther, higher, _ = minimizers(quadrics[creased] + more, low, high)
+        error = np.abs(level.solid.distance(middles[creased] + farther) - level.value)
+        wanted = (error < ON * step) & ((higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON * step))
+        wider[creased[wanted]] = middles[creased[wanted]] + farther[wanted]
+    for _ in range(2):
+        closest = level.solid.closest(middles + found)
+        off = closest.distances - level.value
+        onto = np.clip(found - off[:, None] * closest.gradients, lower, upper)
+        found = np.where((np.abs(off) > ON * step)[:, None], onto, found)
+    return middles + found, middles, wider
+
+
+def _probes(
+    along: NDArray[np.float64], across: NDArray[np.float64], spacing: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n, p, 3) moves from vertices on creases to places near which there may be other planes.
+
+    These are all around, and ahead and back along the crease, somewhat to both of its sides: beyond the end of a crease
+    the nearest place on the surface is on what ends it.
+    """
+    around = np.broadcast_to(0.5 * spacing * (2 * np.array(list(np.ndindex(2, 2, 2))) - 1), (len(along), 8, 3))
+    length = np.linalg.norm(across, axis=1)[:, None]
+    aside = BESIDE * spacing * across / np.where(length > 0, length, 1.0)
+    beside = [way * share * spacing * along + sign * aside for share in AHEAD for way in (-1, 1) for sign in (-1, 1)]
+    return np.concatenate([around, np.stack(beside, axis=1)], axis=1)

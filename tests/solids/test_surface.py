@@ -1,0 +1,127 @@
+"""Surfaces of solids: closed, manifold, with sharp edges, and without triangles that pass through each other."""
+
+import numpy as np
+import pytest
+import scipy
+
+import signedheat as sh
+from shapes.bodies import box
+from shapes.grid_cases import assert_closed_manifold
+from signedheat import samples
+from signedheat.errors import OutsideError
+from signedheat.geometry.self_intersections import self_intersections
+from signedheat.solids.complete import complete
+
+
+def turned(mesh, seed=0):
+    turn = scipy.spatial.transform.Rotation.random(random_state=seed).as_matrix()
+    return sh.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
+
+
+def crumpled(seed):
+    ball = samples.sphere(2)
+    return sh.TriangleMesh(
+        ball.vertices * np.random.default_rng(seed).normal(1, 0.35, (len(ball.vertices), 1)), ball.faces
+    )
+
+
+SHAPES = {
+    "box": lambda: turned(box((-1.0, -0.7, -0.2), (1.0, 0.6, 0.3))),
+    "box on nodes": lambda: box((-1.0, -0.5, -0.25), (1.0, 0.5, 0.25)),
+    "plate thinner than two cells": lambda: turned(box((-1.0, -0.8, 0.0), (1.0, 0.7, 0.1)), 3),
+    "torus with holes": lambda: samples.without_patches(samples.torus(), 3, 0.3, seed=1),
+    "two bodies": lambda: samples.union(samples.sphere(3), turned(box((0.2, -0.3, -0.3), (1.5, 0.4, 0.3)))),
+    "crumpled": lambda: crumpled(1),
+}
+
+
+@pytest.fixture(scope="module", params=SHAPES)
+def solid(request):
+    return complete(SHAPES[request.param]())
+
+
+@pytest.mark.parametrize("level", [0.0, 0.06, -0.04])
+def test_closed_and_apart(solid, level):
+    surface = solid.surface(level, resolution=34)
+    assert_closed_manifold(surface)
+    assert not len(self_intersections(surface.vertices, surface.faces))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_corners_and_edges_of_boxes_are_exact(seed):
+    """Marching cubes cuts them off by .2 cells at the median and up to .7."""
+    rng = np.random.default_rng(seed)
+    shape = turned(box(rng.uniform(-1, -0.3, 3), rng.uniform(0.3, 1, 3)), seed)
+    solid = complete(shape)
+    spacing = float(np.ptp(solid.bounds, axis=0).max()) / 35
+    surface = complete(solid.surface(spacing=spacing), as_oriented=True)
+    assert np.abs(surface.distance(shape.vertices)).max() < 1e-6 * spacing
+    a, b = shape.vertices[
+        np.unique(np.sort(shape.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    ].swapaxes(0, 1)
+    along = (a[:, None] + np.linspace(0, 1, 50)[:, None] * (b - a)[:, None]).reshape(-1, 3)  # diagonals of sides, too
+    off = np.abs(surface.distance(along)) / spacing
+    assert np.quantile(off, 0.95) < 1e-3
+    assert off.max() < 0.15
+
+
+def test_inner_offsets_have_edges_and_outer_ones_are_round():
+    solid = complete(turned(box((-1.0, -0.7, -0.5), (1.0, 0.6, 0.5))))
+    inner, outer = (solid.surface(level, spacing=0.05) for level in (-0.15, 0.15))
+    for surface, level in ((inner, -0.15), (outer, 0.15)):
+        off = np.abs(solid.distance(surface.vertices) - level)
+        assert np.quantile(off, 0.99) < 1e-3 * 0.05
+    volumes = [each.vertices[each.faces] for each in (inner, outer)]
+    inside, outside = (np.einsum("ij,ij->i", v[:, 0], np.cross(v[:, 1], v[:, 2])).sum() / 6 for v in volumes)
+    assert inside == pytest.approx(1.7 * 1.0 * 0.7, rel=2e-4)
+    a, b, c, d = 2.0, 1.3, 1.0, 0.15  # Steiner's formula
+    steiner = a * b * c + 2 * d * (a * b + b * c + c * a) + np.pi * d**2 * (a + b + c) + 4 / 3 * np.pi * d**3
+    assert outside == pytest.approx(steiner, rel=2e-3)
+
+
+def test_balls_are_as_good_as_their_grid():
+    surface = complete(samples.sphere(5)).surface(0.2, resolution=40)
+    assert np.abs(np.linalg.norm(surface.vertices, axis=1) - 1.2).max() < 1e-3
+
+
+def test_turning_and_scaling_turn_and_scale():
+    """Cells do not turn, so that it is the surface that is the same, not its triangles."""
+    shape = box((-1.0, -0.7, -0.2), (1.0, 0.6, 0.3))
+    volumes = []
+    for scale in (1e-6, 1.0, 1e6):
+        large = sh.TriangleMesh(scale * turned(shape).vertices, shape.faces)
+        surface = complete(large).surface(resolution=30)
+        corners = surface.vertices[surface.faces] / scale
+        volumes.append(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6)
+    np.testing.assert_allclose(volumes, 2 * 1.3 * 0.5, rtol=1e-3)
+
+
+def test_smooth_surfaces_are_those_of_the_field():
+    solid = complete(samples.sphere(3))
+    surface = solid.surface(0.1, sharp=False, resolution=24)
+    assert_closed_manifold(surface)
+    assert np.abs(solid.distance(surface.vertices) - 0.1).max() < 1e-3
+
+
+def test_levels_that_are_not_taken():
+    with pytest.raises(OutsideError, match="nowhere"):
+        complete(samples.sphere(2)).surface(-2.0, resolution=16)
+    with pytest.raises(OutsideError, match="smaller cells"):
+        complete(turned(box((0, 0, 0), (1, 1, 1e-6)))).surface(resolution=16)
+
+
+def test_triangles_that_meet_are_found():
+    flat = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]])
+    through = np.array([[0.5, 0.5, -1], [0.6, 0.5, 1], [0.5, 0.6, 1]])
+    for other, meets in (
+        (through, True),
+        (through + np.array([5, 0, 0]), False),
+        (0.5 * flat + np.array([0.1, 0.1, 0]), True),  # covers a part
+        (flat + np.array([0, 0, 1e-3]), False),
+        (flat * np.array([-1, 1, 1]), False),  # beside, along an edge
+    ):
+        pairs = self_intersections(np.concatenate([flat, other]), np.arange(6).reshape(2, 3))
+        assert len(pairs) == meets
+    folded = np.array([[0, 1, 2], [2, 1, 3]])
+    assert len(self_intersections(np.concatenate([flat, [[0.2, 0.2, 0]]]), folded)) == 1
+    assert len(self_intersections(np.concatenate([flat, [[2.0, 2, 0]]]), folded)) == 0
