@@ -241,8 +241,8 @@ class Solid(Frozen, ShortRepr):
         Returns
         -------
         TriangleMesh
-            Corners of the level are in it, and edges: of turned boxes 98 % of their length to a thousandth of a cell, the
-            rest to a tenth.
+            Corners of the level are in it, and edges: of turned boxes 98 % of their length to a thousandth of a cell,
+            the rest to a tenth.
 
         Raises
         ------
