@@ -125,3 +125,44 @@ def test_triangles_that_meet_are_found():
     folded = np.array([[0, 1, 2], [2, 1, 3]])
     assert len(self_intersections(np.concatenate([flat, [[0.2, 0.2, 0]]]), folded)) == 1
     assert len(self_intersections(np.concatenate([flat, [[2.0, 2, 0]]]), folded)) == 0
+
+
+def broken():
+    """Shapes, and the volumes of the solids that they are pictures of."""
+    plank, post = box((-1, -0.7, -0.2), (1, 0.6, 0.3)), box((-0.3, -0.3, -0.9), (0.2, 0.3, 0.8))
+    whole = 2 * 1.3 * 0.5
+    yield "box", plank, whole
+    yield "a face gone", sh.TriangleMesh(plank.vertices, plank.faces[1:]), whole
+    yield "a side gone", sh.TriangleMesh(plank.vertices, plank.faces[2:]), whole
+    yield "a cross", samples.union(plank, post), whole + 0.5 * 0.6 * (1.7 - 0.5)
+    yield "touching", samples.union(plank, box((1, -0.3, -0.1), (1.5, 0.3, 0.2))), whole + 0.5 * 0.6 * 0.3
+    yield "turned faces", samples.with_flipped_faces(plank, 0.3, seed=1), whole
+    yield "soup", samples.soup(plank), whole
+
+
+@pytest.mark.parametrize(("shape", "volume"), [pytest.param(*rest, id=name) for name, *rest in broken()])
+def test_given_faces_are_kept(shape, volume):
+    surface = complete(shape).surface(keep_faces=True)
+    tails, heads = surface.faces.ravel(), np.roll(surface.faces, -1, axis=1).ravel()
+    there = scipy.sparse.coo_array((np.ones(len(tails)), (tails, heads))).tocsr()
+    assert abs(there - there.T).sum() == 0
+    assert not len(self_intersections(surface.vertices, surface.faces))
+    corners = surface.vertices[surface.faces]
+    found = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    assert found == pytest.approx(volume, rel=1e-3)
+
+
+def test_whole_shapes_keep_their_faces_as_they_are():
+    torus = samples.torus()
+    surface = complete(torus).surface(keep_faces=True)
+    given, kept = (np.sort(each.vertices[each.faces].reshape(-1, 9), axis=0) for each in (torus, surface))
+    np.testing.assert_array_equal(kept, given)
+
+
+def test_faces_cannot_be_kept_elsewhere_or_of_sheets():
+    with pytest.raises(sh.errors.SignedHeatError, match="level 0"):
+        complete(samples.sphere(2)).surface(0.1, keep_faces=True)
+    with pytest.raises(sh.errors.GeometryError, match="bounds a solid"):
+        complete(sh.TriangleMesh([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])).surface(
+            keep_faces=True
+        )

@@ -14,7 +14,7 @@ from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number, query_points
-from ..errors import SourceError
+from ..errors import SignedHeatError, SourceError
 from ..fields.grid_field import GridField
 from ..fields.known_solid import Closest
 from ..frozen import Frozen
@@ -28,6 +28,7 @@ from ..reprs import ShortRepr
 from .contouring import sharp_surface
 from .fields import band_field, dense_field
 from .files import save_solid
+from .keeping import given_surface
 from .stores import Scheduler
 from .winding import Windings
 
@@ -216,6 +217,7 @@ class Solid(Frozen, ShortRepr):
         level: float = 0.0,
         *,
         sharp: bool = True,
+        keep_faces: bool = False,
         resolution: int = 128,
         spacing: ArrayLike | None = None,
         progress: Progress | None = None,
@@ -231,6 +233,9 @@ class Solid(Frozen, ShortRepr):
             Signed distance, in units of length; negative inside.
         sharp : bool
             Dual contouring with exact distances, nearest places and normals; else marching cubes, which cuts edges off.
+        keep_faces : bool
+            At level 0, the faces that were given, cut where bodies overlap, and what completes them: exact, and of few
+            triangles. Edges are divided where those of the completion are finer. Bodies that touch share edges.
         resolution : int
             Nodes along the longest side of a grid around the solid, and around the surface.
         spacing : float or (3,) float, optional
@@ -248,6 +253,10 @@ class Solid(Frozen, ShortRepr):
         ------
         OutsideError
             If distance has the level nowhere, or only where it is thinner than a cell.
+        GeometryError
+            If faces are to be kept and do not join with the completion all around; it says where.
+        SignedHeatError
+            If faces are to be kept at another level than 0.
         MemoryLimitError
             If marching cubes cannot fit in memory; nothing has been allocated then.
 
@@ -260,6 +269,12 @@ class Solid(Frozen, ShortRepr):
         True
         """
         height = finite_number(level, "level")
+        if keep_faces:
+            if height != 0:
+                raise SignedHeatError(
+                    "faces that were given are on level 0", remedy="leave out keep_faces or the level"
+                )
+            return given_surface(self.triangles, self.windings)
         reach = self.bounds + np.array([[-1.0], [1.0]]) * max(height, 0.0)
         where = Grid.around(reach, resolution, None, spacing)
         if sharp:

@@ -1,0 +1,105 @@
+"""Triangles joined along their edges: those that end on the edges of others divide these."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from .edges import edge_keys
+
+MOST_ROUNDS = 64
+"""Times that faces are divided: each halves the number of points on an edge."""
+
+
+def conforming(
+    triangles: NDArray[np.float64], tolerance: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """A mesh of triangles of which edges meet whole edges.
+
+    Corners within the tolerance of each other become one vertex. Edges that no other face runs along in the opposite
+    direction are divided at the ends of other such edges that lie on them, and their faces with them.
+
+    Parameters
+    ----------
+    triangles : (m, 3, 3) float
+        Corners.
+    tolerance : float
+        Distance.
+
+    Returns
+    -------
+    vertices : (n, 3) float
+        Positions.
+    faces : (k, 3) int
+        In order of the triangles at first; parts of divided ones are at the end.
+    open_edges : (e, 2) int
+        Edges that faces do not run along as often one way as the other: none if the mesh is closed.
+
+    Examples
+    --------
+    A large face beside two small ones:
+
+    >>> corners = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 0, 0], [1, -1, 0], [1, 0, 0]],
+    ...                     [[1, 0, 0], [1, -1, 0], [2, 0, 0]]])
+    >>> vertices, faces, open_edges = conforming(corners, 1e-9)
+    >>> len(faces), len(open_edges)
+    (4, 4)
+    """
+    vertices, faces = _welded(triangles.reshape(-1, 3), tolerance)
+    for _ in range(MOST_ROUNDS):
+        sides = _open_sides(faces)
+        rows, corners, points = _points_on_edges(vertices, faces, sides, tolerance)
+        if not len(rows):
+            break
+        a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
+        halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
+        faces = np.concatenate([np.delete(faces, rows, axis=0), halves])
+    sides = _open_sides(faces)
+    return vertices, faces, np.stack([faces[sides // 3, sides % 3], faces[sides // 3, (sides + 1) % 3]], axis=1)
+
+
+def _welded(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices, and triangles between them that have three different ones."""
+    places, which = np.unique(points, axis=0, return_inverse=True)
+    pairs = scipy.spatial.cKDTree(places).query_pairs(tolerance, output_type="ndarray")
+    links = scipy.sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=(len(places),) * 2)
+    count, groups = scipy.sparse.csgraph.connected_components(links, directed=False)
+    vertices = np.empty((count, 3))
+    vertices[groups[::-1]] = places[::-1]
+    faces = groups[which.ravel()].astype(np.int64).reshape(-1, 3)
+    return vertices, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+
+
+def _open_sides(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Sides of faces, three times the face plus the corner where each begins, along edges that do not cancel."""
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    _, edge = np.unique(edge_keys(tails, heads), return_inverse=True)
+    balance = np.bincount(edge, np.where(tails < heads, 1, -1))
+    return np.flatnonzero(balance[edge] != 0)
+
+
+def _points_on_edges(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], sides: NDArray[np.int64], tolerance: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """For faces with points on a side: the face, the corner where this begins, and of the points the middlemost."""
+    tails, heads = faces[sides // 3, sides % 3], faces[sides // 3, (sides + 1) % 3]
+    ends = np.union1d(tails, heads)
+    nothing = np.zeros(0, dtype=np.int64)
+    if not len(ends):
+        return nothing, nothing, nothing
+    start, stop = vertices[tails], vertices[heads]
+    lengths = np.linalg.norm(stop - start, axis=1)
+    near = scipy.spatial.cKDTree(vertices[ends]).query_ball_point(0.5 * (start + stop), 0.5 * lengths, workers=-1)
+    side = np.repeat(np.arange(len(sides)), [len(each) for each in near])
+    point = ends[np.concatenate([np.asarray(each, dtype=np.int64) for each in near])]
+    away, along = vertices[point] - start[side], (stop - start)[side] / np.maximum(lengths, 1e-300)[side, None]
+    at = (away * along).sum(axis=1)
+    off = np.linalg.norm(away - at[:, None] * along, axis=1)
+    on = (off <= tolerance) & (at > tolerance) & (at < lengths[side] - tolerance)
+    on &= (point != tails[side]) & (point != heads[side]) & (point != faces[sides // 3, (sides + 2) % 3][side])
+    side, point, at = side[on], point[on], at[on]
+    order = np.lexsort((np.abs(at / lengths[side] - 0.5), sides[side] // 3))
+    _, first = np.unique(sides[side[order]] // 3, return_index=True)
+    chosen = order[first]
+    return sides[side[chosen]] // 3, sides[side[chosen]] % 3, point[chosen]
