@@ -39,7 +39,10 @@ USES = {
 FILES = {
     "ball.glb": "trimesh",
     "ball.gltf": "trimesh",
+    "ball.e57": "pye57",
+    "ball.las": "laspy",
     "ball.mesh": "meshio",
+    "ball.step": "OCP",
     "ball.vtk": "meshio",
 }
 """Files of shapes, and the package that reads them."""

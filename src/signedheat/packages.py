@@ -13,6 +13,7 @@ from typing import Any
 from .errors import MissingPackageError
 
 REMEDIES = {
+    "OCP": "pip install cadquery-ocp",
     "PIL": "pip install pillow",
     "mpl_toolkits": "pip install matplotlib",
     "nrrd": "pip install pynrrd",

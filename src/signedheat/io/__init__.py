@@ -10,6 +10,7 @@ from .polylines import POLYLINE_FORMATS, read_polylines, write_polylines
 from .samples import SAMPLE_FORMATS
 from .shapes import SHAPE_FORMATS, read, save
 from .solids import load
+from .step import read_step
 from .surface_fields import VALUE_FORMATS, VERTEX_FIELD_FORMATS
 from .tets import TET_FIELD_FORMATS
 from .vdb import write_vdb
@@ -35,6 +36,7 @@ __all__ = [
     "read_labels",
     "read_mask",
     "read_polylines",
+    "read_step",
     "read_volume",
     "save",
     "save_field",

@@ -17,6 +17,8 @@ from .obj import read_obj, write_obj, write_pc
 from .off import read_off, write_off
 from .pcd import read_pcd
 from .ply import read_ply, write_ply
+from .scans import read_e57, read_las
+from .step import step_mesh
 from .stl import read_stl, write_stl
 from .tets import TET_FORMATS, read_tets, write_tets
 from .three_mf import read_3mf
@@ -26,8 +28,11 @@ from .xyz import read_xyz, write_xyz
 
 READERS: dict[str, Callable[[PathLike], Shape]] = {
     ".3mf": read_3mf,
+    ".e57": read_e57,
     ".glb": read_glb,
     ".gltf": read_glb,
+    ".las": read_las,
+    ".laz": read_las,
     ".npy": read_volume,
     ".nrrd": read_volume,
     ".obj": read_obj,
@@ -35,7 +40,9 @@ READERS: dict[str, Callable[[PathLike], Shape]] = {
     ".pc": read_obj,
     ".pcd": read_pcd,
     ".ply": read_ply,
+    ".step": step_mesh,
     ".stl": read_stl,
+    ".stp": step_mesh,
     ".vti": read_volume,
     ".vtp": read_vtp,
     ".xyz": read_xyz,
@@ -61,11 +68,11 @@ MANY, BYTES_PER_FACE = 100_000, 250
 def read(path: PathLike) -> Shape:
     """Read a shape, in the format given by the extension.
 
-    STL, OBJ, PLY, OFF, VTP and GLB files have surfaces; XYZ, PCD and PC files have points, and so have PLY, OBJ, OFF
-    and VTP files without faces. Vertices and faces keep their number and order, whatever their defects: nothing is
-    merged, dropped, split or turned. STL has no vertices; corners with exactly the same coordinates become one. NPY,
-    NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH, VTU, VTK and TetGen's NODE with
-    ELE have tets.
+    STL, OBJ, PLY, OFF, VTP, GLB and STEP files have surfaces; XYZ, PCD, LAS, LAZ, E57 and PC files have points, and so
+    have PLY, OBJ, OFF and VTP files without faces. Vertices and faces keep their number and order, whatever their
+    defects: nothing is merged, dropped, split or turned. STL has no vertices; corners with exactly the same coordinates
+    become one. NPY, NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH, VTU, VTK and
+    TetGen's NODE with ELE have tets.
 
     Parameters
     ----------

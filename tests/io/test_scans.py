@@ -1,0 +1,40 @@
+"""LAS, LAZ and E57: points as other packages write them."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+
+POINTS = np.random.default_rng(0).uniform(-3, 3, (50, 3)) + np.array([5e5, 5.2e6, 400.0])
+
+
+@pytest.mark.parametrize("kind", ["las", "laz"])
+def test_las(tmp_path, kind):
+    laspy = pytest.importorskip("laspy")
+    if kind == "laz":
+        pytest.importorskip("lazrs")
+    path = tmp_path / f"scan.{kind}"
+    header = laspy.LasHeader(point_format=3, version="1.2")
+    header.offsets, header.scales = POINTS.min(axis=0), np.full(3, 1e-4)
+    data = laspy.LasData(header)
+    data.x, data.y, data.z = POINTS.T
+    data.write(path)
+    np.testing.assert_allclose(sh.read(path).points, POINTS, rtol=0, atol=0.6e-4)
+    path.write_bytes(path.read_bytes()[:200])
+    assert refused(lambda: sh.read(path), sh.errors.FileFormatError)
+
+
+def test_e57_puts_each_scan_into_its_place(tmp_path):
+    pye57 = pytest.importorskip("pye57")
+    path = tmp_path / "scan.e57"
+    columns = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), np.ascontiguousarray(POINTS.T), strict=True))
+    file = pye57.E57(str(path), mode="w")
+    file.write_scan_raw(columns)
+    file.write_scan_raw(columns, translation=np.array([10.0, 0.0, 0.0]))
+    file.close()
+    np.testing.assert_allclose(
+        sh.read(path).points, np.concatenate([POINTS, POINTS + np.array([10.0, 0, 0])]), atol=1e-6
+    )
+    path.write_bytes(b"ASTM-E57 and nothing else")
+    assert refused(lambda: sh.read(path), sh.errors.FileFormatError)
