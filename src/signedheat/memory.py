@@ -85,13 +85,6 @@ def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     return np.frombuffer(pages, dtype=dtype, count=count).reshape(shape)
 
 
-def paged(array: NDArray[Any]) -> NDArray[Any]:
-    """A copy in pages of its own, which the system gets back as soon as nobody needs them."""
-    result = untouched_zeros(array.shape, array.dtype)
-    result[...] = array
-    return result
-
-
 def fitting_count(count: int, estimate: Callable[[int], float], available: float) -> int:
     """The largest number of elements, at most `count`, that takes no more than the memory available.
 

@@ -7,7 +7,6 @@ import pytest
 
 from signedheat import samples
 from signedheat.geometry.box_tree import BoxTree
-from signedheat.geometry.face_band import nearest_in_band
 from signedheat.geometry.face_features import FaceFeatures
 from signedheat.geometry.nearest import nearest_on_triangles
 from signedheat.geometry.nearest_faces import search_from
@@ -56,23 +55,6 @@ def test_needles_and_specks_keep_their_distance():
         one = foot_on_triangle(triangle_rows(whole.reshape(1, 9)), 0, *point)[0]
         rows = triangle_rows(parts)
         assert min(foot_on_triangle(rows, f, *point)[0] for f in range(3)) == pytest.approx(one, rel=1e-9)
-
-
-@pytest.mark.parametrize("subdivisions", [0, 2, 4])
-def test_bands_are_exact(subdivisions):
-    """Faces larger and smaller than a cell; the tree of boxes is the other route."""
-    mesh = samples.sphere(subdivisions)
-    corners = mesh.vertices[mesh.faces] + 1.5
-    steps = np.array([0.21, 0.17, 0.19])
-    shape = tuple(np.ceil(3.0 / steps).astype(int) + 1)
-    _, squares = nearest_in_band(triangle_rows(corners.reshape(-1, 9)), shape, steps, 0.21)
-    nodes = np.argwhere(np.isfinite(squares))
-    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
-    everywhere = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3) * steps
-    faces, weights = nearest_on_triangles(corners, tree, everywhere)
-    distance = np.linalg.norm(np.einsum("pk,pki->pi", weights, corners[faces]) - everywhere, axis=1).reshape(shape)
-    assert (np.isfinite(squares) == (distance <= 0.21)).mean() > 0.9999
-    np.testing.assert_allclose(np.sqrt(squares[tuple(nodes.T)]), distance[tuple(nodes.T)], atol=1e-6)
 
 
 def test_a_search_leads_to_the_nearest_face():

@@ -132,17 +132,6 @@ def refuse_extreme(
         )
 
 
-def refuse_beyond_single(steps: NDArray[np.float64], extent: NDArray[np.float64]) -> None:
-    """Refuse a grid on which squares of lengths leave the range of single precision."""
-    least, greatest = SINGLE
-    if steps.min() < least or extent.max() > greatest:
-        raise GeometryError(
-            f"a grid of spacing {steps.min():.3g} over {extent.max():.3g} is beyond what single precision holds",
-            remedy="scale the shape, for instance to a size of 1",
-            element="grid",
-        )
-
-
 def query_points(values: object, columns: int) -> NDArray[np.float64]:
     """`values` as an array of shape (n, columns), or (columns,), of finite positions within `LARGEST`."""
     points = contiguous(values, "points")

@@ -21,8 +21,6 @@ WIDTHS = (0.05, 0.0158)
 
 BYTES_PER_SAMPLE = 165
 """At the most, with what finding its nearest face takes."""
-BESIDE = 0.05
-"""Cells from the rim of a hole beyond which its completion begins."""
 
 Layout = Literal["arrays", "deepsdf"]
 """How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""

@@ -16,13 +16,14 @@ from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.marching_tets import level_triangles
 from ..lowering.tets.discretization import TetDiscretization
-from ..operators.grid.sampled_surface import NEAR
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
 from .joining import Shape, joined_triangles
 from .tet_distance import Surface, distance_around
 
+NEAR = 2.0
+"""Mean edges from a face within which it tells the side."""
 FAR = 1.5
 """Mean edges: the zero set farther than that from any face stands for missing surface."""
 

@@ -163,30 +163,3 @@ def facing(
         if lengths > 0.0:
             out_cosines[p] = (nx * dx + ny * dy + nz * dz) / lengths
         out_regular[p] = regular
-
-
-@compiled
-def feet_of_nodes(
-    rows: NDArray[np.float64], nearest: NDArray[np.int32], steps: NDArray[np.float64]
-) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Turn the nearest face of each node, in place, into the nearest of (s, 4) feet, 0 in front; and their faces."""
-    n0, n1, n2 = nearest.shape
-    count = 0
-    for i in range(n0):
-        for j in range(n1):
-            for k in range(n2):
-                count += nearest[i, j, k] >= 0
-    feet = np.zeros((count, 4), dtype=np.float32)
-    faces = np.empty(count, dtype=np.int32)
-    count = 0
-    for i in range(n0):
-        for j in range(n1):
-            for k in range(n2):
-                f = np.int64(nearest[i, j, k])
-                if f >= 0:
-                    _, _, x, y, z = foot_on_triangle(rows, f, i * steps[0], j * steps[1], k * steps[2])
-                    feet[count, 1], feet[count, 2], feet[count, 3] = x, y, z
-                    faces[count] = f
-                    nearest[i, j, k] = count
-                    count += 1
-    return feet, faces

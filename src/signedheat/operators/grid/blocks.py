@@ -118,14 +118,6 @@ def block_points(places: NDArray[np.int32], steps: NDArray[np.float64]) -> NDArr
     return nodes.reshape(-1, 3) * steps
 
 
-def off_grid(values: NDArray[Any], blocks: Blocks, nothing: float) -> None:
-    """Give nodes of the last of some blocks, (n, 8, 8, 8), that are not on the grid another value."""
-    for axis in range(3):
-        index = blocks.places[:, axis, None].astype(np.int64) * SIDE + np.arange(SIDE)
-        for row in np.flatnonzero((index >= blocks.shape[axis]).any(axis=1)):
-            np.moveaxis(values[row], axis, 0)[index[row] >= blocks.shape[axis]] = nothing
-
-
 @compiled
 def row_of_node(cubes: NDArray[np.int32], rows: NDArray[np.int32], i: int, j: int, k: int) -> np.int32:
     """The block that holds a node; −1 if there is none. The node is on the grid."""

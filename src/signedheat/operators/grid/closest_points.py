@@ -325,21 +325,3 @@ def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
                     away[2], away[3] = k * steps[2] - crossing[2], m * steps[3] - crossing[3]
                     distance = circle_distance(crossing, away, across, reach)
                     out[i, j, k, m] = distance if field[i, j, k, m] >= 0 else -distance
-
-
-@compiled
-def distances_to_crossings(
-    points: NDArray[np.float64],
-    chosen: NDArray[np.int32],
-    crossings: NDArray[np.float64],
-    reach: float,
-    out: NDArray[np.float64],
-) -> None:
-    """Distance of (n, 3) points to the circle that touches at the crossing chosen for each; −1 is none, and inf."""
-    away, across = np.zeros(4), np.empty(4)
-    for p in range(len(points)):
-        out[p] = np.inf
-        if chosen[p] >= 0:
-            for d in range(3):
-                away[1 + d] = points[p, d] - crossings[chosen[p], 1 + d]
-            out[p] = circle_distance(crossings[chosen[p]], away, across, reach)

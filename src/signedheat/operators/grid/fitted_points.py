@@ -77,26 +77,6 @@ def _slopes(phi: NDArray[np.float64], nodes: NDArray[np.int64], steps: NDArray[n
     return slopes
 
 
-def points_as_crossings(
-    points: NDArray[np.float64], normals: NDArray[np.float64], steps: NDArray[np.float64], shape: tuple[int, ...]
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Oriented points in space as flat crossings of a zero set: see `crossed_edges` and `crossings_at`.
-
-    Returns
-    -------
-    edges : (n, 5) int
-        From the nearest node, or the one before it, along the last axis.
-    crossings : (n, 18) float
-        Positions and normals, without curvature.
-    """
-    edges = np.full((len(points), 5), 3, dtype=np.int32)
-    edges[:, 0] = 0
-    edges[:, 1:4] = np.clip(np.rint(points / steps), 0, np.array(shape) - [1, 1, 2])
-    crossings = np.zeros((len(points), 18))
-    crossings[:, 1:4], crossings[:, 5:8] = points, normals
-    return edges, crossings
-
-
 def mean_gap(points: NDArray[np.float64]) -> float:
     """Side of a square that each of (n, 3) points would have on a plane, from the disks that hold their six nearest."""
     reach = scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0]
