@@ -18,9 +18,7 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.extensions.joining import Shape
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
-from signedheat.extensions.sampling import BYTES_PER_SAMPLE
 from signedheat.geometry.surfels import count_surfels
 from signedheat.lowering.grid.discretization import bytes_of_area
 from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate
@@ -34,6 +32,8 @@ from signedheat.memory import libraries
 from signedheat.operators.grid.blocks import NODES
 from signedheat.solids.complete import bytes_to_complete, complete
 from signedheat.solids.fields import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_NODE, blocks_near
+from signedheat.solids.joining import Shape
+from signedheat.solids.sampling import BYTES_PER_SAMPLE
 
 SIZES = {
     "triangles": (70, 140, 280),

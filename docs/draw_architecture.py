@@ -17,8 +17,8 @@ FLOORS = [
         "#f3d9c1",
     ),
     (
-        "signed_distance extensions curves solids",
-        "the one verb; sharpening, jumps, completion, morphology, tet meshing",
+        "signed_distance solids curves orientation sharpening tets extensions",
+        "complete a shape, orient curves, measure exactly; jumps, morphology, tets",
         "#f7e6d0",
     ),
     ("solver   fields", "SignedHeatSolver; values that know their domain", "#fbf1de"),

@@ -33,7 +33,7 @@ FLOORS = [
     {"method", "extrapolation"},
     {"fields"},
     {"solver"},
-    {"extensions", "curves", "solids", "signed_distance"},
+    {"extensions", "curves", "orientation", "sharpening", "solids", "tets", "signed_distance"},
     {"io", "torch"},
     {"view"},
     {"batches"},

@@ -17,10 +17,10 @@ from refusals import refused
 from shapes.tet_cases import boxes
 from signedheat import memory, samples
 from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
-from signedheat.extensions.tetrahedralize import BYTES_PER_TET
 from signedheat.lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
 from signedheat.lowering.surface import intrinsic
 from signedheat.memory import available_memory
+from signedheat.tets.tetrahedralize import BYTES_PER_TET
 
 
 def test_some_memory_is_free_but_not_more_than_there_is():

@@ -12,8 +12,8 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat.cli import main
-from signedheat.extensions.tet_meshers import tetrahedralize_with_tetgen, tetrahedralize_with_tetwild
 from signedheat.packages import REMEDIES, lazy_module, require
+from signedheat.tets.meshers import tetrahedralize_with_tetgen, tetrahedralize_with_tetwild
 from signedheat.view import save_scene
 
 SOURCES = sorted(Path(sh.__file__).parent.rglob("*.py"))

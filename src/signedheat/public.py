@@ -37,13 +37,7 @@ from .errors import (
 )
 from .extensions.deviation import Deviation, deviation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
-from .extensions.orient import orient
-from .extensions.orientation import Orientation, orientation
 from .extensions.piecewise import piecewise_distance
-from .extensions.sampling import Samples, sample
-from .extensions.sharpening import sharpen
-from .extensions.sharpening_methods import Convex, Geodesic
-from .extensions.tetrahedralize import tetrahedralize
 from .extrapolation import Extrapolated
 from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
 from .fields.grid_field import GridField
@@ -68,10 +62,16 @@ from .io import (
     write_polylines,
     write_vdb,
 )
+from .orientation.meshes import Orientation, orientation
+from .orientation.orient import orient
+from .sharpening.methods import Convex, Geodesic
+from .sharpening.sharpen import sharpen
 from .signed_distance import signed_distance
 from .solids.complete import complete
+from .solids.sampling import Samples, sample
 from .solids.solid import Solid
 from .solver import SignedHeatSolver
+from .tets.tetrahedralize import tetrahedralize
 from .view import new_figure as _new_figure  # noqa: F401  provides notebooks and windows
 
 __all__ = [

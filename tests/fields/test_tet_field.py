@@ -228,7 +228,7 @@ def test_command_line(tmp_path, capsys):
 @pytest.mark.parametrize("package", ["tetgen", "pytetwild"])
 def test_tets_of_other_programs(package):
     pytest.importorskip(package)
-    from signedheat.extensions import tet_meshers
+    from signedheat.tets import meshers as tet_meshers
 
     mesher = {
         "tetgen": tet_meshers.tetrahedralize_with_tetgen,

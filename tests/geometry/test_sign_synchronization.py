@@ -6,10 +6,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from signedheat.geometry.plane_fit_kernels import least_eigenvector
-from signedheat.geometry.plane_fits import CLEAN_NEIGHBORS, fit_planes, noise_scale
 from signedheat.geometry.synchronization import best_signs, synchronize_signs
-from signedheat.geometry.thinning import spread_out
+from signedheat.orientation.plane_fit_kernels import least_eigenvector
+from signedheat.orientation.plane_fits import CLEAN_NEIGHBORS, fit_planes, noise_scale
+from signedheat.orientation.thinning import spread_out
 
 
 def random_pairs(rng, n, m):

@@ -14,14 +14,14 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError
 from ..extensions.figures import describe, shape_figures, told
-from ..extensions.orient import orient
-from ..extensions.sampling import WIDTHS, Layout, sample
 from ..fields.grid_field import GridField
 from ..io.bands import BAND_FORMATS
 from ..io.files import told_apart
 from ..io.shapes import read, save
 from ..lowering.area_elements import bounds_around
+from ..orientation.orient import orient
 from ..solids.distance import distance_to_shapes
+from ..solids.sampling import WIDTHS, Layout, sample
 from ..solver import SignedHeatSolver, as_list
 
 

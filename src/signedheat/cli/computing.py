@@ -19,11 +19,11 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError
 from ..extensions.figures import describe as describe
 from ..extensions.figures import told
-from ..extensions.orient import orient
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import read_mask
 from ..lowering.area_elements import bounds_around
+from ..orientation.orient import orient
 from ..progress import Progress, within
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes

@@ -15,15 +15,15 @@ from ..domains.inspection import inspect
 from ..domains.intrinsic_triangulation import intrinsic_delaunay
 from ..domains.point_cloud import PointCloud
 from ..domains.polyline import Polyline
-from ..extensions.orientation import orientation
 from ..extensions.piecewise import piecewise_distance
-from ..extensions.sampling import sample
-from ..extensions.sharpening import sharpen
-from ..extensions.sharpening_methods import Convex, Geodesic
-from ..extensions.tetrahedralize import tetrahedralize
-from ..extensions.thickness import thickness
+from ..orientation.meshes import orientation
+from ..sharpening.methods import Convex, Geodesic
+from ..sharpening.sharpen import sharpen
 from ..signed_distance import signed_distance
+from ..solids.sampling import sample
+from ..solids.thickness import thickness
 from ..solver import SignedHeatSolver
+from ..tets.tetrahedralize import tetrahedralize
 from ..view import new_figure
 from ..view.scenes import draw_shape
 

@@ -11,8 +11,6 @@ from ..domains.inspection import CloudReport, SurfaceReport, TetReport, inspect
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
-from ..extensions.orientation import Orientation, orientation
-from ..extensions.thickness import Thickness, thickness
 from ..io import read, read_curves, read_polylines
 from ..io.files import extension
 from ..io.labels import LabelImage
@@ -21,7 +19,9 @@ from ..io.three_mf import unit_of
 from ..lowering.area_elements import bounds_around
 from ..lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
 from ..memory import available_memory
+from ..orientation.meshes import Orientation, orientation
 from ..solids.fields import BYTES_AT_WORK, BYTES_PER_NODE
+from ..solids.thickness import Thickness, thickness
 from .computing import describe
 from .curve_reports import as_text, curve_reports
 from .images import field_or_image, image_report

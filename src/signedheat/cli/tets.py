@@ -9,7 +9,6 @@ from typing import Any
 from ..domains.grid import Grid
 from ..domains.tet_mesh import TetMesh
 from ..errors import GeometryError
-from ..extensions.tetrahedralize import tetrahedralize
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import ensure_writable, read
@@ -17,6 +16,7 @@ from ..io.tets import TET_FIELD_FORMATS
 from ..lowering.tets.discretization import memory_estimate
 from ..memory import refuse_beyond_memory
 from ..packages import require
+from ..tets.tetrahedralize import tetrahedralize
 from ..view import ensure_picture_writable, save_slices
 from .computing import compute, describe, prefix_errors
 from .options import Summary

@@ -23,9 +23,9 @@ from ..errors import (
     InexactWarning,
     warn_user,
 )
-from ..extensions.sharpening import sharpen
 from ..fields.vertex_field import VertexField
 from ..progress import Progress
+from ..sharpening.sharpen import sharpen
 from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .directions import Decision, Pieces, decide
 from .orientation import with_turned

@@ -25,8 +25,8 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
-from .orientation import orientation
-from .thickness import thickness
+from ..orientation.meshes import orientation
+from ..solids.thickness import thickness
 
 TOLD = 0.005
 """Fraction of the surface that may be completed, or bound nothing, without a word."""

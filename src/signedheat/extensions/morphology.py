@@ -28,9 +28,9 @@ from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..lowering.area_elements import area_elements, bounds_around
 from ..lowering.grid.discretization import refuse_beyond_memory
+from ..sharpening.sharpen import sharpen
 from ..signed_distance import signed_distance
 from ..solver import SignedHeatSolver, as_list
-from .sharpening import sharpen
 
 RESOLUTION = 128
 ROOM = 0.15

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SignedHeatError
-from ..extensions.sampling import Layout, Samples, save_samples
+from ..solids.sampling import Layout, Samples, save_samples
 from .fields import CONVENTION
 from .files import PathLike, extension, replacing, unknown_extension
 

@@ -17,21 +17,21 @@ from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError, SourceError
-from ..extensions.joining import Shape, joined_shape
-from ..extensions.orientation import orientation
-from ..extensions.point_orientation import orient_points
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
-from ..geometry.lost_faces import lost_faces
 from ..geometry.welding import roundoff, welded
 from ..memory import refuse_beyond_memory
 from ..operators.grid.fitted_points import mean_gap
+from ..orientation.meshes import orientation
+from ..orientation.points import orient_points
 from ..progress import Progress, Stopwatch
 from . import parts
 from .bounding import pieces_of
 from .closing import lids_of
 from .heat import Heat, heat_surface
+from .joining import Shape, joined_shape
 from .loose import bound_together, clusters_of, scatter_of, without_copies
+from .lost_faces import lost_faces
 from .solid import Solid
 from .winding import Windings
 

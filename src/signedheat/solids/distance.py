@@ -14,14 +14,14 @@ from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
 from ..domains.validation import positive_number
 from ..errors import UnsupportedTypeError
-from ..extensions.joining import joined_shape
-from ..extensions.sharpening import sharpen
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..lowering.area_elements import bounds_around
 from ..progress import Progress, within
+from ..sharpening.sharpen import sharpen
 from ..solver import SignedHeatSolver, checked
 from .complete import complete
+from .joining import joined_shape
 
 
 def distance_to_shapes(

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ..domains.point_cloud import PointCloud
 from ..errors import GeometryError
-from ..geometry.axis_orientation import fitted_outward, outward_signs
-from ..geometry.plane_fits import fit_planes, noise_scale
 from ..reprs import ShortRepr
+from .axes import fitted_outward, outward_signs
+from .plane_fits import fit_planes, noise_scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)

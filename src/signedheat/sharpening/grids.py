@@ -13,7 +13,7 @@ from ..fields.redistancing import redistance
 from ..operators.grid.closest_points import distance_to_zero_set
 from ..parallel import run_cancellable
 from ..progress import Progress
-from .sharpening import sharpen_field
+from .sharpen import sharpen_field
 
 
 @sharpen_field.register

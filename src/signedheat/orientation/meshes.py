@@ -13,14 +13,14 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..frozen import Frozen
-from ..geometry.orientation_votes import imbalance, votes
-from ..geometry.part_orientation import PartOrientation, Parts, orient_parts
-from ..geometry.soup_orientation import agreement, disagreeing_with_neighbors, odds_at_corners
-from ..geometry.stabbing_lines import LineCrossings, aimed_lines, joined, stabbing_lines
-from ..geometry.surface_parts import SurfaceParts
 from ..reprs import ShortRepr
 from .mesh_faces import Mesh, MeshFaces
-from .point_orientation import orient_triangles
+from .parts import PartOrientation, Parts, orient_parts
+from .points import orient_triangles
+from .soups import agreement, disagreeing_with_neighbors, odds_at_corners
+from .stabbing_lines import LineCrossings, aimed_lines, joined, stabbing_lines
+from .surface_parts import SurfaceParts
+from .votes import imbalance, votes
 
 N_LINES = 30_000
 """Lines laid through a shape to see which way its parts face."""

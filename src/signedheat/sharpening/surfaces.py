@@ -15,6 +15,7 @@ from ..discretization import SourceTerm, discretize
 from ..domains.curves import Curve, CurvesAndPoints, SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..errors import GeometryError, SourceError, UnsupportedTypeError
+from ..extensions.curve_sharpening import FALSE_ZERO_WIDTH, ToCurves, told, without_false_zeros
 from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import interpolation_at
 from ..geometry.geodesics.exact import distance_to_segments, distance_to_zero_line
@@ -24,9 +25,8 @@ from ..lowering.surface.source import SurfaceSource
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
 from ..solver import as_list
-from .curve_sharpening import FALSE_ZERO_WIDTH, ToCurves, told, without_false_zeros
-from .sharpening import Method, sharpen_field, sharpened
-from .sharpening_methods import straight_distance
+from .methods import straight_distance
+from .sharpen import Method, sharpen_field, sharpened
 
 
 @sharpen_field.register

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..geometry.surface_parts import SurfaceParts
 from ..geometry.triangle_kernels import areas_and_volumes
+from .surface_parts import SurfaceParts
 
 Mesh = TriangleMesh | PolygonMesh
 

@@ -20,11 +20,11 @@ from ..lowering.tets.discretization import TetDiscretization, lowered_tets
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
-from .joining import Shape
-from .sharpening import Method, sharpen_field, sharpened
-from .sharpening_methods import straight_distance
+from ..solids.joining import Shape
+from .methods import straight_distance
+from .sharpen import Method, sharpen_field, sharpened
 from .tet_distance import Surface, distance_around
-from .tet_shape_sharpening import ToShapes
+from .to_shapes import ToShapes
 
 
 @sharpen_field.register

@@ -5,7 +5,7 @@ import pytest
 
 from signedheat import samples
 from signedheat.geometry.edges import edge_table
-from signedheat.geometry.lost_faces import FEW, MOST_SIDES, lost_faces
+from signedheat.solids.lost_faces import FEW, MOST_SIDES, lost_faces
 
 
 def unordered(faces):

@@ -22,7 +22,7 @@ from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
-from .sharpening_methods import Geodesic
+from .methods import Geodesic
 
 
 @runtime_checkable

@@ -10,7 +10,7 @@ from ..domains.curves import CurveOrPoints
 from ..domains.foreign import ForeignShape
 from ..domains.kinds import SurfaceDomain
 from .mesh_faces import Mesh
-from .orientation import orientation
+from .meshes import orientation
 
 
 @overload

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .orientation_votes import Votes, containers, votes
 from .stabbing_lines import LineCrossings
+from .votes import Votes, containers, votes
 
 LEAST_VOTE = 0.1
 """A surface that bounds nothing gets no votes; of one of area A that a surface of area D would close, (A − D) / (A + D)

@@ -6,7 +6,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.extensions.sampling import WIDTHS
+from signedheat.solids.sampling import WIDTHS
 
 
 @pytest.fixture(scope="module")

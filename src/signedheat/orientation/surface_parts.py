@@ -8,9 +8,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .coincident_faces import coincident_faces
-from .halfedges import FaceOrientation, HalfedgePairs, following_corners, may_coincide, orient_faces, pair_halfedges
-from .welding import roundoff, welded
+from ..geometry.coincident_faces import coincident_faces
+from ..geometry.halfedges import (
+    FaceOrientation,
+    HalfedgePairs,
+    following_corners,
+    may_coincide,
+    orient_faces,
+    pair_halfedges,
+)
+from ..geometry.welding import roundoff, welded
 
 ALMOST_ALL = 0.95
 """Share of a part's area from which a part that is there again elsewhere is a duplicate."""

@@ -14,10 +14,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .directions import unit
-from .edges import edge_keys, edge_table
-from .hole_filling import next_around_gap
-from .virtual_refinement import area_vectors
+from ..geometry.directions import unit
+from ..geometry.edges import edge_keys, edge_table
+from ..geometry.hole_filling import next_around_gap
+from ..geometry.virtual_refinement import area_vectors
 
 MOST_SIDES = 16
 """Sides of a hole from which on vertices, too, may be lost."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.stabbing_lines import LineCrossings, stabbing_lines
-from .mesh_faces import Mesh, MeshFaces
+from ..orientation.mesh_faces import Mesh, MeshFaces
+from ..orientation.stabbing_lines import LineCrossings, stabbing_lines
 
 N_LINES = 30_000
 """Lines laid through a shape to measure it."""

@@ -8,9 +8,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..geometry.synchronization import synchronize_signs
 from .empty_balls import sign_links
 from .plane_fits import PlaneFits, fit_planes, noisy_sizes
-from .synchronization import synchronize_signs
 from .thinning import spread_out
 
 SPREAD = 0.35

@@ -5,7 +5,7 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.extensions.thickness import thickness
+from signedheat.solids.thickness import thickness
 
 
 def slab(lower, upper, n=1):

@@ -19,7 +19,7 @@ from ..lowering.tets.discretization import TetDiscretization
 from ..operators.linear_elements import LinearElements
 from ..parallel import run_cancellable
 from ..progress import Progress
-from .joining import Shape, joined_triangles
+from ..solids.joining import Shape, joined_triangles
 from .tet_distance import Surface, distance_around
 
 NEAR = 2.0

@@ -6,7 +6,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.extensions.point_orientation import orient_axes, orient_points, orient_triangles
+from signedheat.orientation.points import orient_axes, orient_points, orient_triangles
 
 
 def box(size, center=(0.0, 0.0, 0.0)):

@@ -76,7 +76,7 @@ def tetrahedralize(
     -----
     On lattices, heat decays slightly faster along some directions than others. `sharpen` removes the resulting error; a
     four times larger diffusion time (``diffusion=4``) halves it on smooth shapes. On unstructured tets it is smaller:
-    see `signedheat.extensions.tet_meshers` for TetGen and fTetWild.
+    see `signedheat.tets.meshers` for TetGen and fTetWild.
 
     Examples
     --------

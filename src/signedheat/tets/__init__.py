@@ -1,0 +1,1 @@
+"""Tets around and inside broken shapes."""
