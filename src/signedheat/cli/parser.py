@@ -18,6 +18,7 @@ from . import (
     view,
     volume,
     warmup,
+    watertight,
 )
 from .options import Parser
 
@@ -26,6 +27,7 @@ COMMANDS = (
     surface,
     close,
     offset,
+    watertight,
     contour,
     morph,
     sample,

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .. import parallel as parallel
     from .. import samples as samples
     from .. import view as view
+    from ..batches import watertight as watertight
     from ..curves import close as close
     from ..domains import inspection as inspection
     from . import computing as computing
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from . import tets as tets
 else:
     PARTS = (
-        *("batches", "compiled", "curves.close", "domains.inspection", "io"),
+        *("batches", "batches.watertight", "compiled", "curves.close", "domains.inspection", "io"),
         *("parallel", "samples", "view", "cli.computing", "cli.curves", "cli.images", "cli.kernel_runs"),
         *("cli.placing", "cli.reports", "cli.surfaces", "cli.tets"),
     )

@@ -1,0 +1,63 @@
+"""``signedheat watertight``, as a user meets it."""
+
+import json
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.bodies import box, sheet
+from shapes.grid_cases import assert_closed_manifold
+from signedheat import samples
+from signedheat.cli import main
+
+
+@pytest.fixture
+def folder(tmp_path):
+    shapes = tmp_path / "in"
+    shapes.mkdir()
+    plank = box((-1, -0.7, -0.2), (1, 0.6, 0.3))
+    sh.TriangleMesh(plank.vertices, plank.faces[1:]).save(shapes / "plank.ply")
+    samples.without_patches(samples.sphere(3), 2, 0.4, seed=1).save(shapes / "ball.stl")
+    return shapes
+
+
+def figures(tmp_path, capsys, *arguments):
+    main(["watertight", *map(str, arguments), "-o", str(tmp_path / "out"), "--workers", "1", "--json"])
+    return json.loads(capsys.readouterr().out)
+
+
+def test_closed_meshes_and_a_line_for_each(tmp_path, folder, capsys):
+    assert main(["watertight", str(folder), "-o", str(tmp_path / "out"), "--workers", "1"]) == 0
+    printed = capsys.readouterr().out
+    assert "plank.stl: 1 body, volume 1.3, 12 faces, 1 opening completed" in printed
+    assert printed.count("no self-intersections; faces kept") == 2
+    assert "2 of 2 shapes closed" in printed
+    assert_closed_manifold(sh.read(tmp_path / "out" / "ball.stl"))
+
+
+def test_contours_say_how_far_they_are_from_the_faces(tmp_path, folder, capsys):
+    options = "--contour", "--spacing", "0.07", "--surface", "ply"
+    (found,) = figures(tmp_path, capsys, folder / "plank.ply", *options)["shapes"]
+    assert found["output"] == ["plank.ply"] and found["way"] == "contoured"
+    assert found["bodies"] == 1 and found["openings"] == 1 and found["self_intersections"] == 0
+    assert found["volume"] == pytest.approx(2 * 1.3 * 0.5, rel=1e-3)
+    assert found["to_faces"] < 0.07 and found["from_faces"] < 0.07
+    assert_closed_manifold(sh.read(tmp_path / "out" / "plank.ply"))
+
+
+def test_sheets_need_a_thickness(tmp_path, capsys):
+    sheet([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.1]]).save(tmp_path / "sheet.ply")
+    command = ["watertight", str(tmp_path / "sheet.ply"), "-o", str(tmp_path / "out"), "--workers", "1"]
+    assert main(command) == 1
+    assert "bounds nothing" in capsys.readouterr().err
+    (found,) = figures(tmp_path, capsys, tmp_path / "sheet.ply", "--thickness", "0.1", "--resolution", "60")["shapes"]
+    assert found["bodies"] == 1
+    area, rim, thickness = 1.005, 4 * np.hypot(1, 0.1), 0.1
+    assert found["volume"] == pytest.approx(area * thickness + rim * np.pi * thickness**2 / 8, rel=0.02)
+
+
+def test_bad_usage(tmp_path, folder, capsys):
+    for options in (["--resolution", "9", "--spacing", "1"], ["--thickness", "-1"], ["--surface", "txt"]):
+        assert main(["watertight", str(folder), "-o", str(tmp_path / "out"), *options]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
