@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
-.PHONY: demo docs test fuzz lint types conformance coverage matrix dist clean
+.PHONY: blender demo docs test fuzz lint types conformance coverage matrix dist clean
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -53,6 +53,10 @@ $(VENV)/.installed-matrix: $(VENV)/.installed
 
 matrix: $(VENV)/.installed-matrix  # ROWS="3.10-lowest 3.13-highest" runs these rows alone
 	$(BIN)/python .ci/matrix $(ROWS)
+
+blender:  # the add-on, to be installed from disk in Blender 4.2 and later
+	mkdir -p dist
+	cd blender/signedheat_blender && $(PYTHON) -m zipfile -c ../../dist/signedheat-blender.zip blender_manifest.toml __init__.py protocol.py
 
 dist: $(VENV)/.installed
 	rm -rf dist
