@@ -35,7 +35,7 @@ from .errors import (
     UnreachedWarning,
     UnsupportedTypeError,
 )
-from .extensions.deviation import Deviation, deviation
+from .solids.deviation import Deviation, deviation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.piecewise import piecewise_distance
 from .extrapolation import Extrapolated

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Literal, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,7 @@ class Evaluated(KnownSolid, Protocol):
         """Notes."""
 
 
-def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField:
+def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:
     """Signed distance to a solid at all nodes of a grid.
 
     Raises
@@ -88,7 +88,7 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Grid
         confidence[here] = tree.features.trusted[made.faces]
         if progress is not None:
             progress((done + 1) / len(firsts), "distance")
-    return GridField(grid, values, solid.diagnostics, confidence, solid=solid)
+    return cast("GridField[Literal[3]]", GridField(grid, values, solid.diagnostics, confidence, solid=solid))
 
 
 def band_field(
@@ -98,7 +98,7 @@ def band_field(
     store: str | PathLike[str] | None,
     scheduler: Scheduler,
     progress: Progress | None,
-) -> GridField:
+) -> GridField[Literal[3]]:
     """Signed distance to a solid at the nodes in blocks near its surface; and on a coarse grid everywhere.
 
     Raises
@@ -143,7 +143,8 @@ def band_field(
     else:
         values, confidence, note = in_store(Path(store), tree, windings, grid, blocks, tiles, scheduler, progress)
         diagnostics = diagnostics.noting(note)
-    return GridField(grid, values, diagnostics, confidence, solid=solid, blocks=blocks, coarse=coarse, width=width)
+    field = GridField(grid, values, diagnostics, confidence, solid=solid, blocks=blocks, coarse=coarse, width=width)
+    return cast("GridField[Literal[3]]", field)
 
 
 def tiles_of(blocks: Blocks) -> list[NDArray[np.int64]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -158,7 +158,7 @@ class Solid(Frozen, ShortRepr):
         store: str | PathLike[str] | None = None,
         scheduler: Scheduler = None,
         progress: Progress | None = None,
-    ) -> GridField:
+    ) -> GridField[Literal[3]]:
         """Signed distance at the nodes of a grid: that of `distance`, found together.
 
         Parameters
@@ -279,7 +279,7 @@ class Solid(Frozen, ShortRepr):
         where = Grid.around(reach, resolution, None, spacing)
         if sharp:
             return sharp_surface(self, where, height, progress)
-        return cast("GridField[Literal[3]]", dense_field(self, where, progress)).contour(height)
+        return dense_field(self, where, progress).contour(height)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a ``.npz`` file, without notes; `signedheat.load` reads it, and nothing is completed again."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.display import html_of
-from ..extensions.deviation import Deviation, save_deviation
+from ..solids.deviation import Deviation, save_deviation
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.surface_fields import ply_of
