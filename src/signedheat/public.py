@@ -35,7 +35,6 @@ from .errors import (
     UnreachedWarning,
     UnsupportedTypeError,
 )
-from .solids.deviation import Deviation, deviation
 from .extensions.morphology import closing, dilate, erode, opening, shell, thicken
 from .extensions.piecewise import piecewise_distance
 from .extrapolation import Extrapolated
@@ -68,6 +67,7 @@ from .sharpening.methods import Convex, Geodesic
 from .sharpening.sharpen import sharpen
 from .signed_distance import signed_distance
 from .solids.complete import complete
+from .solids.deviation import Deviation, deviation
 from .solids.sampling import Samples, sample
 from .solids.solid import Solid
 from .solver import SignedHeatSolver

@@ -18,8 +18,8 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..frozen import Frozen
 from ..slots import Slot
-from ..solids.complete import complete
-from ..solids.solid import Solid
+from .complete import complete
+from .solid import Solid
 
 PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 """Of deviations, that summaries have."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.display import html_of
-from ..solids.deviation import Deviation, save_deviation
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.surface_fields import ply_of
+from ..solids.deviation import Deviation, save_deviation
 from .colors import INSIDE_TO_OUTSIDE
 
 DEVIATION_FORMATS = frozenset([".csv", ".html", ".ply"])
