@@ -112,3 +112,20 @@ def test_a_globe_may_be_of_quadrangles_and_of_another_package():
     for no_mesh in (samples.oriented_points(triangles, 50), sh.Grid((0, 0, 0), 1.0, (3, 3, 3))):
         with refused(sh.UnsupportedTypeError, "mesh"):
             sh.globe_curve(no_mesh, parallel(0.0))
+
+
+def test_curves_are_written_in_longitude_and_latitude(tmp_path):
+    globe = samples.sphere(4, 6371.0, (10.0, 20.0, 30.0))
+    open_one = sh.globe_curve(globe, [[170, 10], [-170, 40], [-120, 60]])
+    ring = sh.globe_curve(globe, [[0, 30], [120, 30], [240, 30]], closed=True)
+    sh.write_curves(tmp_path / "curves.geojson", [open_one, ring], globe)
+    back = sh.read_globe_curves(tmp_path / "curves.geojson", globe)
+    assert [curve.closed for curve in back] == [False, True]
+    for one, other in zip((open_one, ring), back, strict=True):
+        ends = globe.positions(one)[[0, -1]], globe.positions(other)[[0, -1]]
+        np.testing.assert_allclose(*ends, atol=60.0)  # the mesh lies up to 20 under the globe
+    field = sh.signed_distance(back[1], globe)
+    assert np.abs(field(ring)).max() < 60.0
+    with pytest.raises(sh.errors.SourceError, match="no globe"):
+        torus = samples.torus(n_around=12, n_across=6)
+        sh.write_curves(tmp_path / "torus.geojson", [torus.path([0, 1, 2])], torus)

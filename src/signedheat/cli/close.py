@@ -22,7 +22,7 @@ def add_to(commands: Any) -> None:
         description="The zero set of the signed distance to broken curves: closed, but for ends at the boundary of the "
         "surface.",
     )
-    add_curves(parser, "completed curves: .txt .obj .json")
+    add_curves(parser, "completed curves: .txt .obj .json; on a globe .geojson")
     parser.add_argument("--preview", metavar="PNG", help="draw the distance, with the completed curves")
     add_up_option(parser)
     add_format_option(parser, "json")

@@ -58,6 +58,20 @@ def globe_curve(
         raise UnsupportedTypeError(
             f"a globe is a mesh, and this is a {type(mesh).__name__}", remedy="triangulate it", element="mesh"
         )
+    center, radius = globe_frame(mesh)
+    step = float(np.mean(mesh.triangulation.edge_lengths)) / radius
+    ways = great_circles(directions(points), closed, step)
+    return mesh.polyline(center + radius * ways, closed=closed, oriented=oriented, max_distance=2 * ROUND * radius)
+
+
+def globe_frame(mesh: TriangleMesh | PolygonMesh) -> tuple[NDArray[np.float64], float]:
+    """Centre and mean radius of a mesh of a globe.
+
+    Raises
+    ------
+    SourceError
+        If it is none.
+    """
     triangles = mesh.triangulation
     lower, upper = mesh.bounds
     center = (lower + upper) / 2
@@ -69,8 +83,7 @@ def globe_curve(
             remedy="use a mesh of a sphere",
             element="mesh",
         )
-    ways = great_circles(directions(points), closed, step=float(np.mean(triangles.edge_lengths)) / radius)
-    return mesh.polyline(center + radius * ways, closed=closed, oriented=oriented, max_distance=2 * ROUND * radius)
+    return center, radius
 
 
 def directions(points: ArrayLike) -> NDArray[np.float64]:
@@ -95,6 +108,18 @@ def directions(points: ArrayLike) -> NDArray[np.float64]:
     longitude, latitude = np.radians(places).T
     level = np.cos(latitude)
     return np.column_stack([level * np.cos(longitude), level * np.sin(longitude), np.sin(latitude)])
+
+
+def longitudes_and_latitudes(ways: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 2) in degrees, of vectors from the centre of a globe: the reverse of `directions`.
+
+    Examples
+    --------
+    >>> longitudes_and_latitudes(np.array([[2.0, 0, 0], [0, -1, 0], [0, 1, 1]])).round(6).tolist()
+    [[0.0, 0.0], [-90.0, 0.0], [90.0, 45.0]]
+    """
+    x, y, z = ways.T
+    return np.asarray(np.degrees(np.column_stack([np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))])))
 
 
 def great_circles(points: NDArray[np.float64], closed: bool, step: float) -> NDArray[np.float64]:

@@ -38,6 +38,7 @@ from .curve_readers import (
     read_text,
 )
 from .files import PathLike, extension, reading, replacing, unknown_extension
+from .globe import write_geojson
 
 
 def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: bool = False) -> list[CurveOrPoints]:
@@ -262,5 +263,10 @@ READERS: dict[str, Callable[..., Iterable[Group | Curve]]] = {
     ".obj": read_obj,
     ".txt": read_text,
 }
-WRITERS: dict[str, Callable[..., str]] = {".json": write_json, ".obj": write_obj, ".txt": write_text}
+WRITERS: dict[str, Callable[..., str]] = {
+    ".geojson": write_geojson,
+    ".json": write_json,
+    ".obj": write_obj,
+    ".txt": write_text,
+}
 CURVE_FORMATS = frozenset(WRITERS)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.curves import Curve
+from ..domains.curves import Curve, CurveOrPoints
 from ..domains.foreign import ForeignShape, converted
-from ..domains.globe import globe_curve
+from ..domains.globe import globe_curve, globe_frame, longitudes_and_latitudes
+from ..domains.kinds import EmbeddedSurface
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import FileFormatError
+from ..errors import FileFormatError, UnsupportedTypeError
 from .files import PathLike, extension, reading, text, unknown_extension
 from .point_lists import read_point_lists
 
@@ -58,6 +59,26 @@ def read_globe_curves(path: PathLike, mesh: TriangleMesh | PolygonMesh | Foreign
         if not lines:
             raise FileFormatError("there is no curve in it", remedy="export lines or polygons", path=path)
         return [globe_curve(mesh, points, closed) for points, closed in lines]
+
+
+def write_geojson(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> str:
+    """Longitudes and latitudes of curves on a globe: closed ones end with their first point.
+
+    Lines that cross the 180th meridian are not cut there.
+    """
+    if not isinstance(domain, TriangleMesh | PolygonMesh):
+        raise UnsupportedTypeError(f"a globe is a mesh, and this is a {type(domain).__name__}", element="domain")
+    center, _ = globe_frame(domain)
+    mesh, features = domain.triangulation, []
+    for curve in curves:
+        points = np.einsum("ik,ikj->ij", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]])
+        places = longitudes_and_latitudes(points - center).tolist()
+        if isinstance(curve, Curve) and curve.closed:
+            places.append(places[0])
+        kind = "LineString" if isinstance(curve, Curve) else "MultiPoint"
+        geometry = {"type": kind, "coordinates": places}
+        features.append({"type": "Feature", "properties": {}, "geometry": geometry})
+    return json.dumps({"type": "FeatureCollection", "features": features}) + "\n"
 
 
 def _lines(thing: object, depth: int) -> Iterator[Line]:
