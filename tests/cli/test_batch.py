@@ -71,5 +71,5 @@ def test_bands_of_many_shapes(tmp_path, folder, capsys):
     assert {path.name for path in out.iterdir()} == names
     lines = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
     assert lines[0]["figures"]["field"]["band"] == 0.3
-    for wrong in (["--volume", "vti"], ["--offset", "0.4"], ["--info", "--plain"]):
+    for wrong in (["--volume", "nrrd"], ["--offset", "0.4"], ["--info", "--plain"]):
         assert main(["batch", str(folder), "-o", str(out), *wrong, *options]) == 2

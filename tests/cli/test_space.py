@@ -242,7 +242,7 @@ def test_bad_usage_is_one_line_and_status_2(tmp_path, ball, capsys, case):
 BAD_SHAPES = {
     "missing.stl": (None, "no such file"),
     "cut.stl": (b"x" * 80 + (9).to_bytes(4, "little"), "truncated"),
-    "what.step": (b"ISO", "not a known format"),
+    "what.iges": (b"ISO", "not a known format"),
     "empty.off": (b"OFF\n0 0 0\n", "no points"),
     "nan.obj": (b"v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "NaN or infinity"),
     "range.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "vertex ids go from"),

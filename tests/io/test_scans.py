@@ -22,7 +22,8 @@ def test_las(tmp_path, kind):
     data.write(path)
     np.testing.assert_allclose(sh.read(path).points, POINTS, rtol=0, atol=0.6e-4)
     path.write_bytes(path.read_bytes()[:200])
-    assert refused(lambda: sh.read(path), sh.errors.FileFormatError)
+    with refused(sh.errors.FileFormatError):
+        sh.read(path)
 
 
 def test_e57_puts_each_scan_into_its_place(tmp_path):
@@ -37,4 +38,5 @@ def test_e57_puts_each_scan_into_its_place(tmp_path):
         sh.read(path).points, np.concatenate([POINTS, POINTS + np.array([10.0, 0, 0])]), atol=1e-6
     )
     path.write_bytes(b"ASTM-E57 and nothing else")
-    assert refused(lambda: sh.read(path), sh.errors.FileFormatError)
+    with refused(sh.errors.FileFormatError):
+        sh.read(path)

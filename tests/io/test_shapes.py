@@ -233,7 +233,7 @@ DAMAGED = {
     "bad.glb": b"glTF" + bytes(30),
     "bad.vtp": b"<VTKFile type='PolyData'><PolyData>",
     "kind.vtp": b"<VTKFile type='ImageData'/>",
-    "what.step": b"ISO-10303-21;",
+    "what.iges": b"ISO-10303-21;",
     "none": b"abc",
 }
 

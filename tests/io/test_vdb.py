@@ -99,3 +99,13 @@ def test_damaged_files_are_refused(tmp_path, band):
             sh.load_field(tmp_path / "cut.vdb")
     with refused(sh.FileFormatError, file="band.vti"):
         write_vdb(band, tmp_path / "band.vti")
+
+
+def test_bands_as_images_have_all_nodes(tmp_path):
+    solid = sh.complete(sphere(500))
+    band = solid.field(resolution=45, band=0.2)
+    band.save(tmp_path / "band.vti")
+    image = sh.load_field(tmp_path / "band.vti")
+    exact = np.clip(solid.distance(band.grid.points.reshape(-1, 3)).reshape(band.grid.shape), -0.2, 0.2)
+    np.testing.assert_allclose(image.values, exact, atol=1e-6)
+    np.testing.assert_array_equal(image.grid.spacing, band.grid.spacing)

@@ -92,8 +92,8 @@ def check(arguments: Namespace) -> None:
     if arguments.band is not None:
         if arguments.plain:
             error("--band does not go with --plain")
-        if arguments.volume not in (None, "npz", "vdb"):
-            error("a band is written as .npz or .vdb")
+        if arguments.volume not in (None, "npz", "vdb", "vti"):
+            error("a band is written as .npz, .vdb or .vti")
         reach = max((abs(distance) for distance in arguments.offset), default=0.0)
         if reach > arguments.band:
             error(f"the band reaches to {arguments.band:g}, and the distances to {reach:g}")

@@ -8,18 +8,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..domains.display import NAME
 from ..domains.grid import Grid
 from ..errors import FileFormatError, GeometryError
 from ..fields.grid_field import GridField
-from ..operators.grid.blocks import Blocks
+from ..lowering.grid.discretization import refuse_beyond_memory
+from ..operators.grid.blocks import SIDE, Blocks
 from .files import PathLike, extension
 from .vdb import write_vdb
+from .vtk_xml import write_vti
 
 CONVENTION = (
     "signed distance, negative inside; values[n, i, j, k] at origin + (8 * places[n] + (i, j, k)) * spacing, axes "
     "x, y, z, in the units of the shape; elsewhere coarse_values[i, j, k] at origin + (i, j, k) * coarse_spacing"
 )
+
+CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
+BYTES_PER_NODE = 20.0
+"""Of grids written whole: values, their copy in the order of the file, and what is written."""
 
 
 def load_band_field(path: PathLike) -> GridField:
@@ -76,6 +84,28 @@ def _write_npz(field: GridField, path: Path) -> None:
         )
 
 
-BAND_WRITERS: dict[str, Callable[[GridField, Path], None]] = {".npz": _write_npz, ".vdb": write_vdb}
+def _write_vti(field: GridField, path: Path) -> None:
+    """All nodes of the grid, for ParaView and solvers: those beyond the band have plus or minus its half width."""
+    refuse_beyond_memory(field.grid, BYTES_PER_NODE, 0.0)
+    path.write_bytes(write_vti(whole_values(field), field.grid.origin, field.grid.spacing, NAME, CLIPPED))
+
+
+def whole_values(field: GridField) -> NDArray[np.float32]:
+    """Values of a band at all nodes of its grid; beyond it, plus or minus its half width."""
+    assert field.blocks is not None
+    grid, width = field.grid, np.float32(field.width)
+    counts = -(-np.array(grid.shape) // SIDE)
+    places = np.argwhere(np.ones(counts, dtype=bool))
+    rows = field.blocks.rows(places)
+    middles = np.minimum(places[rows < 0] * SIDE + 0.5 * (SIDE - 1), np.array(grid.shape) - 1)
+    parts = np.full((len(places), SIDE, SIDE, SIDE), width, dtype=np.float32)
+    parts[rows < 0] *= np.where(field(grid.origin + middles * grid.spacing) < 0, -1, 1)[:, None, None, None]
+    parts[rows >= 0] = np.clip(field.values[rows[rows >= 0]], -width, width)
+    a, b, c = counts
+    whole = parts.reshape(a, b, c, SIDE, SIDE, SIDE).transpose(0, 3, 1, 4, 2, 5).reshape(a * SIDE, b * SIDE, c * SIDE)
+    return np.ascontiguousarray(whole[tuple(slice(0, n) for n in grid.shape)])
+
+
+BAND_WRITERS: dict[str, Callable[[GridField, Path], None]] = {".npz": _write_npz, ".vdb": write_vdb, ".vti": _write_vti}
 
 BAND_FORMATS = frozenset(BAND_WRITERS)

@@ -12,8 +12,9 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..geometry.welding import welded
 from ..packages import lazy_module
-from .files import PathLike, contents, with_messages
+from .files import PathLike, contents
 
+messages = lazy_module("OCP.Message", ".step files")
 control = lazy_module("OCP.STEPControl", ".step files")
 selected = lazy_module("OCP.IFSelect", ".step files")
 mesher = lazy_module("OCP.BRepMesh", ".step files")
@@ -91,8 +92,10 @@ def step_mesh(path: PathLike) -> TriangleMesh:
 
 def _shape(path: PathLike) -> Any:
     contents(path)  # which says why a file cannot be read
+    printer = messages.Message_PrinterOStream.get_type_descriptor_s()
+    messages.Message.DefaultMessenger_s().RemovePrinters(printer)  # which writes to standard output
     reader = control.STEPControl_Reader()
-    status, _ = with_messages(lambda: reader.ReadFile(str(Path(path))))
+    status = reader.ReadFile(str(Path(path)))
     if status != selected.IFSelect_ReturnStatus.IFSelect_RetDone or not reader.TransferRoots():
         raise FileFormatError("Open CASCADE cannot read it, or it has no solid", remedy="export it again", path=path)
     return reader.OneShape()
