@@ -118,7 +118,8 @@ def test_triangles_that_meet_are_found():
         (through + np.array([5, 0, 0]), False),
         (0.5 * flat + np.array([0.1, 0.1, 0]), True),  # covers a part
         (flat + np.array([0, 0, 1e-3]), False),
-        (flat * np.array([-1, 1, 1]), False),  # beside, along an edge
+        (flat * np.array([-1, 1, 1]), True),  # touches along an edge that has other vertices
+        (flat * np.array([-1, 1, 1]) - np.array([1e-3, 0, 0]), False),
     ):
         pairs = self_intersections(np.concatenate([flat, other]), np.arange(6).reshape(2, 3))
         assert len(pairs) == meets

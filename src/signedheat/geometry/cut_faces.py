@@ -53,10 +53,12 @@ def cut_faces(
 
 
 @compiled
-def overlap(p: NDArray[np.float64], q: NDArray[np.float64], slack: float, axis: NDArray[np.float64]) -> bool:
-    """Whether two triangles, (9,) each, overlap deeper than a slack along every axis that may separate them.
+def overlap(
+    p: NDArray[np.float64], q: NDArray[np.float64], slack: float, depth: float, axis: NDArray[np.float64]
+) -> bool:
+    """Whether two triangles, (9,) each, overlap deeper than a depth along every axis that may separate them.
 
-    Along their normals they may touch.
+    Along their normals they may be apart by a slack.
     """
     normals = np.zeros((2, 3))
     for a in range(17):
@@ -103,7 +105,7 @@ def overlap(p: NDArray[np.float64], q: NDArray[np.float64], slack: float, axis: 
         if a < 2:
             if p0 > q1 + slack or q0 > p1 + slack:
                 return False
-        elif p0 >= q1 - slack or q0 >= p1 - slack:
+        elif p0 >= q1 - depth or q0 >= p1 - depth:
             return False
     return True
 
@@ -208,7 +210,7 @@ def _cut(
                 for i in range(3):
                     for j in range(3):
                         shared += ids[f, i] == knife_ids[g, j]
-                if not meets or shared > 1 or not overlap(corners[f], knives[g], slack, axis):
+                if not meets or shared > 1 or not overlap(corners[f], knives[g], slack, slack, axis):
                     continue
                 met[f] = True
                 q = knives[g]
@@ -225,7 +227,7 @@ def _cut(
                     flat &= abs(corners[f, c] * nx + corners[f, c + 1] * ny + corners[f, c + 2] * nz - height) <= slack
                 before = count
                 for at in range(before):
-                    if not alive[at] or not overlap(pieces[at], q, slack, axis):
+                    if not alive[at] or not overlap(pieces[at], q, slack, slack, axis):
                         continue
                     if not flat:
                         count = _halve(pieces, alive, count, at, nx, ny, nz, height, slack)
@@ -242,7 +244,7 @@ def _cut(
                         if alive[at]:
                             count = _halve(pieces, alive, count, at, ax / long, ay / long, az / long, level, slack)
                         for new in range(before, until):
-                            if alive[new] and overlap(pieces[new], q, slack, axis):
+                            if alive[new] and overlap(pieces[new], q, slack, slack, axis):
                                 count = _halve(pieces, alive, count, new, ax / long, ay / long, az / long, level, slack)
         if total + count > len(result):
             more = np.empty((2 * len(result) + count, 9))

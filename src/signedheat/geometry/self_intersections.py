@@ -20,7 +20,9 @@ other."""
 
 
 def self_intersections(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(k, 2) pairs of faces that pass through each other, or cover each other in one plane. Those that touch do not.
+    """(k, 2) pairs of faces that pass through each other, or cover each other in one plane.
+
+    Those that have no vertex in common must not touch, either.
 
     Examples
     --------
@@ -96,7 +98,7 @@ def _pairs(
                     for j in range(3):
                         shared += faces[f, i] == faces[g, j]
                 if (shared > 1 and _folded(corners[f], corners[g])) or (
-                    shared < 2 and overlap(corners[f], corners[g], slack, axis)
+                    shared < 2 and overlap(corners[f], corners[g], slack, slack if shared else -slack, axis)
                 ):
                     if count == len(result):
                         wider = np.empty((2 * count, 2), dtype=np.int64)
