@@ -125,6 +125,7 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "solid": lambda: sh.signed_distance(BALL, resolution=16),
     "piecewise field": lambda: sh.piecewise_distance(BALL, BALL.path([0, 5])),
     "orientation": lambda: sh.orientation(BALL),
+    "deviation": lambda: sh.deviation(samples.sphere(1, 1.1), BALL),
     "completed solid": lambda: sh.complete(samples.without_patches(samples.sphere(2), 2, 0.2)),
     "closest": lambda: sh.complete(samples.sphere(2)).closest([[0.5, 0.0, 0.0]]),
     "band": lambda: banded(),

@@ -228,7 +228,7 @@ def test_what_is_no_batch_says_so(tmp_path, files, monkeypatch):
         sh.BatchJob()
     with pytest.raises(sh.SignedHeatError):
         sh.BatchJob(samples=sh.Sampling(), plain=True)
-    for wrong in ({"volume": ".vti"}, {"offsets": (0.2,)}, {"info": True, "plain": True}):
+    for wrong in ({"volume": ".nrrd"}, {"offsets": (0.2,)}, {"info": True, "plain": True}):
         with pytest.raises(sh.SignedHeatError):
             sh.BatchJob(band=0.1, **wrong)
     monkeypatch.setattr(sys, "path", [path for path in sys.path if not path.endswith("tests")])

@@ -61,9 +61,9 @@ def pp3d_path(pp3d):
 def test_points_of_elements_lie_where_they_should():
     elements, places = as_elements(BALL, 7, 33, 100)
     np.testing.assert_allclose(BALL.positions(curve_of_elements(BALL, elements)), places, atol=1e-15)
-    one = sh.signed_distance(elements, BALL)
-    for other in (sh.signed_distance([elements], BALL), sh.signed_distance(curve_of_elements(BALL, elements), BALL)):
-        np.testing.assert_array_equal(one.values, other.values)
+    one = sh.signed_distance(elements, BALL, as_oriented=True)
+    for same in ([elements], curve_of_elements(BALL, elements)):
+        np.testing.assert_array_equal(one.values, sh.signed_distance(same, BALL, as_oriented=True).values)
     with refused(sh.SourceError, "point 1"):
         sh.signed_distance([(3, []), (10**6, [0.5])], BALL)
 

@@ -1,5 +1,6 @@
 """Reading and writing of shapes, curves and fields."""
 
+from . import streamed_meshes as _streamed_meshes  # noqa: F401  provides the writing of large contours
 from .curves import CURVE_FORMATS, read_curves, write_curves
 from .fields import FIELD_FORMATS, ensure_field_writable, load_field, save_field
 from .files import ensure_writable

@@ -8,10 +8,12 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.curves import Curve, SurfacePoints
 from ..domains.foreign import as_shape, as_shapes
 from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
+from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
@@ -29,7 +31,8 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
         if isinstance(whole, TetMesh):
             return whole.boundary
         if not isinstance(whole, TriangleMesh | PolygonMesh | PointCloud):
-            as_shape(cast("Shape", whole))  # which refuses paths and bare arrays
+            if not isinstance(whole, Curve | SurfacePoints | Polyline):
+                as_shape(cast("Shape", whole))  # which refuses paths and bare arrays
             raise SourceError(
                 f"distance in space is measured to meshes and points, not to a {type(whole).__name__}",
                 remedy="pass a mesh, or a point cloud; curves are measured on their surface",
