@@ -36,7 +36,7 @@ def box(size=(1.0, 1.0, 1.0), origin=(0.0, 0.0, 0.0), without=(), n=8):
 
 def volume(solid):
     """What the faces and the completion enclose, by the divergence theorem."""
-    a, b, c = np.concatenate(solid.windings.sets).transpose(1, 0, 2)
+    a, b, c = solid.windings.triangles.transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 

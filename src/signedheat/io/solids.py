@@ -28,7 +28,7 @@ def _(solid: object, path: PathLike) -> None:
     source: dict[str, Any] = {}
     if solid.source is not None:
         source = dict(zip(_SOURCE, (solid.source.vertices, solid.source.faces), strict=True))
-    (closing,) = solid.windings.sets
+    closing = solid.windings.triangles
     with replacing(path) as temporary, temporary.open("wb") as file:
         np.savez(
             file,
@@ -103,6 +103,6 @@ def load(path: PathLike) -> Solid:
         found["origins"].astype(np.int64),
         found["confidence"].astype(np.float32),
         found["bounding"].astype(np.bool_),
-        Windings((closing.astype(np.float64),), (1.0,)),
+        Windings(closing.astype(np.float64)),
         source,
     )

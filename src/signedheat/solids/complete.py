@@ -294,7 +294,7 @@ def united(
     """The solid that surfaces close: without what lies inside, where bodies overlap, and without idle completion."""
     whole = _joined(surfaces)
     closing = np.concatenate([np.full(len(each.triangles), each.closing) for each in surfaces])
-    windings = Windings((whole.triangles[closing],), (1.0,))
+    windings = Windings(whole.triangles[closing])
     pieces = pieces_of(whole.triangles, whole.ids, closing, windings)
     origins = whole.origins[pieces.origins]
     given = origins >= 0

@@ -112,16 +112,13 @@ def _inside(windings: Windings, grid: Grid, first: NDArray[np.int64], values: ND
     origin, steps = grid.origin + first * grid.spacing, grid.spacing
     inside = np.zeros(values.shape, dtype=bool)
     far = values > 0.5 * (1.0 + SLACK) * float(steps.max())
-    alone = ~np.isnan(values)
-    if windings.closed:
-        alone &= ~far
-        groups, count = scipy.ndimage.label(far)
-        if count:
-            farthest = _farthest(values, groups, count)
-            where = np.stack(np.unravel_index(farthest, values.shape), axis=1)
-            found = np.concatenate([[False], windings.inside(origin + where * steps)])
-            inside = found[groups]
-    nodes = np.argwhere(alone)
+    groups, count = scipy.ndimage.label(far)
+    if count:
+        farthest = _farthest(values, groups, count)
+        where = np.stack(np.unravel_index(farthest, values.shape), axis=1)
+        found = np.concatenate([[False], windings.inside(origin + where * steps)])
+        inside = found[groups]
+    nodes = np.argwhere(~np.isnan(values) & ~far)
     if len(nodes):
         inside[tuple(nodes.T)] = windings.inside(origin + nodes * steps)
     return inside

@@ -91,8 +91,7 @@ def in_store(
         "places": blocks.places,
         "rows": np.concatenate(tiles),
         "starts": np.cumsum([0, *map(len, tiles)]),
-        "weights": np.array(windings.weights),
-        **{f"closing_{at}": triangles for at, triangles in enumerate(windings.sets)},
+        "closing": windings.triangles,
     }
     key = fingerprint(*plan.values()).hex()
     _begin(folder, key, plan, len(blocks), len(tiles))
@@ -131,9 +130,7 @@ def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, ND
         plan = dict(file)
     corners = plan["corners"]
     features = FaceFeatures.of(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), plan["trusted"])
-    sets = tuple(plan[f"closing_{at}"] for at in range(len(plan["weights"])))
-    windings = Windings(sets, tuple(plan["weights"].tolist()))
-    return FaceTree.of(features), windings, Grid(plan["origin"], plan["spacing"], plan["shape"]), plan
+    return FaceTree.of(features), Windings(plan["closing"]), Grid(plan["origin"], plan["spacing"], plan["shape"]), plan
 
 
 def solve_into(folder: str, key: str, number: int) -> int:

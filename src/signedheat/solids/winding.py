@@ -27,28 +27,20 @@ AT_ONCE = 256
 
 @dataclass(frozen=True, eq=False)
 class Windings(Frozen):
-    """Oriented triangles, those of each set counted with a weight.
+    """Winding numbers of oriented triangles that together close.
 
     Attributes
     ----------
-    sets : tuple of (m, 3, 3) float
+    triangles : (m, 3, 3) float
         Corners.
-    weights : tuple of float
-        1 for what closes; more for fragments, since some of their faces are missing.
     """
 
-    sets: tuple[NDArray[np.float64], ...]
-    weights: tuple[float, ...]
-
-    @property
-    def closed(self) -> bool:
-        """Whether the sides change across triangles only: fragments have gaps across which they do, too."""
-        return all(weight == 1.0 for weight in self.weights)
+    triangles: NDArray[np.float64]
 
     @cached_property
-    def trees(self) -> tuple[WindingTree, ...]:
-        """One for each set."""
-        return tuple(WindingTree.of(triangles) for triangles in self.sets if len(triangles))
+    def tree(self) -> WindingTree:
+        """Over the triangles, of which there is at least one."""
+        return WindingTree.of(self.triangles)
 
     @cached_property
     def whole_beyond(self) -> float:
@@ -58,13 +50,10 @@ class Windings(Frozen):
         the face beside it, slits as wide as rounding are left; winding numbers are whole but inside of thin tubes
         around them, since they are harmonic and so nowhere farther off than on these. Infinity where gaps are wider.
         """
-        if not self.closed:
-            return np.inf
-        triangles = np.concatenate(self.sets)
-        if not len(triangles):
+        if not len(self.triangles):
             return 0.0
-        ends = _open_edges(triangles)
-        radius = TUBE * float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+        ends = _open_edges(self.triangles)
+        radius = TUBE * float(np.ptp(self.triangles.reshape(-1, 3), axis=0).max())
         for begin in range(0, len(ends), AT_ONCE):
             numbers = self.numbers(_around(ends[begin : begin + AT_ONCE], radius))
             if (np.abs(numbers - np.round(numbers)) > WHOLE).any():
@@ -72,12 +61,8 @@ class Windings(Frozen):
         return radius if len(ends) else 0.0
 
     def numbers(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) weighted sum of winding numbers."""
-        total = np.zeros(len(points))
-        weights = (weight for triangles, weight in zip(self.sets, self.weights, strict=True) if len(triangles))
-        for tree, weight in zip(self.trees, weights, strict=True):
-            total += weight * tree.numbers(points)
-        return total
+        """(n,) winding numbers."""
+        return self.tree.numbers(points) if len(self.triangles) else np.zeros(len(points))
 
     def inside(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(n,) whether points are inside."""
