@@ -2,7 +2,7 @@
 ==========================================
 
 A whole application: a set in the form that DeepSDF reads, four of five points near the surface, the rest in the box.
-:func:`signedheat.batch` makes such sets of whole folders of shapes.
+:func:`signedheat.batches.run` makes such sets of whole folders of shapes.
 """
 
 from pathlib import Path

@@ -8,6 +8,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import batches as batches
+    from . import errors as errors
+    from . import torch as torch
     from .public import *  # noqa: F403
     from .public import __all__ as __all__
 

@@ -1,9 +1,6 @@
 """The public names, all of which importing this module imports; `signedheat` does when one is first asked for."""
 
-from . import torch as _torch  # noqa: F401  makes it sh.torch
-from .batches.job import BatchJob, Sampling
-from .batches.manifest import Outcome
-from .batches.run import Batch, batch
+from . import batches, errors, torch  # noqa: F401  sh.batches, sh.errors, sh.torch
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.close import close_curves
 from .curves.orientation import CurveOrientation, curve_orientation
@@ -75,8 +72,6 @@ from .tets.tetrahedralize import tetrahedralize
 from .view import new_figure as _new_figure  # noqa: F401  provides notebooks and windows
 
 __all__ = [
-    "Batch",
-    "BatchJob",
     "Closest",
     "ConstraintError",
     "Convex",
@@ -101,14 +96,12 @@ __all__ = [
     "MemoryLimitError",
     "MissingPackageError",
     "Orientation",
-    "Outcome",
     "OutsideError",
     "PiecewiseField",
     "PointCloud",
     "PolygonMesh",
     "Polyline",
     "Samples",
-    "Sampling",
     "SignedHeatError",
     "SignedHeatSolver",
     "Soft",
@@ -123,7 +116,6 @@ __all__ = [
     "VertexField",
     "ZeroSet",
     "as_shape",
-    "batch",
     "close_curves",
     "closing",
     "common_subdivision",

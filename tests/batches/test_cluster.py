@@ -42,15 +42,15 @@ def test_a_cluster_does_what_processes_do(tmp_path, cluster):
     folder.mkdir()
     for name in ("a", "bug", "killed", "slow", "z"):
         (folder / f"{name}.ply").write_text(f"this is {name}")
-    batch = sh.batch(folder, tmp_path / "out", measure, scheduler=cluster, time_limit=5)
+    batch = sh.batches.run(folder, tmp_path / "out", measure, scheduler=cluster, time_limit=2)
     assert [outcome.state for outcome in batch.outcomes] == ["done", "failed", "died", "timed out", "done"]
     assert (tmp_path / "out" / "z.txt").read_text() == "this is z"
     assert not [path for path in (tmp_path / "out").iterdir() if path.name.startswith(".")]
-    assert sh.batch(folder, tmp_path / "out", measure, scheduler=cluster, time_limit=5).skipped == 2
+    assert sh.batches.run(folder, tmp_path / "out", measure, scheduler=cluster, time_limit=2).skipped == 2
 
 
 def test_without_a_scheduler_the_batch_says_so(tmp_path):
     (tmp_path / "a.ply").write_text("")
     with pytest.raises(sh.SignedHeatError) as caught:
-        sh.batch(tmp_path / "a.ply", tmp_path / "out", measure, scheduler="tcp://127.0.0.1:9")
+        sh.batches.run(tmp_path / "a.ply", tmp_path / "out", measure, scheduler="tcp://127.0.0.1:9")
     assert "dask scheduler" in caught.value.remedy

@@ -1,1 +1,8 @@
-"""Many shapes: jobs, workers on this machine or a cluster, and a manifest of what came of each shape."""
+"""Many shapes: one job for each, in processes of this machine or a cluster, and a manifest of what came of them."""
+
+from .job import Job, Sampling
+from .manifest import Outcome
+from .pool import Batch, run
+from .watertight import Watertight
+
+__all__ = ["Batch", "Job", "Outcome", "Sampling", "Watertight", "run"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -12,7 +13,7 @@ from ..domains.grid import Grid, room_around
 from ..domains.kinds import ShapeLike
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import SignedHeatError
+from ..errors import FileFormatError, SignedHeatError
 from ..extensions.figures import describe, shape_figures, told
 from ..fields.grid_field import GridField
 from ..io.bands import BAND_FORMATS
@@ -23,6 +24,7 @@ from ..orientation.orient import orient
 from ..solids.distance import distance_to_shapes
 from ..solids.sampling import WIDTHS, Layout, sample
 from ..solver import SignedHeatSolver, as_list
+from .inputs import Input
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,8 @@ class Sampling:
 
 
 @dataclass(frozen=True)
-class BatchJob:
-    """What `batch` makes of each shape: any of a field, offsets, samples and a report, of one distance.
+class Job:
+    """What `run` makes of each shape: any of a field, offsets, samples and a report, of one distance.
 
     Attributes
     ----------
@@ -98,46 +100,44 @@ class BatchJob:
     plain: bool = False
 
     def __post_init__(self) -> None:
+        reach = max(map(abs, self.offsets), default=0.0)
+        cause = remedy = ""
         if not (self._measures or self.info):
-            raise SignedHeatError(
-                "there is nothing to make of the shapes", remedy="ask for a volume, offsets, samples or info"
-            )
-        if self.plain and self.samples is not None:
-            raise SignedHeatError(
-                "samples have distances to the shape itself, which a plain field does not know",
-                remedy="leave out plain",
-            )
-
-        if self.band is not None:
-            self._check_band(self.band)
-
-    def _check_band(self, band: float) -> None:
-        if self.plain:
-            raise SignedHeatError("a band is measured to the shape itself", remedy="leave out plain")
-        if self.volume not in (None, *sorted(BAND_FORMATS)):
-            raise SignedHeatError(
-                f"a band cannot be written as {self.volume}", remedy=f"use {' or '.join(sorted(BAND_FORMATS))}"
-            )
-        reach = max((abs(distance) for distance in self.offsets), default=0.0)
-        if reach > band:
-            raise SignedHeatError(
-                f"the band reaches to {band:g}, and the offsets to {reach:g}", remedy=f"use a band of {reach:g}"
-            )
+            cause, remedy = "there is nothing to make of the shapes", "ask for a volume, offsets, samples or info"
+        elif self.plain and (self.samples is not None or self.band is not None):
+            what = "samples have" if self.samples is not None else "a band has"
+            cause, remedy = f"{what} distances to the shape itself, and a plain field has others", "leave out plain"
+        elif self.band is not None and self.volume not in (None, *BAND_FORMATS):
+            cause, remedy = f"a band cannot be written as {self.volume}", f"use {' or '.join(sorted(BAND_FORMATS))}"
+        elif self.band is not None and reach > self.band:
+            cause = f"the band reaches to {self.band:g}, and the offsets to {reach:g}"
+            remedy = f"use a band of {reach:g}"
+        if cause:
+            raise SignedHeatError(cause, remedy=remedy)
 
     @property
     def _measures(self) -> bool:
         return self.volume is not None or bool(self.offsets) or self.samples is not None
 
     @property
-    def endings(self) -> tuple[str, ...]:
-        """How the names of its results end, after that of the shape."""
-        volume = () if self.volume is None else (self.volume,)
-        surfaces = (f"_{name}{self.surfaces}" for name in told_apart(self.offsets))
-        return (*volume, *surfaces, *(() if self.samples is None else (self._of_samples,)))
-
-    @property
     def _of_samples(self) -> str:
         return "_samples.npz" if self.volume == ".npz" else ".npz"
+
+    def refuse_shared_names(self, shapes: Iterable[Input]) -> None:
+        """Raise `FileFormatError` if results of two shapes would have one name: one would replace the other."""
+        endings = [f"_{name}{self.surfaces}" for name in told_apart(self.offsets)]
+        endings += [] if self.volume is None else [self.volume]
+        endings += [] if self.samples is None else [self._of_samples]
+        owners: dict[str, Input] = {}
+        for each in shapes:
+            for ending in endings:
+                other = owners.setdefault(f"{each.name}{ending}".lower(), each)
+                if other is not each:
+                    raise FileFormatError(
+                        f"a result of {other.path.name} would have the name of one of this shape, {each.name}{ending}",
+                        remedy="rename one of the two",
+                        path=each.path,
+                    )
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Make it of one shape: files that begin with `stem`. Returns figures, with what to know under "told"."""
@@ -148,24 +148,10 @@ class BatchJob:
         if isinstance(shape, DigitalSurface):
             shape = shape.squares
         bounds = bounds_around(as_list(shape))
-        reach = max((abs(distance) for distance in self.offsets), default=0.0)
-        padding = room_around(bounds, reach) if self.padding is None else self.padding
-        grid = Grid.around(bounds, self.resolution, padding, self.spacing)
-        phi = self._distance(shape, grid)
-        return {**figures, "told": told(phi), "field": describe(phi), **self._written(phi, stem)}
-
-    def _distance(self, shape: ShapeLike, grid: Grid) -> GridField:
-        if self.plain:
-            if isinstance(shape, TriangleMesh | PolygonMesh) and not self.as_oriented:
-                shape = orient(shape)
-            return SignedHeatSolver(grid, self.diffusion).distance(shape, self.constraint)
-        options: dict[str, Any] = {"as_oriented": self.as_oriented, "keep_overlaps": self.keep_overlaps}
-        options |= {"constraint": self.constraint, "diffusion": self.diffusion}
-        return cast("GridField", distance_to_shapes(shape, grid, band=self.band, **options))
-
-    def _written(self, phi: GridField, stem: Path) -> dict[str, object]:
-        """Write what is wanted of a field, and tell its figures."""
-        figures: dict[str, object] = {}
+        padding = room_around(bounds, max(map(abs, self.offsets), default=0.0))
+        padding = padding if self.padding is None else self.padding
+        phi = self._distance(shape, Grid.around(bounds, self.resolution, padding, self.spacing))
+        figures |= {"told": told(phi), "field": describe(phi)}
         if self.volume is not None:
             phi.save(f"{stem}{self.volume}")
         surfaces = []
@@ -181,3 +167,12 @@ class BatchJob:
             (taken.normalized() if wanted.normalize else taken).save(f"{stem}{self._of_samples}", wanted.layout)
             figures["samples"] = taken.figures
         return figures
+
+    def _distance(self, shape: ShapeLike, grid: Grid) -> GridField:
+        if self.plain:
+            if isinstance(shape, TriangleMesh | PolygonMesh) and not self.as_oriented:
+                shape = orient(shape)
+            return SignedHeatSolver(grid, self.diffusion).distance(shape, self.constraint)
+        options: dict[str, Any] = {"as_oriented": self.as_oriented, "keep_overlaps": self.keep_overlaps}
+        options |= {"constraint": self.constraint, "diffusion": self.diffusion}
+        return cast("GridField", distance_to_shapes(shape, grid, band=self.band, **options))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
@@ -12,8 +11,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..io.files import contents, replacing, writing
-
-NAME = "manifest.jsonl"
 
 State = Literal["done", "failed", "timed out", "died"]
 """done: everything was written; failed: with an error; timed out: stopped at the time limit; died: its process did."""
@@ -38,7 +35,7 @@ class Outcome:
     outputs : tuple of str
         Files, in the folder of the batch.
     figures : mapping
-        Figures of quality, as ``--json`` tells them.
+        Figures of quality, as ``--json`` prints them.
     job : str
         What was to be made of it, and by which version of this package.
     source : tuple of int
@@ -65,17 +62,15 @@ class Manifest:
     """The manifest in a folder, as it was left, and open for what follows."""
 
     def __init__(self, folder: Path) -> None:
-        self.path = folder / NAME
+        self.path = folder / "manifest.jsonl"
         self.known = _read(self.path)
 
     def still_holds(self, name: str, path: Path, job: str) -> Outcome | None:
         """The outcome of a shape that is done: the same file, the same job, and all its results still there."""
         outcome = self.known.get(name)
-        if outcome is None or not outcome.is_done or outcome.job != job_text(job):
+        if outcome is None or not outcome.is_done or outcome.job != job or outcome.source != source_of(path):
             return None
-        same = outcome.source == source_of(path)
-        present = all((self.path.parent / output).is_file() for output in outcome.outputs)
-        return outcome if same and present else None
+        return outcome if all((self.path.parent / output).is_file() for output in outcome.outputs) else None
 
     def add(self, outcome: Outcome) -> None:
         """Append a line, at once: whatever happens next, it stays."""
@@ -87,13 +82,7 @@ class Manifest:
     def write(self, outcomes: Iterable[Outcome]) -> None:
         """Replace all lines."""
         with replacing(self.path) as temporary:
-            temporary.write_text("".join(_line(outcome) for outcome in outcomes), encoding="utf-8")
-
-
-def job_text(job: str) -> str:
-    """A job with the version that does it."""
-    package = __name__.partition(".")[0]
-    return f"{job} by {package} {sys.modules[package].__version__}"
+            temporary.write_text("".join(map(_line, outcomes)), encoding="utf-8")
 
 
 def source_of(path: Path) -> tuple[int, int]:
@@ -105,13 +94,13 @@ def source_of(path: Path) -> tuple[int, int]:
 
 
 def _line(outcome: Outcome) -> str:
-    """One line for whoever reads it; names of files may hold bytes that are no text, and separators of lines."""
+    """One line that people can read; names of files may hold bytes that are no text, and separators of lines."""
     line = json.dumps(asdict(outcome), ensure_ascii=False)
     return (line if line.isprintable() else json.dumps(asdict(outcome))) + "\n"
 
 
 def _read(path: Path) -> dict[str, Outcome]:
-    """Outcomes by name, the last of each; a line that was cut off by the end of a run is left out.
+    """Outcomes by name, the last of each; lines that are damaged or cut off are left out.
 
     Raises
     ------
@@ -130,8 +119,7 @@ def _read(path: Path) -> dict[str, Outcome]:
 
 def _outcome(entries: dict[str, Any]) -> Outcome:
     """An outcome as it was written; ValueError, TypeError or KeyError if these are other things."""
-    entries["outputs"], entries["source"] = tuple(entries["outputs"]), tuple(entries["source"])
-    outcome = Outcome(**entries)
+    outcome = Outcome(**{**entries, "outputs": tuple(entries["outputs"]), "source": tuple(entries["source"])})
     texts = (outcome.name, outcome.input, outcome.state, outcome.message, outcome.job, *outcome.outputs)
     if not all(isinstance(text, str) and "\0" not in text for text in texts):
         raise TypeError("these are no outcomes")

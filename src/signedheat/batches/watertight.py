@@ -28,7 +28,7 @@ PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5],
 
 @dataclass(frozen=True)
 class Watertight:
-    """A closed mesh of each shape, for `batch`.
+    """A closed mesh of each shape, for `run`.
 
     The faces that were given are kept where they bound the solid and join with its completion all around; otherwise the
     surface is contoured, with its edges and corners.

@@ -8,7 +8,7 @@ from typing import Any
 
 import signedheat as sh
 
-from ..errors import SourceError
+from ..errors import SignedHeatError, SourceError
 from .options import (
     MOST_WORKERS,
     Summary,
@@ -21,7 +21,7 @@ from .options import (
     positive,
     whole_number,
 )
-from .parts import batches, computing
+from .parts import computing, pool
 from .progress import ProgressBar
 from .streams import say
 
@@ -81,36 +81,28 @@ def add_to(commands: Any) -> None:
 def check(arguments: Namespace) -> None:
     """Reject what asks for nothing, and options that contradict each other."""
     error = arguments.parser.error
-    if not (arguments.volume or arguments.offset or arguments.sample or arguments.info):
-        error("say what is to be made: --volume, --offset D, --sample or --info")
-    if arguments.plain and arguments.sample:
-        error("--plain does not go with --sample, whose distances are those to the shape itself")
     if arguments.spacing is not None and len(arguments.spacing) not in (1, 3):
         error(f"argument --spacing: one number or 3, not {len(arguments.spacing)}")
     if arguments.spacing is not None and arguments.resolution is not None:
         error("--resolution does not go with --spacing: give one of them")
-    if arguments.band is not None:
-        if arguments.plain:
-            error("--band does not go with --plain")
-        if arguments.volume not in (None, "npz", "vdb", "vti"):
-            error("a band is written as .npz, .vdb or .vti")
-        reach = max((abs(distance) for distance in arguments.offset), default=0.0)
-        if reach > arguments.band:
-            error(f"the band reaches to {arguments.band:g}, and the distances to {reach:g}")
     if arguments.scheduler is not None and arguments.workers is not None:
         error("--workers does not go with --scheduler, which has workers of its own")
+    try:
+        job_of(arguments)
+    except SignedHeatError as problem:
+        error(str(problem))
 
 
 def run(arguments: Namespace) -> Summary:
     """Do the job for every shape; a line on standard error for each that is not done."""
     with ProgressBar(arguments.quiet or arguments.json) as progress:
 
-        def report(outcome: sh.Outcome) -> None:
+        def report(outcome: sh.batches.Outcome) -> None:
             if not outcome.is_done:
                 progress.clear()
                 say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
 
-        done = sh.batch(
+        done = sh.batches.run(
             listed(arguments.inputs),
             arguments.output,
             job_of(arguments),
@@ -135,7 +127,7 @@ def run(arguments: Namespace) -> Summary:
     }
     told = ", ".join(f"{number} {state}" for state, number in counts.items())
     before = f" ({done.skipped} of them before)" if done.skipped else ""
-    return summary, f"{done.manifest}: {len(states)} shapes, {told}{before}, {batches.run.duration(seconds)} of work"
+    return summary, f"{done.manifest}: {len(states)} shapes, {told}{before}, {pool.duration(seconds)} of work"
 
 
 def listed(inputs: list[str]) -> list[str]:
@@ -155,11 +147,11 @@ def listed(inputs: list[str]) -> list[str]:
     return [*inputs[:at], *lines, *(each for each in inputs[at + 1 :] if each != "-")]
 
 
-def job_of(arguments: Namespace) -> sh.BatchJob:
+def job_of(arguments: Namespace) -> sh.batches.Job:
     """The job that the options ask for."""
     sampling = None
     if arguments.sample is not None:
-        sampling = sh.Sampling(
+        sampling = sh.batches.Sampling(
             n=arguments.sample,
             near=arguments.near,
             widths=tuple(arguments.widths),
@@ -168,7 +160,7 @@ def job_of(arguments: Namespace) -> sh.BatchJob:
             layout=arguments.layout,
         )
     spacing = None if arguments.spacing is None else tuple(arguments.spacing)
-    return sh.BatchJob(
+    return sh.batches.Job(
         volume=f".{arguments.volume}" if arguments.volume else None,
         offsets=tuple(arguments.offset),
         surfaces=f".{arguments.surface}",

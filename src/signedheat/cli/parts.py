@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 from ..packages import lazy_module
 
 if TYPE_CHECKING:
-    from .. import batches as batches
     from .. import compiled as compiled
     from .. import io as io
     from .. import parallel as parallel
     from .. import samples as samples
     from .. import view as view
+    from ..batches import pool as pool
     from ..batches import watertight as watertight
     from ..curves import close as close
     from ..domains import inspection as inspection
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from . import tets as tets
 else:
     PARTS = (
-        *("batches", "batches.watertight", "compiled", "curves.close", "domains.inspection", "io"),
+        *("batches.pool", "batches.watertight", "compiled", "curves.close", "domains.inspection", "io"),
         *("parallel", "samples", "view", "cli.computing", "cli.curves", "cli.images", "cli.kernel_runs"),
         *("cli.placing", "cli.reports", "cli.surfaces", "cli.tets"),
     )

@@ -51,14 +51,14 @@ def run(arguments: Namespace) -> Summary:
     """Do it for every shape; a line for each."""
     with ProgressBar(arguments.quiet or arguments.json) as progress:
 
-        def report(outcome: sh.Outcome) -> None:
+        def report(outcome: sh.batches.Outcome) -> None:
             progress.clear()
             if not outcome.is_done:
                 say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
             elif not (arguments.quiet or arguments.json):
                 tell(f"{outcome.outputs[0]}: {watertight.in_words(dict(outcome.figures))}")
 
-        done = sh.batch(
+        done = sh.batches.run(
             arguments.inputs,
             arguments.output,
             watertight.Watertight(

@@ -8,11 +8,11 @@ import queue
 import shutil
 import threading
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import ExitStack, closing, contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, is_dataclass
-from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 from ..compiled import MOST_THREADS
@@ -21,20 +21,15 @@ from ..errors import FileFormatError, SignedHeatError
 from ..packages import require
 from ..parallel import connected, n_threads
 from ..progress import Progress, logger
-from .inputs import Input, expand, named_path
-from .job import BatchJob
-from .manifest import Manifest, Outcome, job_text
-from .worker import Done, Job, Task, Worker, apart
+from .inputs import expand, named_path
+from .job import Job
+from .manifest import Manifest, Outcome
+from .worker import Done, Function, Task, Worker, do_apart
 
 try:
     import fcntl
-except ImportError:  # where folders cannot be held, two batches at once are not told
+except ImportError:  # where folders cannot be locked, two batches at once are not noticed
     fcntl = None  # type: ignore[assignment]
-
-SCRATCH = ".unfinished"
-"""The folder in that of the results in which they are made."""
-HEARING = 0.5
-"""Seconds after which a wait is interrupted, so that a signal is heard everywhere."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +60,10 @@ class Batch:
         return f"Batch({done} of {len(self.outcomes)} shapes done, {self.skipped} of them before)"
 
 
-def batch(
+def run(
     inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     folder: str | os.PathLike[str],
-    job: Job,
+    job: Function,
     *,
     workers: int | None = None,
     threads: int = 1,
@@ -91,7 +86,7 @@ def batch(
     folder : path
         Where results go, under the names of the inputs; and ``manifest.jsonl``, a line of JSON for each shape: its
         state, seconds, message, and figures of quality.
-    job : BatchJob, or callable
+    job : Job, Watertight, or callable
         What to make of each shape: ``job(path, stem)`` writes files whose names begin with `stem`, and returns a
         dictionary of figures. It must be importable by the workers.
     workers : int, optional
@@ -125,61 +120,60 @@ def batch(
     Examples
     --------
     >>> import tempfile
-    >>> from signedheat import BatchJob, samples
+    >>> from signedheat import batches, samples
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     for k in range(3):
     ...         samples.sphere(2, radius=k + 1).save(f"{folder}/ball{k}.ply")
-    ...     batch(folder, f"{folder}/out", BatchJob(volume=".npz", resolution=16), workers=1)
+    ...     batches.run(folder, f"{folder}/out", batches.Job(volume=".npz", resolution=16), workers=1)
     Batch(3 of 3 shapes done, 0 of them before)
     """
     if scheduler is not None:
         require("distributed", "clusters")
     _refuse_odd(workers, threads, time_limit)
     target = named_path(folder)
-    _refuse_file(target)
+    if os.path.lexists(target) and not target.is_dir():
+        raise FileFormatError("this is no folder", remedy="choose another one", path=target)
     every = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
-    if isinstance(job, BatchJob):
-        _refuse_shared(every, job)
-    named = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
+    if isinstance(job, Job):
+        job.refuse_shared_names(every)
+    described = _described(job)
     with ExitStack() as stack:
-        scratch = stack.enter_context(_held(target))
+        scratch = stack.enter_context(_locked(target))
         manifest = Manifest(target)
-        found = {each.name: manifest.still_holds(each.name, each.path, named) for each in every}
-        kept = {name: outcome for name, outcome in found.items() if outcome is not None}
-        manifest.write(kept.values())
-        todo = [each for each in every if each.name not in kept]
-        tasks = [Task(job, job_text(named), each, target.absolute(), scratch / str(k)) for k, each in enumerate(todo)]
+        found = {each.name: manifest.still_holds(each.name, each.path, described) for each in every}
+        known = {name: outcome for name, outcome in found.items() if outcome is not None}
+        skipped = len(known)
+        manifest.write(known.values())
+        todo = [each for each in every if each.name not in known]
+        tasks = [Task(job, described, each, target.absolute(), scratch / str(k)) for k, each in enumerate(todo)]
         if scheduler is not None:
             outcomes = _on_cluster(tasks, scheduler, threads, time_limit)
         else:
             outcomes = _in_processes(tasks, workers or n_threads(), threads, time_limit)
         stack.enter_context(closing(outcomes))
         begin, failed = time.perf_counter(), 0
-        _tell(progress, len(kept), len(every))
+        if progress is not None:
+            progress(skipped / len(every), f"{skipped} of {len(every)} shapes")
         for now, outcome in enumerate(outcomes, 1):
-            kept[outcome.name] = outcome
+            known[outcome.name] = outcome
             manifest.add(outcome)
             logger.info("%s: %s (%.1f s) %s", outcome.name, outcome.state, outcome.seconds, outcome.message)
             if report is not None:
                 report(outcome)
             failed += not outcome.is_done
-            _tell(progress, len(kept), len(every), failed, (time.perf_counter() - begin) / now)
-        manifest.write(kept[each.name] for each in every)
-    return Batch(tuple(kept[each.name] for each in every), manifest.path, len(every) - len(todo))
+            if progress is not None:
+                text = f"{len(known)} of {len(every)} shapes" + (f", {failed} not done" if failed else "")
+                left = (time.perf_counter() - begin) / now * (len(todo) - now)
+                progress(len(known) / len(every), text + (f", about {duration(left)} left" if now < len(todo) else ""))
+        manifest.write(known[each.name] for each in every)
+    return Batch(tuple(known[each.name] for each in every), manifest.path, skipped)
 
 
-def _refuse_shared(every: Sequence[Input], job: BatchJob) -> None:
-    """Refuse shapes of which one has a result by the name of one of another's: one would replace the other."""
-    owners: dict[str, Input] = {}
-    for each in every:
-        for ending in job.endings:
-            other = owners.setdefault(f"{each.name}{ending}".lower(), each)
-            if other is not each:
-                raise FileFormatError(
-                    f"a result of {other.path.name} would have the name of one of this shape, {each.name}{ending}",
-                    remedy="rename one of the two",
-                    path=each.path,
-                )
+def _described(job: Function) -> str:
+    """What a job is, and the version that does it: shapes that were done by another are done again."""
+    text = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
+    package = __name__.partition(".")[0]
+    return f"{text} by {package} {import_module(package).__version__}"
 
 
 def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
@@ -192,18 +186,12 @@ def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
         raise SignedHeatError(cause, remedy="leave it out", element="time limit")
 
 
-def _refuse_file(folder: Path) -> None:
-    """Raise `FileFormatError` if there is something else of that name."""
-    if os.path.lexists(folder) and not folder.is_dir():
-        raise FileFormatError("this is no folder", remedy="choose another one", path=folder)
-
-
 @contextmanager
-def _held(folder: Path) -> Iterator[Path]:
+def _locked(folder: Path) -> Iterator[Path]:
     """Make a folder, and keep other batches out: each would leave the lines of the other out of the manifest.
 
-    Gives a place in it for what is not finished, without what a batch has left there that was killed. The system lets
-    go of the folder when the process ends, however it does.
+    Gives a place in it for what is not finished, without what a batch has left there that was killed. The system
+    releases the lock when the process ends, however it does.
 
     Raises
     ------
@@ -217,7 +205,7 @@ def _held(folder: Path) -> Iterator[Path]:
     except OSError as error:
         cause = f"the folder cannot be made ({error.strerror})"
         raise FileFormatError(cause, remedy="choose another one", path=folder) from error
-    scratch = folder.absolute() / SCRATCH
+    scratch = folder.absolute() / ".unfinished"
     with ExitStack() as stack:
         if fcntl is not None:
             number = os.open(folder, os.O_RDONLY)
@@ -225,7 +213,7 @@ def _held(folder: Path) -> Iterator[Path]:
             try:
                 fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
-                if error.errno in (errno.EWOULDBLOCK, errno.EACCES):  # and not that this file system holds nothing
+                if error.errno in (errno.EWOULDBLOCK, errno.EACCES):  # and not a file system without locks
                     cause, remedy = "another batch is writing into this folder", "wait for it, or choose another folder"
                     raise SignedHeatError(cause, remedy=remedy, path=folder) from error
         shutil.rmtree(scratch, ignore_errors=True)
@@ -234,11 +222,11 @@ def _held(folder: Path) -> Iterator[Path]:
 
 
 def _in_processes(
-    tasks: Sequence[Task], number: int, threads: int, time_limit: float | None
+    tasks: list[Task], number: int, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
     """Outcomes as they come; of those that were short of memory once more, alone, at the end."""
     starved = []
-    workers = [Worker(threads) for _ in range(min(number, len(tasks)))]
+    workers = [Worker(threads) for _ in range(max(1, min(number, len(tasks))))]
     idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
     for worker in workers:
         idle.put(worker)
@@ -250,12 +238,13 @@ def _in_processes(
         finally:
             idle.put(worker)
 
-    pool = ThreadPoolExecutor(max(len(workers), 1))
+    pool = ThreadPoolExecutor(len(workers))
     try:
-        for task, future in _as_done(pool, do, tasks):
-            outcome, is_starved = future.result()
+        jobs = {pool.submit(do, task): task for task in tasks}
+        for job in as_completed(jobs):
+            outcome, is_starved = job.result()
             if is_starved and len(workers) > 1:
-                starved.append(task)
+                starved.append(jobs[job])
             else:
                 yield outcome
         for worker in workers[1:]:
@@ -270,46 +259,23 @@ def _in_processes(
 
 
 def _on_cluster(
-    tasks: Sequence[Task], address: str, threads: int, time_limit: float | None
+    tasks: list[Task], address: str, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
     """Outcomes as they come from a Dask cluster, each task in a process beside the Dask worker that got it."""
     with connected(address) as client:
-        do = partial(apart, threads=threads, time_limit=time_limit)
-        for task, future in _as_done(client.get_executor(pure=False), do, tasks):
+        pool = client.get_executor(pure=False)
+        jobs = {pool.submit(do_apart, task, threads, time_limit): task for task in tasks}
+        for job in as_completed(jobs):
             try:
-                yield future.result()[0]
+                yield job.result()[0]
             except SignedHeatError:
                 raise
             except Exception as error:
-                yield task.outcome("died", 0.0, f"its Dask worker died ({error})")
-
-
-def _as_done(
-    executor: Executor, do: Callable[[Task], Done], tasks: Sequence[Task]
-) -> Iterator[tuple[Task, Future[Done]]]:
-    """Tasks with what came of them, as it comes."""
-    ready: queue.SimpleQueue[Future[Done]] = queue.SimpleQueue()
-    submitted = {executor.submit(do, task): task for task in tasks}
-    for future in submitted:
-        future.add_done_callback(ready.put)
-    while submitted:
-        with suppress(queue.Empty):
-            future = ready.get(timeout=HEARING)
-            yield submitted.pop(future), future
-
-
-def _tell(progress: Progress | None, done: int, total: int, failed: int = 0, each: float = 0.0) -> None:
-    """How many shapes are done, how many are not, and how long the others will take if each takes so many seconds."""
-    if progress is None:
-        return
-    text = f"{done} of {total} shapes"
-    text += f", {failed} not done" if failed else ""
-    text += f", about {duration(each * (total - done))} left" if each and done < total else ""
-    progress(done / max(total, 1), text)
+                yield jobs[job].outcome("died", 0.0, f"its Dask worker died ({error})")
 
 
 def duration(seconds: float) -> str:
-    """A time that is about to pass, in words.
+    """Seconds in words.
 
     Examples
     --------
