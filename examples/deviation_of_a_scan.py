@@ -17,7 +17,7 @@ EXPECTED = (-0.086, 0.003)
 
 
 def main(folder: Path) -> float:
-    """Write a picture, a page and a coloured mesh; return how deep the dent is."""
+    """Write pictures and a coloured mesh; return how deep the dent is."""
     part = samples.torus(0.8, 0.3)
     nominal = samples.with_flipped_faces(samples.without_faces(part, 0.1), 0.2)
 
@@ -27,7 +27,7 @@ def main(folder: Path) -> float:
     scan = samples.without_patches(printed, 4, 0.15)
 
     found = sh.deviation(scan, nominal)
-    found.save(folder / "deviation.html")
+    found.save(folder / "histogram.png")
     found.save(folder / "deviation.ply")
     view.save_row(
         folder / "deviation_of_a_scan.png",

@@ -20,11 +20,13 @@ def add_to(commands: Any) -> None:
         run,
         help="how far a scan is off a nominal part",
         description="Signed distances of a scan's points to a nominal part, positive outside of it: percentiles; the "
-        "scan in colours, a page with the histogram, or a table. Both must be in one place: nothing is aligned.",
+        "scan in colours, a picture with the histogram, or a table. Both must be in one place: nothing is aligned.",
     )
     parser.add_argument("scan", metavar="SCAN", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd")
     parser.add_argument("nominal", metavar="NOMINAL", help="the part as it should be, broken or not")
-    parser.add_argument("-o", "--output", metavar="OUT", help="coloured .ply, page .html, or table .csv")
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", help="coloured .ply, picture .png .pdf .svg .jpg, or table .csv"
+    )
     parser.add_argument("--tolerance", type=positive, metavar="T", help="say which share of the points is within it")
 
 

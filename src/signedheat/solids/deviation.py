@@ -29,7 +29,7 @@ BINS = 40
 """Of histograms."""
 
 save_deviation: Slot[[object, str | PathLike[str]], None] = Slot("save_deviation")
-"""Write deviations as a coloured shape, a page or a table."""
+"""Write deviations as a coloured shape, a picture or a table."""
 Progress = Callable[[float, str], None]
 
 
@@ -96,10 +96,10 @@ class Deviation(Frozen):
         }
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file: ``.ply`` has the scan in colours, blue below the part and orange above; ``.html`` is a page.
+        """Write to a file: ``.ply`` has the scan in colours, blue below the part and orange above.
 
-        A page has a picture, the histogram and percentiles. A ``.csv`` has a line for each point: position, deviation,
-        the nearest place.
+        A picture (``.png``, ``.pdf``, ``.svg`` or ``.jpg``) has the scan in colours and the histogram. A ``.csv`` has a
+        line for each point: position, deviation, the nearest place.
 
         Raises
         ------
