@@ -66,6 +66,15 @@ def test_on_coarse_grids_around_many_faces():
     assert_exact(solid.field(spacing=0.15, padding=0.4), solid)
 
 
+def test_gaps_beside_what_was_given_do_not_leak():
+    """Between faces and the zero set of φ they are wider than these steps."""
+    solid = complete(samples.without_faces(samples.sphere(3), 0.75, seed=1), completion="heat")
+    rim = solid.faces.vertices[0]
+    field = solid.field(grid=sh.Grid(1.02 * rim - 0.12, 0.005, (48, 48, 48)))
+    assert_exact(field, solid)
+    assert 0.2 < (field.values < 0).mean() < 0.8
+
+
 def test_places_between_nodes_are_exact_too(solid):
     field = solid.field(resolution=24)
     points = np.random.default_rng(0).uniform(solid.bounds[0] - 0.5, solid.bounds[1] + 0.5, (300, 3))

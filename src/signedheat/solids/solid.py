@@ -301,7 +301,7 @@ class Solid(Frozen, ShortRepr):
         No triangle is between a point and the nearest place. So where sides change across triangles only it is inside
         where it is on that side of this place, which the normal there tells. Elsewhere winding numbers are counted.
         """
-        beyond = self.windings.whole_beyond
+        beyond = self.windings.sided_beyond
         if np.isinf(beyond):
             return self.windings.inside(points)
         clear = found.regular & self.bounding[self.features.ids[found.faces]] & (np.abs(found.cosines) > SLANT)

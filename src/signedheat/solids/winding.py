@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..frozen import Frozen
@@ -17,12 +18,13 @@ INSIDE = 0.5
 """Winding number above which a point is inside; it is near 0 or 1 but beside slits."""
 DEPTH = 1e-6
 """Size of a face by which places in front of it and behind it are off it."""
-TUBE = 1e-4
-"""Radius of the tubes around open edges in which winding numbers are looked at, over the size of all triangles."""
-WHOLE = 0.1
-"""What winding numbers may be off whole ones there: twice what the tree is off by at most."""
+TUBES = 1e-4 * 2.0 ** np.arange(11)
+"""Radii of the tubes around open edges on which winding numbers are looked at, over the size of all triangles. Where a
+lid has more vertices than the face beside it the first is enough; beside seams of what φ completes one of .003 to .02."""
+SIDED = 0.4
+"""What winding numbers may be off whole ones there: a half, less what the tree is off by at most, twice."""
 AT_ONCE = 256
-"""Open edges that are looked at together: where some gap is wide, the first of them tell."""
+"""Open edges that are looked at together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,22 +45,35 @@ class Windings(Frozen):
         return WindingTree.of(self.triangles)
 
     @cached_property
-    def whole_beyond(self) -> float:
-        """Distance to all triangles from which on the winding number is whole, so that sides change across them only.
+    def sided_beyond(self) -> float:
+        """Distance to all triangles from which on sides change across them only.
 
-        It is 0 where each edge is run along as often in both directions. Where a lid has more vertices on an edge than
-        the face beside it, slits as wide as rounding are left; winding numbers are whole but inside of thin tubes
-        around them, since they are harmonic and so nowhere farther off than on these. Infinity where gaps are wider.
+        It is 0 where each edge is run along as often in both directions. Elsewhere gaps are left: slits as wide as
+        rounding where a lid has more vertices on an edge than the face beside it, wider ones where φ completes. Since
+        winding numbers are harmonic, they are nowhere farther off whole ones than on tubes around the open edges: the
+        least that are wide enough are the answer; infinity if none is.
         """
         if not len(self.triangles):
             return 0.0
         ends = _open_edges(self.triangles)
-        radius = TUBE * float(np.ptp(self.triangles.reshape(-1, 3), axis=0).max())
+        size = float(np.ptp(self.triangles.reshape(-1, 3), axis=0).max())
+        spots = _spots(ends)
+        known = scipy.spatial.cKDTree(spots.reshape(-1, 3)) if len(ends) else None
+        rung = 0
         for begin in range(0, len(ends), AT_ONCE):
-            numbers = self.numbers(_around(ends[begin : begin + AT_ONCE], radius))
-            if (np.abs(numbers - np.round(numbers)) > WHOLE).any():
-                return np.inf
-        return radius if len(ends) else 0.0
+            here = slice(begin, begin + AT_ONCE)
+            while not self._sided(_around(ends[here], spots[here], size * TUBES[rung]), known, size * TUBES[rung]):
+                rung += 1
+                if rung == len(TUBES):
+                    return np.inf
+        return size * float(TUBES[rung]) if len(ends) else 0.0
+
+    def _sided(self, points: NDArray[np.float64], spots: scipy.spatial.cKDTree, radius: float) -> bool:
+        """Whether points that are not within a radius of any spot are clearly inside or clearly outside."""
+        within = 0.999 * radius
+        off = spots.query(points, distance_upper_bound=within)[0] > within
+        numbers = self.numbers(points[off])
+        return bool((np.abs(numbers - np.round(numbers)) < SIDED).all())
 
     def numbers(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) winding numbers."""
@@ -89,14 +104,18 @@ def _open_edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     return ends
 
 
-def _around(ends: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
-    """(k, 3) places around edges, at a distance from them: at both ends and in the middle, on six sides."""
+def _spots(ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3, 3) three places on each edge; not its ends, where it may meet a face at a right angle."""
+    return np.asarray(ends[:, :1] + np.array([0.1, 0.5, 0.9])[:, None] * (ends[:, 1:] - ends[:, :1]))
+
+
+def _around(ends: NDArray[np.float64], spots: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """(k, 3) places at a distance from edges, on six sides of each spot."""
     along = ends[:, 1] - ends[:, 0]
     first = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1)[:, None]
     second = np.cross(along, first)
     second /= np.linalg.norm(second, axis=1)[:, None]
-    angles = 0.3 + np.pi / 3 * np.arange(6)[:, None, None]
-    ring = radius * (np.cos(angles) * first + np.sin(angles) * second)
-    spots = np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]])
-    return np.asarray((spots[:, None] + ring).reshape(-1, 3))
+    angles = 0.3 + np.pi / 3 * np.arange(6)[:, None, None, None]
+    ring = radius * (np.cos(angles) * first[:, None] + np.sin(angles) * second[:, None])
+    return np.asarray((spots + ring).reshape(-1, 3))
