@@ -19,8 +19,8 @@ INSIDE = 0.5
 DEPTH = 1e-6
 """Size of a face by which places in front of it and behind it are off it."""
 TUBES = 1e-4 * 2.0 ** np.arange(11)
-"""Radii of the tubes around open edges on which winding numbers are looked at, over the size of all triangles. Where a
-lid has more vertices than the face beside it the first is enough; beside seams of what φ completes it is .003 to .02."""
+"""Radii of tubes around open edges on which winding numbers are looked at, over the size of all triangles. Where a lid
+has more vertices than the face beside it the first is enough; beside seams of what φ completes, one of .003 to .02."""
 SIDED = 0.4
 """What winding numbers may be off whole ones there: a half, less what the tree is off by at most, twice."""
 AT_ONCE = 256
