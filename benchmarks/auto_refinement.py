@@ -26,7 +26,7 @@ LIMITS = (intrinsic.COARSEST, 1.25, 2.0, np.inf)
 
 
 def tables() -> None:
-    warnings.simplefilter("ignore", sh.InexactWarning)
+    warnings.simplefilter("ignore", sh.errors.InexactWarning)
     table(meshes())
     table(decimated())
 

@@ -71,7 +71,7 @@ def study(
     seeds: int, names: list[str] | None = None, kept: Path | None = None, shown: dict[str, tuple] | None = None
 ) -> dict[tuple[str, str], list[float]]:
     """Errors by damage and way, of all meshes and seeds; what `kept` has is counted too."""
-    warnings.simplefilter("ignore", sh.InexactWarning)
+    warnings.simplefilter("ignore", sh.errors.InexactWarning)
     begin, errors = time.perf_counter(), {}
     if kept and kept.exists():
         errors = {tuple(key.split("|")): found.tolist() for key, found in np.load(kept).items()}

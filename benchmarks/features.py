@@ -38,7 +38,7 @@ def part() -> sh.TriangleMesh:
     block = sh.GridField(grid, np.maximum.reduce([np.abs(x) - 1.2, np.abs(y) - 0.8, np.abs(z + 0.2) - 0.3]))
     boss = sh.GridField(grid, np.maximum(np.hypot(x - 0.4, y) - 0.4, np.abs(z) - 0.6))
     hole = sh.GridField(grid, np.hypot(x + 0.6, y) - 0.3)
-    return sh.smooth_difference(sh.smooth_union(block, boss, 0.2), hole, 0.1).contour()
+    return sh.morphology.smooth_difference(sh.morphology.smooth_union(block, boss, 0.2), hole, 0.1).contour()
 
 
 @cache

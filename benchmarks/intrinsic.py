@@ -152,7 +152,7 @@ def read(folder: Path) -> Iterator[Case]:
             continue
         described = file.with_suffix(".json")
         if described.exists():
-            curves = sh.read_curves(described, mesh)
+            curves = sh.io.read_curves(described, mesh)
             ids = [mesh.faces[c.faces, c.barycentric.argmax(axis=1)] for c in curves]
             yield Case(file.stem, mesh, tuple((i, c.closed) for i, c in zip(ids, curves, strict=True)))
         else:
@@ -280,7 +280,7 @@ if __name__ == "__main__":
     parser.add_argument("--growth", action="store_true", help="measure time and size of ever larger meshes instead")
     parser.add_argument("--picture", type=Path, help="draw the three ways to cut a face, and angles, instead")
     arguments = parser.parse_args()
-    warnings.simplefilter("ignore", sh.UnreachedWarning)  # parts that holes cut off
+    warnings.simplefilter("ignore", sh.errors.UnreachedWarning)  # parts that holes cut off
     if arguments.picture:
         picture(arguments.picture)
     elif arguments.growth:

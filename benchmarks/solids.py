@@ -98,7 +98,7 @@ def surface_outside(program: str, broken: Mesh) -> tuple[np.ndarray, np.ndarray]
     """The surface at `OFFSET`, or nothing where it is refused."""
     try:
         vertices, faces = PROGRAMS[program]["offset surface"](broken, OFFSET)
-    except sh.OutsideError as error:
+    except sh.errors.OutsideError as error:
         print(f"  {program} refuses: {error}", file=sys.stderr)
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     return np.ascontiguousarray(vertices, dtype=float), np.asarray(faces)

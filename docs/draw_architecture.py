@@ -12,12 +12,12 @@ from PIL import Image
 
 FLOORS = [
     (
-        "__main__   cli   view   samples   public   batches   io   torch",
+        "__main__   cli   view   samples   public   results   batches   io   torch",
         "commands, pictures, many shapes, files",
         "#f3d9c1",
     ),
     (
-        "signed_distance solids curves orientation sharpening tets extensions",
+        "signed_distance morphology solids curves orientation sharpening tets extensions",
         "complete a shape, orient curves, measure exactly; jumps, morphology, tets",
         "#f7e6d0",
     ),

@@ -27,13 +27,13 @@ def broken(corners: np.ndarray, gap: float) -> list[sh.Polyline]:
 def main(folder: Path) -> float:
     """Write the outlines and a picture; return the area of the sharp one."""
     sides = broken(LETTER, gap=0.3)
-    sh.write_polylines(folder / "broken.svg", sides)
+    sh.io.write_polylines(folder / "broken.svg", sides)
     figure = view.new_figure(11, 6.5)
     areas, cuts = [], []
     for k, (name, diffusion) in enumerate([("sharp", 1.0), ("round", 30.0)]):
         phi = sh.SignedHeatSolver(sh.Grid.around(sides, 160, padding=0.8), diffusion=diffusion).distance(sides)
         outline = max(phi.contour(0.0), key=lambda line: line.length)
-        sh.write_polylines(folder / f"{name}.svg", outline)
+        sh.io.write_polylines(folder / f"{name}.svg", outline)
 
         areas.append(-outline.signed_area)
         cuts.append(np.linalg.norm(outline.points - LETTER[1], axis=1).min())

@@ -22,7 +22,7 @@ def main(folder: Path) -> float:
     x, y, z = np.moveaxis(grid.points, -1, 0)
     block = sh.GridField(grid, np.maximum.reduce([np.abs(x) - 1.2, np.abs(y) - 0.8, np.abs(z) - 0.5]))
     boss = sh.GridField(grid, np.maximum(np.hypot(x - 0.4, y) - 0.4, np.abs(z) - 0.9))
-    part = sh.smooth_union(block, boss, 0.2).contour()
+    part = sh.morphology.smooth_union(block, boss, 0.2).contour()
 
     angle = np.linspace(0, 2 * np.pi, 241)
     seam = np.stack([0.9 * np.cos(angle), 0.6 * np.sin(angle), 0.5 + 0 * angle], axis=1)
@@ -30,7 +30,7 @@ def main(folder: Path) -> float:
 
     phi = sh.sharpen(sh.SignedHeatSolver(part).distance(strokes, sh.Free()))
     stitches = [curve for level in (-0.2, -0.1, 0.1, 0.2) for curve in phi.contour(level)]
-    sh.write_curves(folder / "stitches.obj", stitches, part)
+    sh.io.write_curves(folder / "stitches.obj", stitches, part)
 
     view.save_row(
         folder / "curve_design.png",

@@ -23,26 +23,26 @@ def main(folder: Path) -> float:
     ball = sh.transform(sh.read(folder / "ball.ply"), 25.4 * np.eye(4)[:3])  # inches to millimetres
     sdf = sh.signed_distance(ball, resolution=36)
     sh.save(sdf.offset(2.54), folder / "grown.stl")
-    sh.write_vdb(sdf, folder / "ball.vdb")
+    sh.io.write_vdb(sdf, folder / "ball.vdb")
     view.save_scene(ball, folder / "ball.png")
 
     image = np.full((60, 80), 255, dtype=np.uint8)
     image[15:45, 30:34] = image[:10, 60:64] = 0
     Image.fromarray(image).save(folder / "walls.png")
     line = sh.Polyline([[5.0, 55.0], [5.0, 5.0]])
-    sh.write_polylines(folder / "line.svg", line)
-    round_walls = sh.signed_distance(sh.read_polylines(folder / "line.svg"), sh.read_mask(folder / "walls.png"))
+    sh.io.write_polylines(folder / "line.svg", line)
+    round_walls = sh.signed_distance(sh.io.read_polylines(folder / "line.svg"), sh.io.read_mask(folder / "walls.png"))
 
     globe = samples.sphere(3)
     (folder / "coast.csv").write_text("longitude,latitude\n-55,-5\n-40,-25\n10,-20\n20,15\n\n10,20\n-30,30\n-60,5\n")
-    coast = sh.read_globe_curves(folder / "coast.csv", globe)
-    sh.write_curves(folder / "whole.txt", sh.close_curves(globe, coast), globe)
-    along = sh.signed_distance(sh.read_curves(folder / "whole.txt", globe), globe)
+    coast = sh.io.read_globe_curves(folder / "coast.csv", globe)
+    sh.io.write_curves(folder / "whole.txt", sh.close_curves(globe, coast), globe)
+    along = sh.signed_distance(sh.io.read_curves(folder / "whole.txt", globe), globe)
 
     labels = np.zeros((40, 40, 40), dtype=np.uint8)
     labels[np.linalg.norm(np.indices(labels.shape) - 20.0, axis=0) < 15] = 3
     np.save(folder / "labels.npy", labels)
-    organ = sh.read_labels(folder / "labels.npy")
+    organ = sh.io.read_labels(folder / "labels.npy")
     view.save_row(
         folder / "files_in_and_out.png",
         ("ball.ply, in millimetres", sdf, {"across": (1,), "levels": [2.54]}),

@@ -21,10 +21,10 @@ def main(folder: Path) -> float:
     duck = samples.without_patches(samples.duck(32), 3, 0.2, seed=2)
     grid = sh.Grid.around(duck.bounds, resolution=60, padding=0.5)
     changed = {
-        "dilated by 0.1": sh.dilate(duck, 0.1, grid),
-        "eroded by 0.1": sh.erode(duck, 0.1, grid),
-        "opened by 0.14": sh.opening(duck, 0.14, grid),
-        "closed by 0.25": sh.closing(duck, 0.25, grid),
+        "dilated by 0.1": sh.morphology.dilate(duck, 0.1, grid),
+        "eroded by 0.1": sh.morphology.erode(duck, 0.1, grid),
+        "opened by 0.14": sh.morphology.opening(duck, 0.14, grid),
+        "closed by 0.25": sh.morphology.closing(duck, 0.25, grid),
     }
     for title, surface in changed.items():
         sh.save(surface, folder / f"{title.split()[0]}.stl")

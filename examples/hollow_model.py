@@ -16,7 +16,7 @@ EXPECTED = (1.0, 0.08)
 def main(folder: Path) -> float:
     """Write the hollow duck and a picture; return its volume over area times thickness."""
     scan = samples.without_patches(samples.duck(40), 5, 0.2, seed=3)
-    wall = sh.shell(scan, -0.1, 0.0, resolution=96)
+    wall = sh.morphology.shell(scan, -0.1, 0.0, resolution=96)
     wall.save(folder / "hollow.stl")
 
     grid = sh.Grid.around(wall.bounds, resolution=80, padding=0.15)
@@ -26,7 +26,7 @@ def main(folder: Path) -> float:
         ("out: distance to the wall", sh.signed_distance(wall, grid), {"across": (1,)}),
         ("out: from outside", wall),
     )
-    middle = sh.dilate(scan, 0.0, resolution=96)
+    middle = sh.morphology.dilate(scan, 0.0, resolution=96)
     area = 0.5 * wall.face_areas.sum()
     return float(wall.to_trimesh().volume / (0.1 * area)) * float(bool(middle.n_faces))
 

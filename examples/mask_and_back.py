@@ -2,7 +2,8 @@
 ================================
 
 A whole application: a segmented organ as voxels; distance at the same nodes, and from it the very same mask, and
-one grown by a millimetre. Files of masks are for :func:`signedheat.read_volume` and :func:`signedheat.read_labels`.
+one grown by a millimetre. Files of masks are for :func:`signedheat.io.read_volume`
+and :func:`signedheat.io.read_labels`.
 """
 
 from pathlib import Path

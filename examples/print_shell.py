@@ -20,7 +20,7 @@ def main(folder: Path) -> float:
     """Write the solid and a picture; return the volume of the solid."""
     ball = samples.sphere(4)
     bowl = sh.TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces][..., 2].max(axis=1) <= 0])
-    wall = sh.thicken(bowl, 0.06, resolution=96)
+    wall = sh.morphology.thicken(bowl, 0.06, resolution=96)
 
     grid = sh.Grid.around(wall.bounds, resolution=96, padding=0.15)
     solid = sh.signed_distance(wall, grid)

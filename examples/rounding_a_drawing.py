@@ -36,7 +36,7 @@ def main(folder: Path) -> float:
     plate = sh.Polyline(PLATE, closed=True)
     grid = sh.Grid.around(plate.bounds, resolution=220, padding=0.4)
     phi = sh.signed_distance(plate, grid)
-    opened, closed = sh.opening(plate, 0.15, grid), sh.closing(plate, 0.15, grid)
+    opened, closed = sh.morphology.opening(plate, 0.15, grid), sh.morphology.closing(plate, 0.15, grid)
 
     figure = view.new_figure(13.5, 3.4)
     for k, (title, lines) in enumerate([("a plate", plate), ("opened by 0.15", opened), ("closed by 0.15", closed)]):

@@ -20,12 +20,12 @@ def main(folder: Path) -> float:
     grid = sh.Grid((-1.8, -1.4, -1.4), 0.06, (61, 48, 48))
     ball = sh.signed_distance(samples.sphere(4, 0.8, (-0.5, 0, 0)), grid)
     ring = sh.signed_distance(samples.torus(0.8, 0.25), grid)
-    sharp, smooth = ball | ring, sh.smooth_union(ball, ring, 0.5)
+    sharp, smooth = ball | ring, sh.morphology.smooth_union(ball, ring, 0.5)
     shown = {
         "union": sharp,
         "union, width 0.5": smooth,
-        "common part, width 0.2": sh.smooth_intersection(ball, ring, 0.2),
-        "difference, width 0.2": sh.smooth_difference(ball, ring, 0.2),
+        "common part, width 0.2": sh.morphology.smooth_intersection(ball, ring, 0.2),
+        "difference, width 0.2": sh.morphology.smooth_difference(ball, ring, 0.2),
     }
     view.save_row(
         folder / "smooth_blends.png",

@@ -21,7 +21,7 @@ def measure(path: Path, stem: Path) -> dict[str, object]:
     if name.startswith("crashed"):
         os._exit(3)
     if name.startswith("wrong"):
-        raise sh.GeometryError("there is\nno face", remedy="add one")
+        raise sh.errors.GeometryError("there is\nno face", remedy="add one")
     if name.startswith("bug"):
         raise KeyError("missing")
     if name.startswith("loud"):

@@ -13,8 +13,8 @@ import signedheat as sh
 
 @contextmanager
 def refused(
-    kind: type[sh.SignedHeatError], element: str | None = None, *, file: str | None = None
-) -> Iterator[pytest.ExceptionInfo[sh.SignedHeatError]]:
+    kind: type[sh.errors.SignedHeatError], element: str | None = None, *, file: str | None = None
+) -> Iterator[pytest.ExceptionInfo[sh.errors.SignedHeatError]]:
     """Expect an error of this kind, about this element of the input, or about the file of this name.
 
     Beside its cause it must say what it is about, or what to do.

@@ -33,11 +33,11 @@ FLOORS = [
     {"method", "extrapolation"},
     {"fields"},
     {"solver"},
-    {"extensions", "curves", "orientation", "sharpening", "solids", "tets", "signed_distance"},
+    {"extensions", "curves", "orientation", "sharpening", "solids", "tets", "signed_distance"} | {"morphology"},
     {"io", "torch"},
     {"view"},
     {"batches"},
-    {"", "public"},  # the package itself, with the public names
+    {"", "public", "results"},  # the package itself, with the public names
     {"samples"},
     {"cli", "__main__"},
 ]

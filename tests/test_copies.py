@@ -43,7 +43,8 @@ def arrays(thing, path="", seen=None):
 
 
 def test_no_public_class_is_left_out():
-    public = {getattr(sh, name) for name in sh.__all__}
+    modules = (sh, sh.batches, sh.results)
+    public = {getattr(module, name) for module in modules for name in module.__all__} | {sh.io.LabelImage}
     classes = {thing for thing in public if isinstance(thing, type) and not issubclass(thing, BaseException)}
     assert classes == {type(make()) for make in [*OBJECTS.values(), *SOLVERS.values()]} & public
 
@@ -123,7 +124,7 @@ def test_factors_of_pardiso_refuse_to_be_copied():
     if factor.backend != "pardiso":
         pytest.skip("PARDISO is not installed")
     for way in WAYS.values():
-        with pytest.raises(sh.UnsupportedTypeError):
+        with pytest.raises(sh.errors.UnsupportedTypeError):
             way(factor)
 
 

@@ -15,7 +15,7 @@ import signedheat as sh
 from signedheat.cli.computing import prefix_errors
 
 TRIANGLE = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-KINDS = [kind for kind in vars(sh).values() if isinstance(kind, type) and issubclass(kind, sh.SignedHeatError)]
+KINDS = [kind for kind in vars(sh).values() if isinstance(kind, type) and issubclass(kind, sh.errors.SignedHeatError)]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -33,14 +33,22 @@ def test_parts_and_text(kind):
 @pytest.mark.parametrize(
     "call, kind, element",
     [
-        (lambda: sh.TriangleMesh([[0, 0, np.nan]], [[0, 0, 0]]), sh.GeometryError, "number 0"),
-        (lambda: sh.PointCloud([[0, 0, 0], [1, 0, 0]], normals=[[0, 0, 1], [0, 0, 0]]), sh.GeometryError, "point 1"),
-        (lambda: TRIANGLE.points_at(7), sh.SourceError, "vertex 7"),
-        (lambda: sh.SignedHeatSolver(TRIANGLE).distance([]), sh.SourceError, None),
-        (lambda: sh.SignedHeatSolver(TRIANGLE).distance(TRIANGLE.path([0, 1]), "free"), sh.UnsupportedTypeError, None),
-        (lambda: sh.SignedHeatSolver(TRIANGLE.path([0, 1])).discretization, sh.UnsupportedTypeError, None),
-        (lambda: sh.sharpen(np.zeros(3)), sh.UnsupportedTypeError, None),
-        (lambda: sh.shell(TRIANGLE, 0.0, 0.1, TRIANGLE), sh.UnsupportedTypeError, None),
+        (lambda: sh.TriangleMesh([[0, 0, np.nan]], [[0, 0, 0]]), sh.errors.GeometryError, "number 0"),
+        (
+            lambda: sh.PointCloud([[0, 0, 0], [1, 0, 0]], normals=[[0, 0, 1], [0, 0, 0]]),
+            sh.errors.GeometryError,
+            "point 1",
+        ),
+        (lambda: TRIANGLE.points_at(7), sh.errors.SourceError, "vertex 7"),
+        (lambda: sh.SignedHeatSolver(TRIANGLE).distance([]), sh.errors.SourceError, None),
+        (
+            lambda: sh.SignedHeatSolver(TRIANGLE).distance(TRIANGLE.path([0, 1]), "free"),
+            sh.errors.UnsupportedTypeError,
+            None,
+        ),
+        (lambda: sh.SignedHeatSolver(TRIANGLE.path([0, 1])).discretization, sh.errors.UnsupportedTypeError, None),
+        (lambda: sh.sharpen(np.zeros(3)), sh.errors.UnsupportedTypeError, None),
+        (lambda: sh.morphology.shell(TRIANGLE, 0.0, 0.1, TRIANGLE), sh.errors.UnsupportedTypeError, None),
     ],
 )
 def test_cause_element_and_remedy(call, kind, element):
@@ -56,16 +64,16 @@ def test_errors_of_files_name_them(tmp_path):
         path = tmp_path / name
         if content is not None:
             path.write_text(content)
-        with pytest.raises(sh.FileFormatError) as caught:
+        with pytest.raises(sh.errors.FileFormatError) as caught:
             sh.read(path)
         assert caught.value.path == str(path) and caught.value.remedy and str(path) not in caught.value.cause
 
 
 def test_wrong_types_are_type_errors_too():
     with pytest.raises(TypeError), prefix_errors("input.ply"):
-        raise sh.UnsupportedTypeError("no")
-    with pytest.raises(sh.SignedHeatError) as caught, prefix_errors("input.ply"):
-        raise sh.UnsupportedTypeError("no")
+        raise sh.errors.UnsupportedTypeError("no")
+    with pytest.raises(sh.errors.SignedHeatError) as caught, prefix_errors("input.ply"):
+        raise sh.errors.UnsupportedTypeError("no")
     assert caught.value.path == "input.ply"
 
 
@@ -95,4 +103,7 @@ def test_no_remedy_hides_in_a_cause():
 
 
 def test_what_is_quoted_keeps_errors_to_one_line():
-    assert str(sh.SignedHeatError(f"no {np.zeros((2, 2))!r}", remedy="none")) == "no array([[0., 0.], [0., 0.]]): none"
+    assert (
+        str(sh.errors.SignedHeatError(f"no {np.zeros((2, 2))!r}", remedy="none"))
+        == "no array([[0., 0.], [0., 0.]]): none"
+    )

@@ -78,7 +78,7 @@ def test_scale_and_side():
 
 @pytest.mark.parametrize("arguments", [(0.0,), (-1.0,), (np.nan,), (4.0, 1.0), (4.0, 0.5), (4.0, np.inf)])
 def test_times_that_make_no_sense_are_refused(arguments):
-    with refused(sh.SignedHeatError, "middle" if len(arguments) == 1 else "ratio"):
+    with refused(sh.errors.SignedHeatError, "middle" if len(arguments) == 1 else "ratio"):
         sh.Extrapolated(*arguments)
 
 

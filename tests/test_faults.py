@@ -39,8 +39,8 @@ WRITERS = {
     **{f"surface.{ending}": ON_BALL.save for ending in ("npz", "ply", "vtp", "obj")},
     **{f"tets.{ending}": TETS.save for ending in ("node", "ele", "mesh", "msh", "vtk", "vtu")},
     **{f"values.{ending}": ON_TETS.save for ending in ("msh", "vtk", "vtu")},
-    **{f"lines.{ending}": lambda path: sh.write_polylines(path, LINE) for ending in ("svg", "csv")},
-    **{f"curves.{ending}": lambda path: sh.write_curves(path, CURVE, BALL) for ending in ("txt", "json", "obj")},
+    **{f"lines.{ending}": lambda path: sh.io.write_polylines(path, LINE) for ending in ("svg", "csv")},
+    **{f"curves.{ending}": lambda path: sh.io.write_curves(path, CURVE, BALL) for ending in ("txt", "json", "obj")},
     **{f"picture.{ending}": lambda path: save_scene(BALL, path) for ending in ("png", "svg")},
 }
 """Everything that writes a file, by the end of its name."""
@@ -65,7 +65,7 @@ def test_full_disk(tmp_path, name, size):
     old = {p: b"old" for p in [path, *beside] if p.suffix != path.suffix or p == path}
     for p, data in old.items():
         p.write_bytes(data)
-    with disk_of(size), pytest.raises(sh.FileFormatError) as caught:
+    with disk_of(size), pytest.raises(sh.errors.FileFormatError) as caught:
         WRITERS[name](path)
     assert caught.value.path and caught.value.remedy
     assert {p: p.read_bytes() for p in tmp_path.iterdir()} == old
@@ -75,10 +75,10 @@ def test_full_disk(tmp_path, name, size):
 def test_read_only_files_and_folders(tmp_path):
     (tmp_path / "ball.stl").write_bytes(b"old")
     (tmp_path / "ball.stl").chmod(0o444)
-    with pytest.raises(sh.FileFormatError):
+    with pytest.raises(sh.errors.FileFormatError):
         BALL.save(tmp_path / "ball.stl")
     tmp_path.chmod(0o555)
-    with pytest.raises(sh.FileFormatError):
+    with pytest.raises(sh.errors.FileFormatError):
         BALL.save(tmp_path / "new.stl")
     tmp_path.chmod(0o755)
     assert [p.name for p in tmp_path.iterdir()] == ["ball.stl"]
@@ -192,7 +192,7 @@ sys.exit(main(["info", "ball.stl"]))
 def test_environments_that_make_no_sense(tmp_path, variables):
     ready(tmp_path)
     command = ["-m", "signedheat", "surface", "ball.stl", "curve.txt", "-o", "phi.ply"]
-    sh.write_curves(
+    sh.io.write_curves(
         tmp_path / "curve.txt", sh.read(tmp_path / "ball.stl").path([0, 1, 2]), sh.read(tmp_path / "ball.stl")
     )
     environment = {**os.environ, **variables}
@@ -256,7 +256,7 @@ def test_one_processor_and_numbers_of_threads_give_the_same_bits(tmp_path, threa
 def test_memory_that_is_not_free(tmp_path, monkeypatch):
     BALL.save(tmp_path / "ball.stl")
     monkeypatch.setattr(files, "available_memory", lambda: 100)
-    with pytest.raises(sh.MemoryLimitError):
+    with pytest.raises(sh.errors.MemoryLimitError):
         sh.read(tmp_path / "ball.stl")
 
 

@@ -160,7 +160,7 @@ def test_a_lock_that_was_left_is_taken_off(cache, shifted, monkeypatch):
 def test_numbers_of_threads_that_are_none(monkeypatch, threads, cache, shifted):
     compiled._prepare.cache_clear()
     monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
-    with pytest.raises(sh.SignedHeatError) as caught:
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
         shifted()
     assert caught.value.element == "NUMBA_NUM_THREADS" and caught.value.remedy
 

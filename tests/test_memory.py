@@ -41,7 +41,7 @@ resource.setrlimit(getattr(resource, sys.argv[1]), (held + 10**9, resource.RLIM_
 assert 0.3e9 < available_memory() <= 1e9, available_memory()
 try:
     sh.SignedHeatSolver(sh.Grid((0, 0, 0), 1.0, (400, 400, 400))).discretization
-except sh.MemoryLimitError:
+except sh.errors.MemoryLimitError:
     print("refused")
 """
     done = subprocess.run([sys.executable, "-c", code, limit, field], capture_output=True, text=True, check=True)
@@ -94,7 +94,7 @@ def test_the_spacing_that_is_proposed_fits(shape):
     counts = np.floor((grid.upper - grid.origin) / spacing).astype(int) + 1
     fitting = memory_estimate(sh.Grid(grid.origin, spacing, counts))
     assert 0.9 * 8e9 < fitting <= 8e9
-    with refused(sh.MemoryLimitError):
+    with refused(sh.errors.MemoryLimitError):
         _ = sh.SignedHeatSolver(grid).discretization
 
 
@@ -128,7 +128,7 @@ def test_how_much_surface_there_is_counts(monkeypatch):
     free = memory.libraries() + 32 * grid.n_nodes
     monkeypatch.setattr(memory, "_free", lambda: free)
     sh.SignedHeatSolver(grid).distance(one)
-    with refused(sh.MemoryLimitError):
+    with refused(sh.errors.MemoryLimitError):
         sh.SignedHeatSolver(grid).distance(many)
 
 
@@ -184,7 +184,7 @@ def test_what_does_not_fit_is_refused_and_what_would_is_named(name, monkeypatch)
     domain, source = DOMAINS[name]
     sh.SignedHeatSolver(domain).distance(source(domain))
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 100_000)
-    with refused(sh.MemoryLimitError) as caught:
+    with refused(sh.errors.MemoryLimitError) as caught:
         sh.SignedHeatSolver(domain).distance(source(domain))
     assert any(letter.isdigit() for letter in caught.value.remedy)
 
@@ -195,7 +195,7 @@ def test_piecewise_fields_that_do_not_fit_name_a_number_of_triangles_that_does(e
     free = memory.libraries() + int(piecewise_estimate(BALL.n_faces // 2, exact))
     for surface in (BALL, sh.PolygonMesh(BALL.vertices, BALL.faces), sh.intrinsic_delaunay(BALL)):
         monkeypatch.setattr(memory, "_free", lambda: free)
-        with refused(sh.MemoryLimitError) as caught:
+        with refused(sh.errors.MemoryLimitError) as caught:
             sh.piecewise_distance(surface, half, exact=exact)
         fitting = int(caught.value.remedy.split()[3].replace(",", ""))
         room = (free - memory.libraries()) / memory.ROOM
@@ -205,7 +205,7 @@ def test_piecewise_fields_that_do_not_fit_name_a_number_of_triangles_that_does(e
 @pytest.mark.parametrize("free", [200e6, 400e6])
 def test_lattices_that_do_not_fit_name_a_resolution_that_does(free, monkeypatch):
     monkeypatch.setattr(memory, "_free", lambda: int(free))
-    with refused(sh.MemoryLimitError) as caught:
+    with refused(sh.errors.MemoryLimitError) as caught:
         sh.tetrahedralize(BALL, resolution=120)
     n_tets = sh.tetrahedralize(BALL, resolution=int(float(caught.value.remedy.split()[-1]))).n_tets
     assert 0.4 * free < BYTES_PER_TET * n_tets <= free - memory.libraries()
@@ -214,7 +214,7 @@ def test_lattices_that_do_not_fit_name_a_resolution_that_does(free, monkeypatch)
 def test_meshes_that_do_not_fit_are_refused_before_they_are_refined(monkeypatch):
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 2_000_000)
     monkeypatch.setattr(intrinsic, "intrinsic_delaunay", lambda *_, **__: pytest.fail("refined"))
-    with refused(sh.MemoryLimitError):
+    with refused(sh.errors.MemoryLimitError):
         sh.SignedHeatSolver(BALL, intrinsic=True).distance(BALL.points_at(0))
 
 
@@ -223,14 +223,14 @@ def test_rows_are_imposed_exactly_only_where_there_is_memory_for_it(monkeypatch)
     grid = sh.Grid.around(BALL, 40)
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 60 * grid.n_nodes)
     sh.SignedHeatSolver(grid).distance(BALL)
-    with refused(sh.MemoryLimitError) as caught:
+    with refused(sh.errors.MemoryLimitError) as caught:
         sh.SignedHeatSolver(grid).distance(BALL, sh.ZeroSet(hard=True))
     assert "hard=True" in caught.value.remedy
 
 
 def test_shapes_are_refused_before_their_faces_are_turned(monkeypatch):
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 10_000)
-    with refused(sh.MemoryLimitError):
+    with refused(sh.errors.MemoryLimitError):
         sh.complete(BALL)
 
 
@@ -244,7 +244,7 @@ def test_the_largest_number_that_fits_fits(count, available, each):
 def test_lattices_name_the_resolution_that_fits(monkeypatch):
     shape = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [[0, 1, 2]])
     for grading in (3.0, np.inf):
-        with refused(sh.MemoryLimitError) as caught:
+        with refused(sh.errors.MemoryLimitError) as caught:
             sh.tetrahedralize(shape, resolution=100_000, grading=grading)
         fitting = float(caught.value.remedy.split()[-1])
         assert 20 < fitting < 100_000

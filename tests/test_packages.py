@@ -21,7 +21,7 @@ CUBE = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1],
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"><path d="M 0,0 L 1,0 L 1,1 Z"/></svg>'
 
 USES = {
-    "nibabel": lambda folder: sh.read_labels(folder / "labels.nii"),
+    "nibabel": lambda folder: sh.io.read_labels(folder / "labels.nii"),
     "torch": lambda folder: sh.torch.distance(sh.complete(CUBE), [[0, 0, 0]]),
     "trimesh": lambda folder: CUBE.to_trimesh(),
     "meshio": lambda folder: CUBE.to_meshio(),
@@ -29,9 +29,9 @@ USES = {
     "tetgen": lambda folder: tetrahedralize_with_tetgen(CUBE, resolution=4),
     "pytetwild": lambda folder: tetrahedralize_with_tetwild(CUBE, resolution=4),
     "matplotlib": lambda folder: save_scene(CUBE, folder / "scene.png"),
-    "svgpathtools": lambda folder: sh.read_polylines(folder / "line.svg"),
+    "svgpathtools": lambda folder: sh.io.read_polylines(folder / "line.svg"),
     "nrrd": lambda folder: sh.load_field(folder / "phi.nrrd"),
-    "PIL": lambda folder: sh.read_mask(folder / "walls.png"),
+    "PIL": lambda folder: sh.io.read_mask(folder / "walls.png"),
     "skimage": lambda folder: sh.GridField(sh.Grid([0, 0], 1, [3, 3]), np.eye(3) - 0.5).contour(0.0),
 }
 """What needs each package that may be missing."""
@@ -66,7 +66,7 @@ def block(monkeypatch, package):
 @pytest.mark.parametrize("package", USES)
 def test_a_missing_package_is_named_with_its_remedy(monkeypatch, folder, package):
     block(monkeypatch, package)
-    with pytest.raises(sh.MissingPackageError) as caught:
+    with pytest.raises(sh.errors.MissingPackageError) as caught:
         USES[package](folder)
     message = str(caught.value)
     assert f" {package}," in message
@@ -77,7 +77,7 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch, folder, package
 @pytest.mark.parametrize(("name", "package"), FILES.items())
 def test_a_file_whose_reader_is_missing_is_not_called_damaged(monkeypatch, folder, name, package, capsys):
     block(monkeypatch, package)
-    with pytest.raises(sh.MissingPackageError):
+    with pytest.raises(sh.errors.MissingPackageError):
         sh.read(folder / name)
     assert main(["info", str(folder / name)]) == 1
     assert capsys.readouterr().err.count("\n") == 1
@@ -102,14 +102,14 @@ def test_the_demo_without_pictures_makes_the_rest(monkeypatch, tmp_path, capsys)
 def test_a_missing_package_is_bad_input_and_an_import_error():
     with pytest.raises(ImportError) as caught:
         require("no_such_package", "tests")
-    assert isinstance(caught.value, sh.SignedHeatError)
+    assert isinstance(caught.value, sh.errors.SignedHeatError)
     assert isinstance(caught.value.__cause__, ModuleNotFoundError)
 
 
 def test_a_package_that_is_there_and_broken_says_why(monkeypatch, tmp_path):
     (tmp_path / "broken_package.py").write_text("import its_own_requirement\n")
     monkeypatch.syspath_prepend(tmp_path)
-    with refused(sh.MissingPackageError, "broken_package"):
+    with refused(sh.errors.MissingPackageError, "broken_package"):
         require("broken_package", "tests")
 
 

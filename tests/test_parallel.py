@@ -81,6 +81,6 @@ def test_what_listens_and_is_no_scheduler_is_told(greeting, monkeypatch):
 
         answering = threading.Thread(target=answer)
         answering.start()
-        with refused(sh.SignedHeatError, element="scheduler"):
+        with refused(sh.errors.SignedHeatError, element="scheduler"):
             parallel.connected(f"tcp://127.0.0.1:{server.getsockname()[1]}")
         answering.join()

@@ -27,7 +27,7 @@ def our_offset(shape: sh.TriangleMesh, distance: float) -> tuple[np.ndarray, np.
 
 
 def our_wall() -> tuple[np.ndarray, np.ndarray]:
-    wall = sh.thicken(sheet(), 0.05, resolution=128)
+    wall = sh.morphology.thicken(sheet(), 0.05, resolution=128)
     return wall.vertices, wall.faces
 
 

@@ -198,8 +198,8 @@ def simplified_by_offsets(page: Page) -> None:
     broken = samples.broken_duck()
     grid = sh.Grid.around(broken.bounds, resolution=72, padding=0.6)
     results = {
-        "closing by 0.15": sh.closing(broken, 0.15, grid),
-        "opening by 0.1": sh.opening(broken, 0.1, grid),
+        "closing by 0.15": sh.morphology.closing(broken, 0.15, grid),
+        "opening by 0.1": sh.morphology.opening(broken, 0.1, grid),
     }
     picture = new_figure(13, 4.2)
     draw_shape(broken, picture.add_subplot(1, 3, 1))

@@ -10,7 +10,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from . import batches as batches
     from . import errors as errors
+    from . import io as io
+    from . import morphology as morphology
+    from . import results as results
     from . import torch as torch
+    from . import view as view
     from .public import *  # noqa: F403
     from .public import __all__ as __all__
 

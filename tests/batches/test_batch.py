@@ -212,24 +212,24 @@ def test_names_follow_files(tmp_path, files):
 
 def test_what_is_no_batch_says_so(tmp_path, files, monkeypatch):
     folder = files("a.ply")
-    with pytest.raises(sh.FileFormatError):
+    with pytest.raises(sh.errors.FileFormatError):
         sh.batches.run(str(tmp_path / "*.nothing"), tmp_path / "out", measure)
     (tmp_path / "empty").mkdir()
-    with pytest.raises(sh.FileFormatError):
+    with pytest.raises(sh.errors.FileFormatError):
         sh.batches.run(tmp_path / "empty", tmp_path / "out", measure)
-    with pytest.raises(sh.SignedHeatError) as caught:
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.batches.run(folder, tmp_path / "out", lambda path, stem: {})
     assert "module" in caught.value.remedy
-    with pytest.raises(sh.SignedHeatError):
+    with pytest.raises(sh.errors.SignedHeatError):
         sh.batches.run(folder, tmp_path / "out", measure, workers=0)
-    with pytest.raises(sh.SignedHeatError):
+    with pytest.raises(sh.errors.SignedHeatError):
         sh.batches.run(folder, folder / "a.ply" / "out", measure)
-    with pytest.raises(sh.SignedHeatError):
+    with pytest.raises(sh.errors.SignedHeatError):
         sh.batches.Job()
-    with pytest.raises(sh.SignedHeatError):
+    with pytest.raises(sh.errors.SignedHeatError):
         sh.batches.Job(samples=sh.batches.Sampling(), plain=True)
     for wrong in ({"volume": ".nrrd"}, {"offsets": (0.2,)}, {"info": True, "plain": True}):
-        with pytest.raises(sh.SignedHeatError):
+        with pytest.raises(sh.errors.SignedHeatError):
             sh.batches.Job(band=0.1, **wrong)
     monkeypatch.setattr(sys, "path", [path for path in sys.path if not path.endswith("tests")])
     unknown = sh.batches.run(folder, tmp_path / "other", measure, workers=1)
@@ -241,14 +241,14 @@ def test_what_is_no_batch_says_so(tmp_path, files, monkeypatch):
 @pytest.mark.parametrize("odd", [0, -1, 1.5, np.nan, "two", 10**6])
 @pytest.mark.parametrize("name", ["workers", "threads"])
 def test_odd_numbers_of_workers(tmp_path, name, odd):
-    with refused(sh.SignedHeatError, name):
+    with refused(sh.errors.SignedHeatError, name):
         sh.batches.run("shape.stl", tmp_path / "made", sh.batches.Job(info=True), **{name: odd})
     assert not (tmp_path / "made").exists()
 
 
 @pytest.mark.parametrize("odd", [0, -1, np.nan, np.inf, "long", 1e30])
 def test_odd_time_limits(tmp_path, odd):
-    with refused(sh.SignedHeatError, "time limit"):
+    with refused(sh.errors.SignedHeatError, "time limit"):
         sh.batches.run("shape.stl", tmp_path / "made", sh.batches.Job(info=True), time_limit=odd)
     assert not (tmp_path / "made").exists()
 
@@ -292,9 +292,9 @@ def test_links_that_run_in_circles_give_every_file_once(tmp_path, files):
 def test_results_among_the_shapes_are_refused(tmp_path, files):
     folder = files("a.ply")
     for target in (folder, tmp_path):
-        with refused(sh.FileFormatError):
+        with refused(sh.errors.FileFormatError):
             sh.batches.run(folder, target, measure, workers=1)
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         sh.batches.run(folder, folder / "a.ply", measure, workers=1)
     assert sh.batches.run(folder, folder / "out", measure, workers=1).outcomes[0].is_done
 
@@ -303,7 +303,7 @@ def test_a_folder_is_written_by_one_batch_at_a_time(tmp_path, files):
     folder, out = files("a.ply", "b.ply"), tmp_path / "out"
 
     def second(outcome):
-        with refused(sh.SignedHeatError):
+        with refused(sh.errors.SignedHeatError):
             sh.batches.run(folder, out, measure, workers=1)
 
     assert not sh.batches.run(folder, out, measure, workers=1, report=second).failures
@@ -313,7 +313,7 @@ def test_a_folder_is_written_by_one_batch_at_a_time(tmp_path, files):
 def test_shapes_whose_results_would_have_one_name_are_refused(tmp_path, files):
     folder = files("a.ply", "a_samples.stl")
     job = sh.batches.Job(volume=".npz", samples=sh.batches.Sampling(n=10), resolution=16)
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         sh.batches.run(folder, tmp_path / "out", job, workers=1)
 
 
@@ -322,7 +322,7 @@ def test_what_has_the_name_of_the_manifest_is_refused(tmp_path, files, odd):
     (tmp_path / "out").mkdir()
     place = tmp_path / "out" / "manifest.jsonl"
     place.mkdir() if odd == "folder" else os.mkfifo(place)
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         sh.batches.run(files("a.ply"), tmp_path / "out", measure, workers=1)
 
 

@@ -51,6 +51,6 @@ def test_a_cluster_does_what_processes_do(tmp_path, cluster):
 
 def test_without_a_scheduler_the_batch_says_so(tmp_path):
     (tmp_path / "a.ply").write_text("")
-    with pytest.raises(sh.SignedHeatError) as caught:
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.batches.run(tmp_path / "a.ply", tmp_path / "out", measure, scheduler="tcp://127.0.0.1:9")
     assert "dask scheduler" in caught.value.remedy

@@ -38,8 +38,8 @@ def arcs(tmp_path):
     angle = -2 * np.pi * np.arange(300) / 300
     points = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     lines = [sh.Polyline(points[k : k + 80]) for k in (0, 100, 200)]
-    sh.write_polylines(tmp_path / "arcs.csv", lines)
-    sh.write_polylines(tmp_path / "arcs.svg", lines)
+    sh.io.write_polylines(tmp_path / "arcs.csv", lines)
+    sh.io.write_polylines(tmp_path / "arcs.svg", lines)
     return tmp_path
 
 
@@ -66,7 +66,7 @@ def test_volume_in_the_plane(arcs, capsys, ending):
     phi = sh.load_field(out)
     np.testing.assert_allclose(phi([[0.3, 0], [1.25, 0], [0, -0.5]]), [-0.7, 0.25, -0.5], atol=0.03)
     assert picture.read_bytes().startswith(b"\x89PNG")
-    kept = sh.signed_distance(sh.read_polylines(arcs / f"arcs.{ending}"), resolution=64)
+    kept = sh.signed_distance(sh.io.read_polylines(arcs / f"arcs.{ending}"), resolution=64)
     np.testing.assert_array_equal(phi.values, kept.values)
 
 
@@ -83,7 +83,7 @@ def test_offsets_in_the_plane(arcs, capsys):
     summary = json.loads(succeed(capsys, *arguments))
     assert [row["closed"] for row in summary["lines"]] == [1, 1]
     for name, radius in (("out_+0.2.svg", 1.2), ("out_-0.3.svg", 0.7)):
-        [line] = sh.read_polylines(arcs / name)
+        [line] = sh.io.read_polylines(arcs / name)
         assert line.closed and line.signed_area == pytest.approx(-np.pi * radius**2, rel=0.02)
     assert "1 lines (1 closed)" in succeed(capsys, "offset", arcs / "arcs.svg", "0.1", "-o", arcs / "one.csv")
 
@@ -91,7 +91,7 @@ def test_offsets_in_the_plane(arcs, capsys):
 def test_contour_view_and_info_in_the_plane(arcs, capsys):
     succeed(capsys, "volume", arcs / "arcs.csv", "-o", arcs / "phi.vti", "--resolution", "48")
     assert "1 lines" in succeed(capsys, "contour", arcs / "phi.vti", "0.1", "-o", arcs / "line.csv")
-    [line] = sh.read_polylines(arcs / "line.csv")
+    [line] = sh.io.read_polylines(arcs / "line.csv")
     np.testing.assert_allclose(np.linalg.norm(line.points, axis=1), 1.1, atol=0.04)
     assert "lines in the plane" in fail(capsys, "contour", arcs / "phi.vti", "0.1", "-o", arcs / "line.stl")
     succeed(capsys, "view", arcs / "phi.vti", "-o", arcs / "view.png")
@@ -102,7 +102,7 @@ def test_contour_view_and_info_in_the_plane(arcs, capsys):
 
 def test_drawings(tmp_path):
     (tmp_path / "drawing.svg").write_text(DRAWING)
-    curve, circle = sh.read_polylines(tmp_path / "drawing.svg")
+    curve, circle = sh.io.read_polylines(tmp_path / "drawing.svg")
     assert circle.closed and circle.signed_area == pytest.approx(-np.pi * 30**2, rel=1e-3)  # clockwise as one sees it
     np.testing.assert_allclose(circle.bounds.mean(axis=0), [50, -50])
     assert not curve.closed
@@ -114,8 +114,8 @@ def test_drawings(tmp_path):
 def test_polylines_come_back_to_the_last_bit(tmp_path, ending):
     rng = np.random.default_rng(3)
     lines = [sh.Polyline(rng.normal(size=(n, 2)), closed=n > 3) for n in (2, 5, 9)]
-    sh.write_polylines(tmp_path / f"lines.{ending}", lines)
-    again = sh.read_polylines(tmp_path / f"lines.{ending}")
+    sh.io.write_polylines(tmp_path / f"lines.{ending}", lines)
+    again = sh.io.read_polylines(tmp_path / f"lines.{ending}")
     for line, other in zip(lines, again, strict=True):
         np.testing.assert_array_equal(line.points, other.points)
         assert line.closed == other.closed
@@ -207,8 +207,8 @@ def test_close_completes_curves(ball, capsys):
     text = succeed(capsys, "close", ball / "ball.ply", ball / "half.csv", "-o", out, "--preview", picture)
     assert "1 curve, 1 of them closed" in text
     mesh = sh.read(ball / "ball.ply")
-    [whole] = sh.read_curves(out, mesh)
-    [wanted] = sh.close_curves(mesh, sh.read_curves(ball / "half.csv", mesh))
+    [whole] = sh.io.read_curves(out, mesh)
+    [wanted] = sh.close_curves(mesh, sh.io.read_curves(ball / "half.csv", mesh))
     points, others = (
         np.einsum("ik,ikj->ij", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]]) for curve in (whole, wanted)
     )
@@ -226,7 +226,7 @@ def test_walls_come_from_pictures_and_volumes(tmp_path, capsys):
     picture = np.full((30, 40), 255, dtype=np.uint8)
     picture[10:, 20] = 0  # rows run downwards
     Image.fromarray(picture).save(tmp_path / "room.png")
-    sh.write_polylines(tmp_path / "line.csv", sh.Polyline([[5.0, 29.0], [5.0, 0.0]]))
+    sh.io.write_polylines(tmp_path / "line.csv", sh.Polyline([[5.0, 29.0], [5.0, 0.0]]))
     flat = ("volume", tmp_path / "line.csv", "--mask", tmp_path / "room.png", "-o", tmp_path / "phi.npz")
     succeed(capsys, *flat, "--preview", tmp_path / "room.preview.png")
     phi = sh.load_field(tmp_path / "phi.npz")

@@ -74,10 +74,10 @@ def test_a_measure_of_ones_own(tmp_path):
         return sh.signed_distance(shape, grid)
 
     ball = samples.sphere(2)
-    same = sh.closing(ball, 0.1, resolution=20, measure=measure)
+    same = sh.morphology.closing(ball, 0.1, resolution=20, measure=measure)
     assert len(asked) == 2 and asked[0] is ball
-    np.testing.assert_array_equal(same.vertices, sh.closing(ball, 0.1, resolution=20).vertices)
-    sh.shell(ball, 0.0, 0.4, resolution=20, measure=measure)
+    np.testing.assert_array_equal(same.vertices, sh.morphology.closing(ball, 0.1, resolution=20).vertices)
+    sh.morphology.shell(ball, 0.0, 0.4, resolution=20, measure=measure)
     assert len(asked) == 3
 
 

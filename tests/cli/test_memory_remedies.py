@@ -83,7 +83,7 @@ def test_files_that_would_not_fit_while_they_are_read_are_refused(tmp_path, endi
         (samples.oriented_points(ball, 5000) if ending == ".xyz" else ball).save(path)
     size, taken = path.stat().st_size, files.TAKEN.get(ending, 20)
     monkeypatch.setattr(memory, "_free", lambda: (taken - 1) * size if ending in files.TAKEN else 900_000)
-    with pytest.raises(sh.MemoryLimitError) as caught:
+    with pytest.raises(sh.errors.MemoryLimitError) as caught:
         sh.read(path)
     assert caught.value.path == str(path) and caught.value.remedy
     monkeypatch.setattr(memory, "_free", lambda: (taken + 1) * size)
@@ -95,7 +95,7 @@ def test_surfaces_of_too_many_faces_to_do_anything_with_are_refused(tmp_path, mo
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 1_000_000)
     samples.sphere(5).save(tmp_path / "ball.ply")
     monkeypatch.setattr(files, "TAKEN", {})
-    with pytest.raises(sh.MemoryLimitError) as caught:
+    with pytest.raises(sh.errors.MemoryLimitError) as caught:
         sh.read(tmp_path / "ball.ply")
     most = int(re.search(r"at most ([0-9,]+) faces", caught.value.remedy).group(1).replace(",", ""))
     assert 1000 < most < samples.sphere(5).n_faces

@@ -30,11 +30,11 @@ def test_points_curves_and_fields_too(tmp_path):
         samples.oriented_points(samples.sphere(1), 20).save(tmp_path / name)
     assert sniffed((tmp_path / "a.xyz").read_bytes()) == ".xyz"
     assert sniffed((tmp_path / "a.pc").read_bytes()) == ".obj"  # which reads the same lines
-    sh.write_polylines(tmp_path / "a.svg", [sh.Polyline([[0, 0], [1, 0], [1, 1]], closed=True)])
+    sh.io.write_polylines(tmp_path / "a.svg", [sh.Polyline([[0, 0], [1, 0], [1, 1]], closed=True)])
     assert sniffed((tmp_path / "a.svg").read_bytes()) == ".svg"
     assert sniffed(b"0,1\n2,3\n") == ".csv"
     for nothing in (b"", b"what is this\n", b"\0\1\2"):
-        with pytest.raises(sh.FileFormatError) as caught:
+        with pytest.raises(sh.errors.FileFormatError) as caught:
             sniffed(nothing)
         assert caught.value.path == "standard input"
 

@@ -20,7 +20,7 @@ def files(tmp_path):
     mesh.save(tmp_path / "ball.ply")
     curve = mesh.level_set(mesh.vertices[:, 2], 0.2)[0]
     half = sh.Curve(curve.faces[:60], curve.barycentric[:60])
-    sh.write_curves(tmp_path / "curves.txt", [half, mesh.path([0, 30])], mesh)
+    sh.io.write_curves(tmp_path / "curves.txt", [half, mesh.path([0, 30])], mesh)
     return tmp_path
 
 
@@ -30,7 +30,7 @@ def test_a_field_comes_out(files, capsys):
     assert main([*arguments, "--constraint", "each-component", "--diffusion", "2"]) == 0
     assert "642 vertices" in capsys.readouterr().out
     mesh = sh.read(files / "ball.ply")
-    curves = sh.read_curves(files / "curves.txt", mesh)
+    curves = sh.io.read_curves(files / "curves.txt", mesh)
     phi = sh.SignedHeatSolver(mesh, 2.0).distance(curves, sh.EachComponent())
     assert (np.load(out)["values"] == phi.values).all()
 
@@ -42,14 +42,14 @@ def test_json_contours_and_a_picture(files, capsys):
     summary = json.loads(capsys.readouterr().out)
     assert summary["minimum"] < 0 < summary["maximum"] and summary["unreached"] == 0
     mesh = sh.read(files / "ball.ply")
-    assert len(sh.read_curves(summary["contours"], mesh)) >= 5
+    assert len(sh.io.read_curves(summary["contours"], mesh)) >= 5
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
 
 
 def test_vertices_that_no_curve_reaches_are_told_on_standard_error(tmp_path, capsys):
     mesh = square(5)
     samples.union(mesh, sh.TriangleMesh(mesh.vertices + 5, mesh.faces)).save(tmp_path / "two.ply")
-    sh.write_curves(tmp_path / "curve.txt", [mesh.path([10, 11, 12, 13, 14])], mesh)
+    sh.io.write_curves(tmp_path / "curve.txt", [mesh.path([10, 11, 12, 13, 14])], mesh)
     command = ["surface", str(tmp_path / "two.ply"), str(tmp_path / "curve.txt"), "-o", str(tmp_path / "phi.npz")]
     assert main([*command, "--quiet"]) == 0
     said = capsys.readouterr().err
@@ -99,7 +99,7 @@ def test_info_says_what_lies_where(tmp_path, capsys):
     mesh = square(6)
     mesh.save(tmp_path / "flat.ply")
     curves = [mesh.path([7, 8, 20]), mesh.path([21, 22, 16, 15], closed=True), mesh.points_at([0])]
-    sh.write_curves(tmp_path / "curves.json", curves, mesh)
+    sh.io.write_curves(tmp_path / "curves.json", curves, mesh)
     assert main(["info", str(tmp_path / "flat.ply"), str(tmp_path / "curves.json"), "--json"]) == 0
     first, second, third = json.loads(capsys.readouterr().out)["curves"]
     assert first["share_no_face"] == [1] and first["open_ends"] == ["vertex 7", "vertex 20"]
@@ -116,7 +116,7 @@ def test_fields_on_surfaces_can_be_contoured_viewed_and_told_about(files, capsys
     assert isinstance(sh.load_field(field), sh.VertexField)
     assert main(["contour", field, "0.3", "-o", str(files / "line.json")]) == 0
     phi = sh.load_field(field)
-    for curve in sh.read_curves(files / "line.json", phi.domain):
+    for curve in sh.io.read_curves(files / "line.json", phi.domain):
         assert phi(curve) == pytest.approx(0.3)
     assert main(["contour", field, "0.3", "-o", str(files / "line.stl")]) == 1
     assert main(["contour", field, "99", "-o", str(files / "line.obj")]) == 1
@@ -134,7 +134,7 @@ def test_turned_pieces_are_told_and_left_with_as_oriented(tmp_path, capsys):
     runs = [np.arange(a, b - 3) for a, b in pairwise(cuts)]
     pieces = [sh.Curve(ring.faces[run], ring.barycentric[run]) for run in runs]
     mesh.save(tmp_path / "ball.ply")
-    sh.write_curves(tmp_path / "pieces.json", [pieces[0], pieces[1].reversed(), *pieces[2:]], mesh)
+    sh.io.write_curves(tmp_path / "pieces.json", [pieces[0], pieces[1].reversed(), *pieces[2:]], mesh)
     arguments = ["surface", str(tmp_path / "ball.ply"), str(tmp_path / "pieces.json"), "-o", str(tmp_path / "phi.ply")]
     assert main([*arguments, "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
@@ -148,7 +148,7 @@ def test_turned_pieces_are_told_and_left_with_as_oriented(tmp_path, capsys):
 def test_a_refined_field_is_written_on_its_pieces(tmp_path):
     square(3).save(tmp_path / "square.ply")
     mesh = sh.read(tmp_path / "square.ply")
-    sh.write_curves(tmp_path / "line.json", mesh.polyline([[0.3, 0.2, 0], [0.4, 0.6, 0]]), mesh)
+    sh.io.write_curves(tmp_path / "line.json", mesh.polyline([[0.3, 0.2, 0], [0.4, 0.6, 0]]), mesh)
     arguments = ["surface", str(tmp_path / "square.ply"), str(tmp_path / "line.json"), "--intrinsic"]
     for name, options in (("own", []), ("pieces", ["--subdivide", "--preview", str(tmp_path / "p.png"), "--up", "y"])):
         assert main([*arguments, "-o", str(tmp_path / f"{name}.npz"), *options]) == 0

@@ -94,7 +94,7 @@ def test_loops_smaller_than_triangles_are_told():
         lambda: solver.distance_many([loops])[0],
         lambda: sh.SignedHeatSolver(mesh).distance(loops),
     ):
-        with pytest.warns(sh.InexactWarning, match="closed curves"):
+        with pytest.warns(sh.errors.InexactWarning, match="closed curves"):
             assert measured().diagnostics.note(SmallLoops).small_loops == 1
     assert solver.distance(loops[1]).diagnostics.note(SmallLoops) is None
     assert solver.distance(mesh.polyline(0.5 * radius * ring[:5])).diagnostics.note(SmallLoops) is None
@@ -195,7 +195,7 @@ def test_turning_a_curve_turns_the_sign():
 def test_a_curve_that_bounds_nothing():
     """Round the tube of a torus: the curve tells no sides, and the method completes it on the far side."""
     mesh = torus(n_around=60, n_across=24)
-    with pytest.warns(sh.InexactWarning, match="piecewise_distance"):
+    with pytest.warns(sh.errors.InexactWarning, match="piecewise_distance"):
         note = sh.signed_distance(mesh.path(np.arange(24), closed=True), mesh).diagnostics.note(SharpenedToCurves)
     assert note.free_ends == 0
     assert note.sides_by_curves < 0.1
@@ -205,7 +205,7 @@ def test_a_curve_that_bounds_nothing():
 def test_levels_of_their_own_are_refused():
     mesh = sphere(2)
     curve = mesh.level_set(mesh.vertices[:, 2], 0.3)
-    with pytest.raises(sh.ConstraintError) as caught:
+    with pytest.raises(sh.errors.ConstraintError) as caught:
         sh.signed_distance(curve, mesh, constraint=sh.EachComponent())
     assert caught.value.remedy
 

@@ -77,7 +77,7 @@ def test_curves_apart_face_each_other(opposite):
         assert (found == wrong).all()
     else:
         assert (found[:4] != wrong[:4]).all() != (found[4:] != wrong[4:]).all()
-        with pytest.warns(sh.InexactWarning, match="as a whole"):
+        with pytest.warns(sh.errors.InexactWarning, match="as a whole"):
             sh.signed_distance(given, mesh)
 
 
@@ -128,6 +128,6 @@ def test_on_every_surface(domain):
 
 
 def test_only_surfaces_have_curves():
-    with pytest.raises(sh.UnsupportedTypeError) as caught:
+    with pytest.raises(sh.errors.UnsupportedTypeError) as caught:
         sh.curve_orientation([], sh.Grid((0, 0), 1.0, (3, 3)))
     assert caught.value.element == "domain"

@@ -82,7 +82,7 @@ def test_what_is_part_of_nothing_larger_stays(mesh):
             assert np.abs(phi(curve)).max() < 0.06
 
 
-@pytest.mark.filterwarnings("ignore::signedheat.InexactWarning")  # that it may as well be nothing is told
+@pytest.mark.filterwarnings("ignore::signedheat.errors.InexactWarning")  # that it may as well be nothing is told
 @pytest.mark.parametrize("seed", range(3))
 def test_no_piece_is_left_out_where_half_of_the_curve_is_gone(seed):
     mesh, rng = sphere(4), np.random.default_rng(seed)

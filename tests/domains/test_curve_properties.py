@@ -31,7 +31,7 @@ def test_segments_lie_in_faces_and_join_end_to_end(data, mesh):
     at = data.draw(surface_points(mesh, 2, 6))
     try:
         segments = segments_of(sh.Curve(at.faces, at.barycentric), intrinsic(mesh))
-    except sh.SourceError:
+    except sh.errors.SourceError:
         return
     assert (segments.ends[1:, 0] == segments.ends[:-1, 1]).all()
     ends = in_space(mesh, sh.SurfacePoints(segments.nodes.faces, segments.nodes.barycentric))[segments.ends]

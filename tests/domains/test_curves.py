@@ -243,7 +243,7 @@ def test_curves_on_a_nonmanifold_spine():
 
 def test_polylines_far_away_are_refused_with_the_farthest_distance():
     mesh = sphere(2)
-    with refused(sh.SourceError, "point 1"):
+    with refused(sh.errors.SourceError, "point 1"):
         mesh.polyline([[1, 0, 0], [0, 2.5, 0]])
     assert mesh.polyline([[1, 0, 0], [0, 2.5, 0]], max_distance=2).n_points > 2
 
@@ -278,22 +278,22 @@ def test_polylines_far_away_are_refused_with_the_farthest_distance():
     ],
 )
 def test_bad_input_is_refused_by_name(make, element):
-    with refused(sh.SourceError, element):
+    with refused(sh.errors.SourceError, element):
         make(sphere(1))
 
 
 def test_normals_that_leave_the_surface_and_points_on_two_components_are_refused():
     mesh = square(4)
     path = mesh.path([5, 6])
-    with refused(sh.SourceError, "face 1"):
+    with refused(sh.errors.SourceError, "face 1"):
         sh.SignedHeatSolver(mesh).distance(sh.Curve(path.faces, path.barycentric, normals=[[0, 0, 1]]))
     two = sh.TriangleMesh(
         np.concatenate([mesh.vertices, mesh.vertices + np.array([0, 0, 1]), [[5, 5, 5]]]),
         np.concatenate([mesh.faces, mesh.faces + 16]),
     )
-    with refused(sh.SourceError, "face 0"):
+    with refused(sh.errors.SourceError, "face 0"):
         sh.SignedHeatSolver(two).distance(two.path([5, 21]))
-    with refused(sh.SourceError, "vertex 32"):
+    with refused(sh.errors.SourceError, "vertex 32"):
         two.path([5, 32])
 
 

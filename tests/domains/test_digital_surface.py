@@ -147,7 +147,7 @@ def test_heat_passes_where_voxels_touch_along_an_edge_and_not_at_a_corner(offset
     surface = sh.DigitalSurface(touching(offset), radius=1.5)
     belt = surface.polyline([[1, 0.5, 1.3], [3, 0.5, 1.3], [5, 0.5, 1.3]])
     at_corner = offset == (1, 1, 1)
-    with pytest.warns(sh.UnreachedWarning) if at_corner else contextlib.nullcontext():
+    with pytest.warns(sh.errors.UnreachedWarning) if at_corner else contextlib.nullcontext():
         phi = sh.SignedHeatSolver(surface).distance(belt).values
     second = (surface.vertices > 5.4).all(axis=1) if at_corner else np.zeros(len(phi), dtype=bool)
     shared = (surface.vertices == 5.5).all(axis=1)
@@ -164,8 +164,8 @@ def test_voxels_at_random_work():
     assert np.linalg.norm(normals, axis=1) == pytest.approx(1)
     try:
         phi = sh.SignedHeatSolver(surface).distance(start).values
-    except sh.UnreachedWarning:  # warnings are errors here; parts apart from the source are NaN
-        with pytest.warns(sh.UnreachedWarning):
+    except sh.errors.UnreachedWarning:  # warnings are errors here; parts apart from the source are NaN
+        with pytest.warns(sh.errors.UnreachedWarning):
             phi = sh.SignedHeatSolver(surface).distance(start).values
     assert np.isfinite(phi).sum() > 100
 
@@ -176,7 +176,7 @@ def test_two_balls_apart_only_reach_one():
     volume[:12], volume[12:] = small, small
     surface = sh.DigitalSurface(volume)
     curve = surface.polyline([[5.5, 1.4, 5.5], [5.5, 5.5, 9.6], [5.5, 9.6, 5.5]])
-    with pytest.warns(sh.UnreachedWarning):
+    with pytest.warns(sh.errors.UnreachedWarning):
         phi = sh.SignedHeatSolver(surface).distance(curve).values
     assert np.array_equal(np.isnan(phi), surface.vertices[:, 0] > 11.5)
 
@@ -217,5 +217,5 @@ def test_volumes_come_from_files(tmp_path):
     ],
 )
 def test_what_is_no_volume_is_refused(arguments, element):
-    with refused(sh.GeometryError, element):
+    with refused(sh.errors.GeometryError, element):
         sh.DigitalSurface(**arguments)

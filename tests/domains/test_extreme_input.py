@@ -60,7 +60,7 @@ def no_warnings():
     ],
 )
 def test_sizes_beyond_computing_are_refused(make, scale):
-    with pytest.raises(sh.GeometryError) as caught:
+    with pytest.raises(sh.errors.GeometryError) as caught:
         make(scale)
     assert caught.value.remedy or f"{scale:g}" in caught.value.cause
 
@@ -110,7 +110,7 @@ def test_sizes_within_give_the_same_distances(scale):
     ],
 )
 def test_what_holds_no_numbers_is_refused(make, thing):
-    with pytest.raises(sh.SignedHeatError) as caught:
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
         make(thing)
     assert len(caught.value.cause) > 15
 
@@ -137,7 +137,7 @@ def test_anisotropic_voxels_need_no_cube_of_padding():
 )
 def test_level_sets_need_a_value_for_each_vertex(make):
     surface = make()
-    with pytest.raises(sh.SourceError):
+    with pytest.raises(sh.errors.SourceError):
         surface.level_set(np.zeros(surface.n_vertices + 1))
 
 
@@ -149,7 +149,7 @@ def test_no_distance_without_area(points):
         lambda: sh.SignedHeatSolver(mesh, intrinsic=True).distance(mesh.points_at(0)),
         lambda: mesh.polyline([points[0], points[1]]),
     ):
-        with pytest.raises(sh.GeometryError):
+        with pytest.raises(sh.errors.GeometryError):
             use()
 
 
@@ -174,7 +174,7 @@ def test_intrinsic_triangulations_keep_the_area_or_refuse(flatness, refine):
     try:
         squashed = sh.TriangleMesh(square(5, 0.2).vertices * [1.0, flatness, 1.0], square(5).faces)
         made = sh.intrinsic_delaunay(squashed, refine=refine, max_vertices=500)
-    except sh.GeometryError as error:
+    except sh.errors.GeometryError as error:
         assert flatness < 1e-6 and error.element == "faces"
     else:
         assert made.triangles.face_areas.sum() == pytest.approx(squashed.face_areas.sum(), rel=1e-4)
@@ -204,12 +204,12 @@ def test_the_convex_method_stays_bounded_where_the_field_is_constant(scale):
 
 @pytest.mark.parametrize("origin", [1e16, -1e16, 1e20])
 def test_grids_whose_spacing_is_lost_in_rounding_are_refused(origin):
-    with pytest.raises(sh.GeometryError) as caught:
+    with pytest.raises(sh.errors.GeometryError) as caught:
         sh.Grid((0, origin, 0), 1.0, (4, 4, 4))
     assert caught.value.element == "spacing" and caught.value.remedy
-    with refused(sh.GeometryError, "spacing"):
+    with refused(sh.errors.GeometryError, "spacing"):
         sh.DigitalSurface(np.ones((2, 2, 2), dtype=bool), origin=(0, origin, 0))
-    with pytest.raises(sh.GeometryError):
+    with pytest.raises(sh.errors.GeometryError):
         sh.SignedHeatSolver(sh.Grid.around(sh.TriangleMesh(BALL.vertices + origin, BALL.faces), 16)).distance(
             sh.TriangleMesh(BALL.vertices + origin, BALL.faces)
         )
@@ -224,7 +224,7 @@ def test_flat_tets_among_others_do_no_harm():
     try:
         field = sh.SignedHeatSolver(flat).distance(source)
         sharp = sh.sharpen(field)
-    except sh.SignedHeatError as error:
+    except sh.errors.SignedHeatError as error:
         assert error.remedy or error.element
     else:
         assert np.isfinite(field.values).all() and np.isfinite(sharp.values).all()
@@ -257,7 +257,7 @@ def test_convex_sharpening_on_tets_holds_sources_of_any_size(area):
 
 def test_voxels_whose_corners_fall_together_are_refused():
     volume = np.random.default_rng(0).random((4, 4, 4)) < 0.5
-    with refused(sh.GeometryError, "spacing"):
+    with refused(sh.errors.GeometryError, "spacing"):
         sh.DigitalSurface(volume, 1e-12, [1e6, 1e6, 1e6])
 
 
@@ -265,7 +265,7 @@ def test_voxels_whose_corners_fall_together_are_refused():
 @pytest.mark.parametrize("value", [None, 1, "yes", np.zeros((2, 2, 2)), np.ma.masked_array([True], mask=True)])
 def test_flags_are_refused_in_one_line(name, value):
     mesh = sphere(1)
-    with refused(sh.SignedHeatError, name) as caught:
+    with refused(sh.errors.SignedHeatError, name) as caught:
         mesh.polyline(mesh.vertices[:3], **{name: value})
     assert "\n" not in str(caught.value)
 
@@ -279,7 +279,7 @@ def test_solids_of_any_size_are_the_same_or_refused(scale, whole):
     one = sh.signed_distance(sh.TriangleMesh(ball.vertices, faces), resolution=16)
     try:
         other = sh.signed_distance(sh.TriangleMesh(scale * ball.vertices, faces), resolution=16)
-    except sh.GeometryError as error:
+    except sh.errors.GeometryError as error:
         assert error.remedy and not 1e-15 <= scale <= 1e15
     else:
         np.testing.assert_allclose(other.values / scale, one.values, atol=1e-3)
@@ -302,5 +302,5 @@ def test_points_whose_squares_cannot_be_computed_are_refused():
     ball = sphere(2)
     field = sh.signed_distance(ball, resolution=12)
     for measure in (complete(ball).closest, complete(ball).distance, field.closest):
-        with pytest.raises(sh.GeometryError):
+        with pytest.raises(sh.errors.GeometryError):
             measure([[1e160, 0.0, 0.0]])

@@ -72,9 +72,9 @@ TAKERS = {
     "grid": lambda shape: sh.Grid.around(shape, 12).origin,
     "orient": lambda shape: sh.orient(shape).faces,
     "complete": lambda shape: sh.complete(shape).triangles,
-    "dilate": lambda shape: sh.dilate(shape, 0.2, resolution=16).vertices,
-    "shell": lambda shape: sh.shell(shape, -0.3, 0.3, resolution=16).vertices,
-    "thicken": lambda shape: sh.thicken(shape, 0.4, resolution=16).vertices,
+    "dilate": lambda shape: sh.morphology.dilate(shape, 0.2, resolution=16).vertices,
+    "shell": lambda shape: sh.morphology.shell(shape, -0.3, 0.3, resolution=16).vertices,
+    "thicken": lambda shape: sh.morphology.thicken(shape, 0.4, resolution=16).vertices,
     "tetrahedralize": lambda shape: sh.tetrahedralize(shape, resolution=2).vertices,
     "domain": lambda shape: sh.SignedHeatSolver(shape).distance(BALL.points_at(0)).values,
     "signed_distance of curves": lambda shape: sh.signed_distance(RING, shape).values,
@@ -99,8 +99,8 @@ def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
     for name, given in {"own": BALL, "trimesh": BALL.to_trimesh(), "arrays": (BALL.vertices, BALL.faces)}.items():
         sh.save(given, tmp_path / f"{name}.ply")
         assert np.array_equal(sh.read(tmp_path / f"{name}.ply").faces, BALL.faces)
-        sh.write_curves(tmp_path / f"{name}.txt", ARCS, given)
-        again = sh.read_curves(tmp_path / f"{name}.txt", given)
+        sh.io.write_curves(tmp_path / f"{name}.txt", ARCS, given)
+        again = sh.io.read_curves(tmp_path / f"{name}.txt", given)
         assert np.abs(places_of(again[1]) - places_of(ARCS[1])).max() < 1e-12
         view.save_scene(given, tmp_path / f"{name}.png")
         view.save_slices(sh.signed_distance(BALL, resolution=12), tmp_path / f"{name}-slices.png", given)
@@ -111,7 +111,7 @@ def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
         lambda: sh.save("ball", tmp_path / "ball.ply"),
         lambda: view.save_scene(3, tmp_path / "3.png"),
     ):
-        with refused(sh.UnsupportedTypeError):
+        with refused(sh.errors.UnsupportedTypeError):
             take()
 
 
@@ -154,9 +154,9 @@ def test_points_and_meshes_go_to_open3d_and_back():
     assert np.array_equal(again.points, cloud.points) and np.abs(again.normals - cloud.normals).max() < 1e-12
     tensors = open3d.t.geometry.TriangleMesh.from_legacy(BALL.to_open3d())
     assert np.array_equal(sh.as_shape(tensors).faces, BALL.faces)
-    with pytest.raises(sh.GeometryError):
+    with pytest.raises(sh.errors.GeometryError):
         CUBE.to_open3d()
-    with pytest.raises(sh.UnsupportedTypeError) as told:
+    with pytest.raises(sh.errors.UnsupportedTypeError) as told:
         sh.as_shape(open3d.geometry.LineSet())
     assert told.value.element == "LineSet" and told.value.remedy
 
@@ -165,10 +165,10 @@ def test_points_and_meshes_go_to_open3d_and_back():
 def test_what_is_no_shape_is_refused_with_a_remedy(take):
     lines = trimesh.load_path(np.array([[0.0, 0], [1, 1]]))
     for wrong in ("ball.stl", 3.0, lines):
-        with pytest.raises(sh.SignedHeatError) as told:
+        with pytest.raises(sh.errors.SignedHeatError) as told:
             take(wrong)
         assert told.value.remedy
-    with pytest.raises(sh.SignedHeatError) as told:
+    with pytest.raises(sh.errors.SignedHeatError) as told:
         take(trimesh.Scene())
     assert told.value.remedy
 
@@ -178,18 +178,18 @@ def test_volumes_lines_and_strips_of_pyvista_are_refused_with_a_remedy():
     image = pyvista.ImageData(dimensions=(3, 3, 3))
     for wrong in (image, image.cast_to_unstructured_grid(), pyvista.Line(), BALL.to_pyvista().strip()):
         for take in (sh.as_shape, sh.TriangleMesh.from_pyvista):
-            with pytest.raises(sh.SignedHeatError) as told:
+            with pytest.raises(sh.errors.SignedHeatError) as told:
                 take(wrong)
             assert told.value.remedy
 
 
 def test_wrong_arrays_are_told():
-    with pytest.raises(sh.GeometryError):
+    with pytest.raises(sh.errors.GeometryError):
         sh.signed_distance((BALL.vertices, BALL.faces + 1))
-    with pytest.raises(sh.GeometryError):
+    with pytest.raises(sh.errors.GeometryError):
         sh.as_shape((BALL.vertices * np.nan, BALL.faces))
     for no_pair in ((BALL.vertices, BALL.vertices), (BALL.faces,), (1.0, 2.0)):
-        with pytest.raises(sh.UnsupportedTypeError):
+        with pytest.raises(sh.errors.UnsupportedTypeError):
             sh.as_shape(no_pair)
 
 
@@ -201,7 +201,7 @@ def test_meshes_of_meshio_without_faces_are_points():
 @pytest.mark.parametrize(("thing", "named"), [("part.stl", "sh.read"), (np.zeros((4, 3)), "PointCloud")])
 def test_paths_and_bare_points_are_told_what_to_pass(thing, named):
     for take in (sh.signed_distance, sh.as_shape):
-        with refused(sh.SignedHeatError) as caught:
+        with refused(sh.errors.SignedHeatError) as caught:
             take(thing)
         assert named in caught.value.remedy
 
@@ -210,7 +210,7 @@ def test_paths_and_bare_points_are_told_what_to_pass(thing, named):
 def test_lines_and_other_cells_of_meshio_are_no_points(kind, corners):
     cells = meshio.Mesh(BALL.vertices, [(kind, np.arange(2 * corners).reshape(2, corners))])
     for take in (sh.as_shape, sh.signed_distance, sh.TriangleMesh.from_meshio):
-        with refused(sh.UnsupportedTypeError, "Mesh") as caught:
+        with refused(sh.errors.UnsupportedTypeError, "Mesh") as caught:
             take(cells)
         assert kind in caught.value.remedy
     assert sh.PointCloud.from_meshio(cells).n_points == BALL.n_vertices  # asked for
@@ -219,5 +219,5 @@ def test_lines_and_other_cells_of_meshio_are_no_points(kind, corners):
 def test_tets_of_meshio_that_are_no_rows_of_four_vertices_are_refused():
     mesh = meshio.Mesh(np.eye(4, 3), [("tetra", np.arange(4)[None])])
     mesh.cells[0].data = np.zeros((1, 8), dtype=int)
-    with refused(sh.GeometryError, "tets"):
+    with refused(sh.errors.GeometryError, "tets"):
         sh.TetMesh.from_meshio(mesh)

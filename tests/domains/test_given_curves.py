@@ -64,7 +64,7 @@ def test_points_of_elements_lie_where_they_should():
     one = sh.signed_distance(elements, BALL, as_oriented=True)
     for same in ([elements], curve_of_elements(BALL, elements)):
         np.testing.assert_array_equal(one.values, sh.signed_distance(same, BALL, as_oriented=True).values)
-    with refused(sh.SourceError, "point 1"):
+    with refused(sh.errors.SourceError, "point 1"):
         sh.signed_distance([(3, []), (10**6, [0.5])], BALL)
 
 
@@ -73,7 +73,7 @@ def test_positions_of_curves():
     np.testing.assert_array_equal(BALL.positions(BALL.points_at([4, 9])), BALL.vertices[[4, 9]])
     cloud = sh.PointCloud(BALL.vertices)
     np.testing.assert_array_equal(cloud.positions(cloud.path([4, 9])), BALL.vertices[[4, 9]])
-    with refused(sh.SourceError, "point 0"):
+    with refused(sh.errors.SourceError, "point 0"):
         BALL.positions(sh.SurfacePoints([10**6], [[1, 0, 0]]))
 
 
@@ -92,25 +92,25 @@ def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):
     np.testing.assert_array_equal(alone.values, with_click.values)
     assert with_click.diagnostics.note(WithoutLength).without_length.tolist() == [1]
     assert alone.diagnostics.note(WithoutLength) is None
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         measure(BALL, click)
 
 
 def test_what_is_misplaced_is_named():
-    with refused(sh.UnsupportedTypeError):
+    with refused(sh.errors.UnsupportedTypeError):
         sh.signed_distance(BALL, RING)
-    with refused(sh.UnsupportedTypeError, "band"):
+    with refused(sh.errors.UnsupportedTypeError, "band"):
         sh.signed_distance(RING, BALL, band=0.1)
     for intrinsic in ("yes", 3, None):
-        with refused(sh.SignedHeatError, "intrinsic"):
+        with refused(sh.errors.SignedHeatError, "intrinsic"):
             sh.signed_distance(RING, BALL, intrinsic=intrinsic)
 
 
 def test_masks_are_not_ignored():
     hidden = np.ma.masked_greater(BALL.vertices, 0.9)
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.as_shape((hidden, BALL.faces))
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.signed_distance((BALL.vertices, np.ma.masked_equal(BALL.faces, 3)), resolution=8)
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.VertexField(BALL, hidden[:, 0])

@@ -59,7 +59,7 @@ def test_a_gap_in_a_coast_is_closed(globe, tmp_path, capsys):
     far = np.abs(latitude - 40) > 12
     assert ((phi > 0) == (latitude > 40))[far].all()
     assert main(["close", *arguments[:3], str(tmp_path / "whole.json"), "--globe"]) == 0
-    curves = sh.read_curves(tmp_path / "whole.json", globe)
+    curves = sh.io.read_curves(tmp_path / "whole.json", globe)
     assert len(curves) == 1 and curves[0].closed
 
 
@@ -70,7 +70,7 @@ def test_geojson_land_is_positive_whichever_way_its_rings_run(globe, tmp_path):
         feature = {"type": "Feature", "geometry": {"type": "MultiPolygon", "coordinates": [polygon]}}
         text = json.dumps({"type": "FeatureCollection", "features": [feature, {"type": "Feature", "geometry": None}]})
         (tmp_path / f"{name}.geojson").write_text(text)
-        curves = sh.read_globe_curves(tmp_path / f"{name}.geojson", globe)
+        curves = sh.io.read_globe_curves(tmp_path / f"{name}.geojson", globe)
         assert [curve.closed for curve in curves] == [True, True]
         phi = sh.SignedHeatSolver(globe).distance(curves).values
         longitude, latitude = places(globe)
@@ -86,15 +86,15 @@ def test_what_is_no_curve_on_a_globe_is_refused(globe, tmp_path):
         ([[0, 10], [0, 10]], "1 points"),
         ([[0, 0, 0], [1, 1, 1]], "points"),
     ):
-        with pytest.raises(sh.SourceError) as caught:
+        with pytest.raises(sh.errors.SourceError) as caught:
             sh.globe_curve(globe, wrong)
         assert caught.value.element == element
-    with pytest.raises(sh.SourceError):
+    with pytest.raises(sh.errors.SourceError):
         sh.globe_curve(samples.torus(n_around=12, n_across=6), [[0, 0], [10, 0]])
     for name, text in (("a.geojson", "[1, 2]"), ("b.geojson", '{"type": "Point"}'), ("c.geojson", "{"), ("d.svg", "x")):
         (tmp_path / name).write_text(text)
-        with pytest.raises(sh.FileFormatError) as caught:
-            sh.read_globe_curves(tmp_path / name, globe)
+        with pytest.raises(sh.errors.FileFormatError) as caught:
+            sh.io.read_globe_curves(tmp_path / name, globe)
         assert caught.value.path == str(tmp_path / name)
     west_is_east = sh.globe_curve(globe, [[170, 0], [180, 0], [-180, 0], [-170, 0]])
     assert len(west_is_east.faces) > 2
@@ -110,7 +110,7 @@ def test_a_globe_may_be_of_quadrangles_and_of_another_package():
     given = sh.globe_curve(triangles.to_trimesh(), parallel(30.0), closed=True)
     assert np.array_equal(given.barycentric, sh.globe_curve(triangles, parallel(30.0), closed=True).barycentric)
     for no_mesh in (samples.oriented_points(triangles, 50), sh.Grid((0, 0, 0), 1.0, (3, 3, 3))):
-        with refused(sh.UnsupportedTypeError, "mesh"):
+        with refused(sh.errors.UnsupportedTypeError, "mesh"):
             sh.globe_curve(no_mesh, parallel(0.0))
 
 
@@ -118,8 +118,8 @@ def test_curves_are_written_in_longitude_and_latitude(tmp_path):
     globe = samples.sphere(4, 6371.0, (10.0, 20.0, 30.0))
     open_one = sh.globe_curve(globe, [[170, 10], [-170, 40], [-120, 60]])
     ring = sh.globe_curve(globe, [[0, 30], [120, 30], [240, 30]], closed=True)
-    sh.write_curves(tmp_path / "curves.geojson", [open_one, ring], globe)
-    back = sh.read_globe_curves(tmp_path / "curves.geojson", globe)
+    sh.io.write_curves(tmp_path / "curves.geojson", [open_one, ring], globe)
+    back = sh.io.read_globe_curves(tmp_path / "curves.geojson", globe)
     assert [curve.closed for curve in back] == [False, True]
     for one, other in zip((open_one, ring), back, strict=True):
         ends = globe.positions(one)[[0, -1]], globe.positions(other)[[0, -1]]
@@ -128,4 +128,4 @@ def test_curves_are_written_in_longitude_and_latitude(tmp_path):
     assert np.abs(field(ring)).max() < 60.0
     with pytest.raises(sh.errors.SourceError, match="no globe"):
         torus = samples.torus(n_around=12, n_across=6)
-        sh.write_curves(tmp_path / "torus.geojson", [torus.path([0, 1, 2])], torus)
+        sh.io.write_curves(tmp_path / "torus.geojson", [torus.path([0, 1, 2])], torus)

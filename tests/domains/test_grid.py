@@ -35,12 +35,12 @@ def test_unreferenced_vertices_take_no_room():
 
 @pytest.mark.parametrize("options", [{"resolution": 1}, {"padding": -1}, {"padding": np.nan}, {"spacing": 0.0}])
 def test_nonsense_is_refused(options):
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.Grid.around([[0, 0, 0], [1, 1, 1]], **options)
 
 
 def test_a_single_point_needs_padding():
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.Grid.around([[1, 1, 1], [1, 1, 1]], 8)
     assert sh.Grid.around([[1, 1, 1], [1, 1, 1]], 8, padding=1.0).shape == (8, 8, 8)
 

@@ -57,7 +57,7 @@ def test_curves_keep_their_length(data, mesh, refine):
     try:
         curve = sh.Curve(points.faces, points.barycentric)
         length = segments_of(curve, sh.intrinsic_delaunay(mesh).base, mesh.vertices).lengths.sum()
-    except sh.SourceError:  # points that coincide, or on different components
+    except sh.errors.SourceError:  # points that coincide, or on different components
         return
     better = sh.intrinsic_delaunay(mesh, refine=refine)
     assert abs(better.transfer(curve).lengths.sum() / length - 1) < 1e-6

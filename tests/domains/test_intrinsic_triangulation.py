@@ -364,7 +364,7 @@ def test_refinement_ends_on_anything(seed):
         soup = sh.TriangleMesh(vertices, rng.integers(0, n, (m, 3)))  # some faces with a corner twice
         try:
             better = sh.intrinsic_delaunay(soup, refine=True, max_vertices=800, coarsest=[1.4, np.inf][seed % 2])
-        except sh.GeometryError as refusal:  # lengths of edges no longer tell the area of the thinnest
+        except sh.errors.GeometryError as refusal:  # lengths of edges no longer tell the area of the thinnest
             assert refusal.remedy
             continue
         area, size = better.base.face_areas.sum(), better.base.edge_lengths.max()
@@ -399,34 +399,34 @@ def test_progress_and_cancelling():
 def test_what_cannot_be_done_is_said():
     mesh = square(4)
     for angle in 45, 0, -3, np.nan, np.inf, "28", [20]:
-        with refused(sh.GeometryError, "angle"):
+        with refused(sh.errors.GeometryError, "angle"):
             sh.intrinsic_delaunay(mesh, refine=True, angle=angle)
     for coarsest in 0.9, -1, np.nan, "fine", [2]:
-        with refused(sh.GeometryError, "coarsest"):
+        with refused(sh.errors.GeometryError, "coarsest"):
             sh.intrinsic_delaunay(mesh, refine=True, coarsest=coarsest)
     for limit in 0, -1, np.nan, np.inf, "many", [9]:
-        with refused(sh.GeometryError, "max_vertices"):
+        with refused(sh.errors.GeometryError, "max_vertices"):
             sh.intrinsic_delaunay(mesh, refine=True, max_vertices=limit)
     for domain in sh.PolygonMesh(mesh.vertices, mesh.faces.tolist()), sh.intrinsic_delaunay(mesh), None:
-        with refused(sh.GeometryError, "domain"):
+        with refused(sh.errors.GeometryError, "domain"):
             sh.intrinsic_delaunay(domain)
-        with refused(sh.GeometryError, "domain"):
+        with refused(sh.errors.GeometryError, "domain"):
             sh.SignedHeatSolver(domain, intrinsic=True).distance(mesh.path([0, 1]))
     for nothing in (np.ones((3, 3)), [[0, 0, 0], [1, 0.1, 0.3], [2, 0.2, 0.6]], np.eye(3) + 1e18):
-        with refused(sh.GeometryError, "faces"):
+        with refused(sh.errors.GeometryError, "faces"):
             sh.intrinsic_delaunay(sh.TriangleMesh(nothing, [[0, 1, 2]]))
-    with refused(sh.SourceError, "face 1000"):
+    with refused(sh.errors.SourceError, "face 1000"):
         sh.intrinsic_delaunay(mesh, keep=sh.Curve([1000, 0], np.eye(3)[:2]))
     for keep in "curve", np.zeros(3), [None], 3:
-        with refused(sh.SourceError, "source 0"):
+        with refused(sh.errors.SourceError, "source 0"):
             sh.intrinsic_delaunay(mesh, keep=keep)
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.common_subdivision(mesh)
     better = sh.intrinsic_delaunay(mesh)
-    with refused(sh.GeometryError, "number 0"):
+    with refused(sh.errors.GeometryError, "number 0"):
         better.locate([0], [[np.nan, 0, 1]])
     for face in -1, mesh.n_faces:
-        with refused(sh.GeometryError, "point 0"):
+        with refused(sh.errors.GeometryError, "point 0"):
             better.locate([face], [[1, 0, 0]])
 
 

@@ -176,7 +176,7 @@ def test_outliers_get_no_distance_and_disturb_no_one():
     points, ids, exact = sphere_with_circle(1500)
     far = np.array([[3.0, 0, 0], [0, 2.5, 0], [0.1, 0, 0.1]])
     cloud = sh.PointCloud(np.concatenate([points, far]))
-    with pytest.warns(sh.UnreachedWarning):
+    with pytest.warns(sh.errors.UnreachedWarning):
         field = sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True))
     assert np.isnan(field.values[-3:]).all()
     assert cases.error(field.values[:-3], exact) < 2e-3
@@ -216,7 +216,7 @@ def test_a_mobius_strip_of_points_is_like_one_of_triangles():
     ],
 )
 def test_clouds_that_are_no_surface_are_refused(points):
-    with refused(sh.GeometryError, "points"):
+    with refused(sh.errors.GeometryError, "points"):
         sh.SignedHeatSolver(sh.PointCloud(points)).distance([sh.SurfacePoints([0], [[1, 0, 0]])])
 
 

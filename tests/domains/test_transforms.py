@@ -51,14 +51,14 @@ def test_normals_and_areas_of_points_are_those_of_their_planes(kind):
 def test_what_is_no_map_is_refused():
     ball = samples.sphere(0)
     for wrong in (np.eye(3), np.diag([1, 1, 0, 1]), np.diag([1, 1, 1, 2]), np.full((3, 4), np.nan)):
-        with pytest.raises(sh.GeometryError):
+        with pytest.raises(sh.errors.GeometryError):
             sh.transform(ball, wrong)
 
 
 @pytest.mark.parametrize("entry", [np.nan, np.inf, 1e60, 1e308, "a", None])
 def test_matrices_beyond_numbers_are_refused_without_a_warning(entry):
     ball = samples.sphere(1)
-    with pytest.raises(sh.GeometryError):
+    with pytest.raises(sh.errors.GeometryError):
         sh.transform(ball, np.full((3, 4), entry))
-    with pytest.raises(sh.GeometryError):
+    with pytest.raises(sh.errors.GeometryError):
         sh.transform(ball, [[entry, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]])

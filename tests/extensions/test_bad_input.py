@@ -21,11 +21,13 @@ HEIGHT = sh.VertexField(BALL, BALL.vertices[:, 2])
 NAN, INF = float("nan"), float("inf")
 
 
-def case(name, *arguments, error=sh.SignedHeatError, **keywords):
+def case(name, *arguments, error=sh.errors.SignedHeatError, **keywords):
     return pytest.param(arguments, keywords, error, id=name)
 
 
-@pytest.mark.parametrize("operation", [sh.dilate, sh.erode, sh.opening, sh.closing])
+@pytest.mark.parametrize(
+    "operation", [sh.morphology.dilate, sh.morphology.erode, sh.morphology.opening, sh.morphology.closing]
+)
 @pytest.mark.parametrize(
     ("arguments", "keywords", "error"),
     [
@@ -35,19 +37,19 @@ def case(name, *arguments, error=sh.SignedHeatError, **keywords):
         case("must be a number, not 'x'", BALL, "x"),
         case("must be a number, not None", BALL, None),
         case("must be a number", BALL, [0.1, 0.2]),
-        case("there is no source", [], 0.1, error=sh.SourceError),
-        case("there is no source", [], 0.1, BALL, error=sh.SourceError),
-        case("not to a NoneType", None, 0.1, error=sh.SourceError),
-        case("not to a VertexField", HEIGHT, 0.1, error=sh.SourceError),
-        case("pass that surface as the domain", RING, 0.1, error=sh.SourceError),
-        case("whole number of at least 2", BALL, 0.1, resolution=1, error=sh.GeometryError),
-        case("lower resolution", BALL, 0.1, resolution=100_000, error=sh.MemoryLimitError),
-        case("is not a domain", BALL, 0.1, "grid", error=sh.UnsupportedTypeError),
-        case("3 dimensions, and the grid in 2", BALL, 0.1, PLANE, error=sh.SourceError),
-        case("measured to a Curve", BALL, 0.1, BALL, error=sh.SourceError),
-        case("not to a Curve", RING, 0.1, GRID, error=sh.SourceError),
-        case("level -?9", RING, 9.0, BALL, error=sh.OutsideError),
-        case("leaves the grid|level -?5", BALL, 5.0, GRID, error=sh.OutsideError),
+        case("there is no source", [], 0.1, error=sh.errors.SourceError),
+        case("there is no source", [], 0.1, BALL, error=sh.errors.SourceError),
+        case("not to a NoneType", None, 0.1, error=sh.errors.SourceError),
+        case("not to a VertexField", HEIGHT, 0.1, error=sh.errors.SourceError),
+        case("pass that surface as the domain", RING, 0.1, error=sh.errors.SourceError),
+        case("whole number of at least 2", BALL, 0.1, resolution=1, error=sh.errors.GeometryError),
+        case("lower resolution", BALL, 0.1, resolution=100_000, error=sh.errors.MemoryLimitError),
+        case("is not a domain", BALL, 0.1, "grid", error=sh.errors.UnsupportedTypeError),
+        case("3 dimensions, and the grid in 2", BALL, 0.1, PLANE, error=sh.errors.SourceError),
+        case("measured to a Curve", BALL, 0.1, BALL, error=sh.errors.SourceError),
+        case("not to a Curve", RING, 0.1, GRID, error=sh.errors.SourceError),
+        case("level -?9", RING, 9.0, BALL, error=sh.errors.OutsideError),
+        case("leaves the grid|level -?5", BALL, 5.0, GRID, error=sh.errors.OutsideError),
     ],
 )
 def test_growing_and_shrinking(operation, arguments, keywords, error):
@@ -64,17 +66,17 @@ def test_growing_and_shrinking(operation, arguments, keywords, error):
         case("inner < outer, not 1 and 0: swap", BALL, 1, 0),
         case("inner < outer", BALL, 0, 0),
         case("raise the resolution", BALL, 0, 0.01, resolution=24),
-        case("not to a NoneType", None, 0, 0.3, error=sh.SourceError),
-        case("there is no source", [], 0, 0.3, error=sh.SourceError),
-        case("pass that surface", RING[0], 0, 0.3, error=sh.SourceError),
-        case("not on a TriangleMesh", BALL, 0, 0.3, BALL, error=sh.UnsupportedTypeError),
-        case("not on a TetMesh", BALL, 0, 0.3, BOX, error=sh.UnsupportedTypeError),
-        case("3 dimensions, and the grid in 2", BALL, 0, 0.3, PLANE, error=sh.SourceError),
+        case("not to a NoneType", None, 0, 0.3, error=sh.errors.SourceError),
+        case("there is no source", [], 0, 0.3, error=sh.errors.SourceError),
+        case("pass that surface", RING[0], 0, 0.3, error=sh.errors.SourceError),
+        case("not on a TriangleMesh", BALL, 0, 0.3, BALL, error=sh.errors.UnsupportedTypeError),
+        case("not on a TetMesh", BALL, 0, 0.3, BOX, error=sh.errors.UnsupportedTypeError),
+        case("3 dimensions, and the grid in 2", BALL, 0, 0.3, PLANE, error=sh.errors.SourceError),
     ],
 )
 def test_shell(arguments, keywords, error):
     with refused(error):
-        sh.shell(*arguments, **keywords)
+        sh.morphology.shell(*arguments, **keywords)
 
 
 @pytest.mark.parametrize(
@@ -86,30 +88,30 @@ def test_shell(arguments, keywords, error):
         case("reach above must be a number", BALL, None),
         case("by nothing", BALL, 0),
         case("raise the resolution", BALL, 0.01, resolution=24),
-        case("there is no source", [], 0.3, error=sh.SourceError),
-        case("a PointCloud has none", POINTS, 0.3, resolution=24, error=sh.SourceError),
-        case("a Polyline has none", sh.Polyline([[0, 0], [1, 0]]), 0.3, resolution=24, error=sh.SourceError),
-        case("not on a TetMesh", BALL, 0.3, None, BOX, error=sh.UnsupportedTypeError),
-        case("2 dimensions of the grid", BALL, 1.0, None, PLANE, error=sh.SourceError),
+        case("there is no source", [], 0.3, error=sh.errors.SourceError),
+        case("a PointCloud has none", POINTS, 0.3, resolution=24, error=sh.errors.SourceError),
+        case("a Polyline has none", sh.Polyline([[0, 0], [1, 0]]), 0.3, resolution=24, error=sh.errors.SourceError),
+        case("not on a TetMesh", BALL, 0.3, None, BOX, error=sh.errors.UnsupportedTypeError),
+        case("2 dimensions of the grid", BALL, 1.0, None, PLANE, error=sh.errors.SourceError),
     ],
 )
 def test_thicken(arguments, keywords, error):
     with refused(error):
-        sh.thicken(*arguments, **keywords)
+        sh.morphology.thicken(*arguments, **keywords)
 
 
 @pytest.mark.parametrize(
     ("arguments", "keywords", "error"),
     [
         *(
-            case(f"not a {type(domain).__name__}", domain, RING, error=sh.UnsupportedTypeError)
+            case(f"not a {type(domain).__name__}", domain, RING, error=sh.errors.UnsupportedTypeError)
             for domain in (None, POINTS, GRID, BOX, sh.DigitalSurface(np.ones((2, 2, 2), bool)))
         ),
-        case("there is no source", BALL, [], error=sh.SourceError),
-        case("no empty lists", BALL, [[]], error=sh.SourceError),
-        case("source 0 is a NoneType", BALL, None, error=sh.SourceError),
-        case("source 0 is a TriangleMesh", BALL, BALL, error=sh.SourceError),
-        case("another mesh", BALL, sh.Curve([9999, 9999], [[1, 0, 0], [0, 1, 0]]), error=sh.SourceError),
+        case("there is no source", BALL, [], error=sh.errors.SourceError),
+        case("no empty lists", BALL, [[]], error=sh.errors.SourceError),
+        case("source 0 is a NoneType", BALL, None, error=sh.errors.SourceError),
+        case("source 0 is a TriangleMesh", BALL, BALL, error=sh.errors.SourceError),
+        case("another mesh", BALL, sh.Curve([9999, 9999], [[1, 0, 0], [0, 1, 0]]), error=sh.errors.SourceError),
         case("diffusion must be finite", BALL, RING, diffusion=NAN),
         case("diffusion must be positive", BALL, RING, diffusion=-1),
         case("diffusion must be a number", BALL, RING, diffusion="x"),
@@ -120,7 +122,7 @@ def test_thicken(arguments, keywords, error):
             "no area",
             sh.TriangleMesh([[0, 0, 0]] * 3, [[0, 1, 2]]),
             sh.Curve([0, 0], [[1, 0, 0], [0, 1, 0]]),
-            error=sh.GeometryError,
+            error=sh.errors.GeometryError,
         ),
     ],
 )
@@ -132,17 +134,17 @@ def test_piecewise_distance(arguments, keywords, error):
 @pytest.mark.parametrize(
     ("arguments", "keywords", "error"),
     [
-        case("is not a domain", None, RING, error=sh.UnsupportedTypeError),
-        case("not to a Curve", GRID, RING, error=sh.SourceError),
-        case("there is no source", BALL, [], error=sh.SourceError),
-        case("source 0 is a NoneType", BALL, None, error=sh.SourceError),
-        case("source 0 is a TriangleMesh", BALL, BALL, error=sh.SourceError),
-        case("orient the curves", BALL, BALL.path([0, 5], oriented=False), error=sh.SourceError),
-        case("orient the curves", BALL, BALL.points_at([3]), error=sh.SourceError),
+        case("is not a domain", None, RING, error=sh.errors.UnsupportedTypeError),
+        case("not to a Curve", GRID, RING, error=sh.errors.SourceError),
+        case("there is no source", BALL, [], error=sh.errors.SourceError),
+        case("source 0 is a NoneType", BALL, None, error=sh.errors.SourceError),
+        case("source 0 is a TriangleMesh", BALL, BALL, error=sh.errors.SourceError),
+        case("orient the curves", BALL, BALL.path([0, 5], oriented=False), error=sh.errors.SourceError),
+        case("orient the curves", BALL, BALL.points_at([3]), error=sh.errors.SourceError),
         case("diffusion must be finite", BALL, RING, diffusion=NAN),
-        case("is not a constraint", BALL, RING, constraint="zero", error=sh.UnsupportedTypeError),
-        case("is not a constraint", BALL, RING, constraint=sh.ZeroSet, error=sh.UnsupportedTypeError),
-        case("3 level values", BALL, RING, constraint=sh.LevelValues([0, 1, 2]), error=sh.ConstraintError),
+        case("is not a constraint", BALL, RING, constraint="zero", error=sh.errors.UnsupportedTypeError),
+        case("is not a constraint", BALL, RING, constraint=sh.ZeroSet, error=sh.errors.UnsupportedTypeError),
+        case("3 level values", BALL, RING, constraint=sh.LevelValues([0, 1, 2]), error=sh.errors.ConstraintError),
     ],
 )
 def test_close_curves(arguments, keywords, error):
@@ -162,23 +164,35 @@ ROUND = np.linalg.norm(GRID.points, axis=-1) - 1
 @pytest.mark.parametrize(
     ("arguments", "keywords", "error"),
     [
-        case("a NoneType cannot be sharpened", None, error=sh.UnsupportedTypeError),
-        case("a TriangleMesh cannot be sharpened", BALL, error=sh.UnsupportedTypeError),
-        case("a PiecewiseField cannot be sharpened", sh.piecewise_distance(BALL, RING), error=sh.UnsupportedTypeError),
-        case("cannot be sharpened", sh.GridField(GRID, with_one(ROUND, INF)), error=sh.GeometryError),
-        case("one sign", sh.GridField(GRID, 0 * ROUND + 1), error=sh.OutsideError),
-        case("infinite at vertex 5", sh.VertexField(BALL, with_one(BALL.vertices[:, 2], INF)), error=sh.GeometryError),
-        case("no value anywhere", sh.VertexField(BALL, np.full(BALL.n_vertices, NAN)), error=sh.OutsideError),
-        case("values of shape", sh.VertexField(BALL, np.ones(3)), error=sh.GeometryError),
-        case("values of shape", sh.VertexField(BALL, np.full(BALL.n_vertices, "x")), error=sh.GeometryError),
-        case("one sign", sh.VertexField(BALL, np.zeros(BALL.n_vertices)), error=sh.OutsideError),
-        case("infinite at vertex 5", sh.TetField(BOX, with_one(BOX.vertices[:, 2], INF)), error=sh.GeometryError),
-        case("no value anywhere", sh.TetField(BOX, np.full(BOX.n_vertices, NAN)), error=sh.OutsideError),
-        case("one sign", sh.TetField(BOX, np.zeros(BOX.n_vertices)), error=sh.OutsideError),
-        case("comes without one", HEIGHT, method=sh.Convex(), error=sh.SourceError),
-        case("comes without one", sh.TetField(BOX, BOX.vertices[:, 0]), method=sh.Convex(), error=sh.SourceError),
-        case("no method of sharpening", HEIGHT, method="convex", error=sh.UnsupportedTypeError),
-        case("no method of sharpening", HEIGHT, method=sh.Convex, error=sh.UnsupportedTypeError),
+        case("a NoneType cannot be sharpened", None, error=sh.errors.UnsupportedTypeError),
+        case("a TriangleMesh cannot be sharpened", BALL, error=sh.errors.UnsupportedTypeError),
+        case(
+            "a PiecewiseField cannot be sharpened",
+            sh.piecewise_distance(BALL, RING),
+            error=sh.errors.UnsupportedTypeError,
+        ),
+        case("cannot be sharpened", sh.GridField(GRID, with_one(ROUND, INF)), error=sh.errors.GeometryError),
+        case("one sign", sh.GridField(GRID, 0 * ROUND + 1), error=sh.errors.OutsideError),
+        case(
+            "infinite at vertex 5",
+            sh.VertexField(BALL, with_one(BALL.vertices[:, 2], INF)),
+            error=sh.errors.GeometryError,
+        ),
+        case("no value anywhere", sh.VertexField(BALL, np.full(BALL.n_vertices, NAN)), error=sh.errors.OutsideError),
+        case("values of shape", sh.VertexField(BALL, np.ones(3)), error=sh.errors.GeometryError),
+        case("values of shape", sh.VertexField(BALL, np.full(BALL.n_vertices, "x")), error=sh.errors.GeometryError),
+        case("one sign", sh.VertexField(BALL, np.zeros(BALL.n_vertices)), error=sh.errors.OutsideError),
+        case(
+            "infinite at vertex 5", sh.TetField(BOX, with_one(BOX.vertices[:, 2], INF)), error=sh.errors.GeometryError
+        ),
+        case("no value anywhere", sh.TetField(BOX, np.full(BOX.n_vertices, NAN)), error=sh.errors.OutsideError),
+        case("one sign", sh.TetField(BOX, np.zeros(BOX.n_vertices)), error=sh.errors.OutsideError),
+        case("comes without one", HEIGHT, method=sh.Convex(), error=sh.errors.SourceError),
+        case(
+            "comes without one", sh.TetField(BOX, BOX.vertices[:, 0]), method=sh.Convex(), error=sh.errors.SourceError
+        ),
+        case("no method of sharpening", HEIGHT, method="convex", error=sh.errors.UnsupportedTypeError),
+        case("no method of sharpening", HEIGHT, method=sh.Convex, error=sh.errors.UnsupportedTypeError),
     ],
 )
 def test_sharpen(arguments, keywords, error):
@@ -205,15 +219,15 @@ def test_methods_are_for_surfaces_and_tets():
     ],
 )
 def test_methods(make):
-    with refused(sh.SignedHeatError):
+    with refused(sh.errors.SignedHeatError):
         make()
 
 
 @pytest.fixture
 def folder(tmp_path):
     BALL.save(tmp_path / "ball.ply")
-    sh.write_curves(tmp_path / "ring.txt", RING, BALL)
-    sh.write_curves(tmp_path / "points.txt", [BALL.points_at([3])], BALL)
+    sh.io.write_curves(tmp_path / "ring.txt", RING, BALL)
+    sh.io.write_curves(tmp_path / "points.txt", [BALL.points_at([3])], BALL)
     for name in ("ball.ply", "ring.txt"):
         whole = (tmp_path / name).read_bytes()
         (tmp_path / f"cut-{name}").write_bytes(whole[: len(whole) * 2 // 3])
@@ -289,5 +303,5 @@ def test_commands(folder, monkeypatch, capsys, words, status, message):
 
 
 def test_curves_are_not_measured_on_grids():
-    with refused(sh.SourceError, "source 0"):
+    with refused(sh.errors.SourceError, "source 0"):
         sh.signed_distance(RING, GRID)

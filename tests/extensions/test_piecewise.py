@@ -217,7 +217,7 @@ def test_intrinsic_triangulation_equals_the_mesh():
     assert intrinsic.diagnostics.note(Jumps).cut_length == pytest.approx(plain.diagnostics.note(Jumps).cut_length)
     split = intrinsic.split()
     assert split.domain.n_vertices == plain.split().domain.n_vertices
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         _ = intrinsic.face_gradients
 
 
@@ -320,7 +320,7 @@ def test_parts_without_source_are_nan():
     both = sh.TriangleMesh(
         np.concatenate([mesh.vertices, mesh.vertices + 5]), np.concatenate([mesh.faces, mesh.faces + mesh.n_vertices])
     )
-    with pytest.warns(sh.UnreachedWarning):
+    with pytest.warns(sh.errors.UnreachedWarning):
         phi = sh.piecewise_distance(both, both.path(range(20), closed=True))
     assert np.isnan(phi.values[mesh.n_faces :]).all() and np.isfinite(phi.values[: mesh.n_faces]).all()
     assert np.array_equal(phi.diagnostics.unreached, np.arange(mesh.n_faces, 2 * mesh.n_faces))
@@ -383,10 +383,10 @@ def test_bad_domain_and_source():
     with refused(TypeError, "domain"):
         sh.piecewise_distance(sh.PointCloud(np.eye(3)), [])
     mesh = sphere(1)
-    with pytest.raises(sh.SourceError):
+    with pytest.raises(sh.errors.SourceError):
         sh.piecewise_distance(mesh, [])
     across = sh.Curve([0, 0], [[0.2, 0.3, 0.5], [0.5, 0.3, 0.2]], oriented=False)
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         sh.piecewise_distance(sh.intrinsic_delaunay(mesh), across)
 
 
@@ -450,7 +450,7 @@ def test_triangles_on_which_slopes_mean_nothing_are_told():
         np.concatenate([points, points + np.array([0, 0, height])]), np.concatenate([*sides, caps[:, ::-1], caps + n])
     )
     section = mesh.level_set(mesh.vertices @ [0.3, 0, 1], 0.45 * height)
-    with pytest.warns(sh.InexactWarning):
+    with pytest.warns(sh.errors.InexactWarning):
         rough = sh.piecewise_distance(mesh, section, intrinsic=False, smoothing=None)
     fine = sh.piecewise_distance(mesh, section)
     errors = [phi.diagnostics.note(Jumps).integration_error for phi in (rough, fine)]
@@ -614,5 +614,5 @@ def test_unoriented_curve_along_edges_of_bad_triangles():
 @pytest.mark.parametrize("slack", [-0.1, np.nan, "much"])
 def test_bad_slack(slack):
     mesh = sphere(1)
-    with refused(sh.SignedHeatError, "slack"):
+    with refused(sh.errors.SignedHeatError, "slack"):
         sh.piecewise_distance(mesh, mesh.path([0, mesh.faces[0, 1]]), slack=slack)

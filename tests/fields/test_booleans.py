@@ -52,14 +52,14 @@ def test_blends_differ_from_sets_within_their_width_alone(width):
     near = np.abs(A.values - B.values) < width - 1e-6
     far = np.abs(A.values - B.values) >= width
     for smooth, sharp, sign in (
-        (sh.smooth_union(A, B, width), A | B, -1),
-        (sh.smooth_intersection(A, B, width), A & B, 1),
+        (sh.morphology.smooth_union(A, B, width), A | B, -1),
+        (sh.morphology.smooth_intersection(A, B, width), A & B, 1),
     ):
         change = sign * (smooth.values - sharp.values)
         assert (change[far] == 0).all() and (change[near] > 0).all()
         assert change.max() <= width / 4 + 1e-12
     near, far = np.abs(A.values + B.values) < width - 1e-6, np.abs(A.values + B.values) >= width
-    change = sh.smooth_difference(A, B, width).values - (A - B).values
+    change = sh.morphology.smooth_difference(A, B, width).values - (A - B).values
     assert (change[far] == 0).all() and (change[near] > 0).all()
 
 
@@ -68,7 +68,9 @@ def test_blends_have_no_edge():
     line = np.stack([np.linspace(-0.6, 0.6, 241), np.full(241, 0.95)], axis=1)
     grid = sh.Grid((-2, -2), 0.01, (401, 401))
     left, right = ball(-0.5, grid=grid), ball(0.5, grid=grid)
-    kinks = [np.abs(np.diff(field(line), 2)).max() for field in (left | right, sh.smooth_union(left, right, 0.5))]
+    kinks = [
+        np.abs(np.diff(field(line), 2)).max() for field in (left | right, sh.morphology.smooth_union(left, right, 0.5))
+    ]
     assert kinks[0] > 5 * kinks[1]
 
 
@@ -98,17 +100,17 @@ def test_what_held_for_the_source_is_not_carried_on():
 
 def test_fields_of_different_domains_are_refused():
     shifted = sh.GridField(sh.Grid(GRID.origin + 0.05, GRID.spacing, GRID.shape), A.values)
-    with pytest.raises(sh.GeometryError) as told:
+    with pytest.raises(sh.errors.GeometryError) as told:
         A | shifted
     assert told.value.remedy and told.value.element == "second field"
     mesh = samples.sphere(1)
-    with pytest.raises(sh.UnsupportedTypeError) as told:
+    with pytest.raises(sh.errors.UnsupportedTypeError) as told:
         A - sh.VertexField(mesh, mesh.vertices[:, 0])
     assert told.value.element == "VertexField"
-    with pytest.raises(sh.SignedHeatError):
-        sh.smooth_union(A, B, -1.0)
-    with pytest.raises(sh.GeometryError):
-        sh.smooth_difference(A, shifted, 0.1)
+    with pytest.raises(sh.errors.SignedHeatError):
+        sh.morphology.smooth_union(A, B, -1.0)
+    with pytest.raises(sh.errors.GeometryError):
+        sh.morphology.smooth_difference(A, shifted, 0.1)
 
 
 def test_equal_grids_made_twice_are_one_domain():
@@ -122,6 +124,6 @@ def test_bands_are_combined_where_they_are_the_same():
     points = np.array([[0.9, 0.1, 0.0], [1.1, 0.0, 0.1]])
     np.testing.assert_allclose((~band).interpolate(points), -band.interpolate(points), rtol=1e-6)
     for wrong in (lambda: band - A, lambda: A & band):
-        with refused(sh.GeometryError, "blocks"):
+        with refused(sh.errors.GeometryError, "blocks"):
             wrong()
     assert (sh.signed_distance(samples.sphere(2), GRID) | A)([[-1.4, 0.0, 0.0]])[0] < 0

@@ -39,9 +39,9 @@ def test_offset_keeps_its_distance_or_says_why_not():
     field = ball()
     assert_closed_manifold(field.offset(0.2))
     assert np.abs(np.linalg.norm(field.offset(-0.2).vertices, axis=1) - 0.3).max() < 5e-3
-    with refused(sh.OutsideError):
+    with refused(sh.errors.OutsideError):
         field.offset(0.6)
-    with refused(sh.OutsideError, "level 5"):
+    with refused(sh.errors.OutsideError, "level 5"):
         field.contour(5.0)
 
 
@@ -75,9 +75,9 @@ def test_beyond_the_box_a_convex_shape_is_at_least_that_far():
 
 def test_bad_input_is_refused():
     field = ball()
-    with refused(sh.GeometryError, "values"):
+    with refused(sh.errors.GeometryError, "values"):
         sh.GridField(field.grid, np.zeros((3, 3, 3)))
-    with refused(sh.GeometryError, "points"):
+    with refused(sh.errors.GeometryError, "points"):
         field([[np.nan, 0, 0]])
-    with refused(sh.GeometryError, "points"):
+    with refused(sh.errors.GeometryError, "points"):
         field([[0.0, 0.0]])

@@ -26,12 +26,12 @@ ODD = [np.nan, np.inf, np.array([0.1, 0.2]), "x", None, True, 1j, 10**400]
 def test_odd_levels(tmp_path, name):
     field = FIELDS[name]()
     for odd in ODD:
-        with refused(sh.SignedHeatError, "level"):
+        with refused(sh.errors.SignedHeatError, "level"):
             field.contour(odd)
         if name != "surface":
-            with refused(sh.SignedHeatError, "distance"):
+            with refused(sh.errors.SignedHeatError, "distance"):
                 field.offset(odd)
         if name == "band":
-            with refused(sh.SignedHeatError, "level"):
+            with refused(sh.errors.SignedHeatError, "level"):
                 field.save_contour(tmp_path / "made.ply", odd)
     assert not list(tmp_path.iterdir())

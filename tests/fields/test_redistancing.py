@@ -145,7 +145,7 @@ def test_walls_without_a_way_around_part_what_is_known():
     found = sh.redistance(values)
     assert found.mask.tolist() == [[True, True, True, False, False]]
     assert found.compressed().tolist() == [0.5, -0.5]
-    with refused(sh.OutsideError):
+    with refused(sh.errors.OutsideError):
         sh.redistance(np.ma.masked_array([1.0, 0.0, -1.0], [False, True, False]))
 
 
@@ -156,7 +156,7 @@ def test_walls_without_a_way_around_part_what_is_known():
     ([-1.0, 1.0], {"periodic": "yes"}), ([-1.0, np.nan, 1.0, 1.0], {"periodic": True}),
 ])  # fmt: skip
 def test_what_has_no_distance_is_refused(values, options):
-    with refused(sh.SignedHeatError):
+    with refused(sh.errors.SignedHeatError):
         sh.redistance(values, **options)
 
 

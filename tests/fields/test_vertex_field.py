@@ -24,7 +24,7 @@ def test_values_between_vertices_are_linear():
     assert phi(curve) == pytest.approx(exact, abs=1e-14)
     assert phi(positions(mesh, curve) + np.array([0, 0, 0.1])) == pytest.approx(exact, abs=1e-14)
     assert np.abs(phi.gradient(curve) - [2, -1, 0]).max() < 1e-12
-    with refused(sh.OutsideError, "point 0"):
+    with refused(sh.errors.OutsideError, "point 0"):
         phi(sh.SurfacePoints([9999], [[1, 0, 0]]))
 
 
@@ -51,7 +51,7 @@ def test_contours_close_and_round_trip_through_the_solver():
     again = sh.SignedHeatSolver(phi.domain).distance(curve)
     assert np.abs(again.values - (phi.values - 0.4))[np.abs(phi.values) < 0.8].max() < 0.03
     assert np.abs(phi(phi.contour(0.0)[0])).max() < 1e-14
-    with refused(sh.OutsideError, "level 100"):
+    with refused(sh.errors.OutsideError, "level 100"):
         phi.contour(100.0)
 
 
@@ -73,7 +73,7 @@ def test_unreached_parts_are_left_out_of_contours():
         np.concatenate([mesh.vertices, mesh.vertices + np.array([0, 0, 1])]),
         np.concatenate([mesh.faces, mesh.faces + 25]),
     )
-    with pytest.warns(sh.UnreachedWarning) as caught:
+    with pytest.warns(sh.errors.UnreachedWarning) as caught:
         phi = sh.SignedHeatSolver(two).distance(two.path([10, 11, 12, 13, 14]))
     assert caught[0].filename == __file__  # the line of the user, not one of ours
     assert np.isnan(phi.values[25:]).all() and phi.diagnostics.unreached.tolist() == list(range(25, 50))
@@ -117,14 +117,14 @@ def test_fields_on_other_surfaces_are_written_too(tmp_path):
 
 def test_bad_names_and_damaged_files_are_refused(tmp_path):
     phi = field_on_sphere(1)
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         phi.save(tmp_path / "phi.docx")
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         phi.save(tmp_path / "missing" / "phi.ply")
     phi.save(tmp_path / "phi.npz")
     whole = (tmp_path / "phi.npz").read_bytes()
     (tmp_path / "half.npz").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(sh.FileFormatError):
+    with pytest.raises(sh.errors.FileFormatError):
         load_vertex_field(tmp_path / "half.npz")
 
 

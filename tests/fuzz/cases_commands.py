@@ -169,7 +169,7 @@ def _save_voxels(random: Random, path: Path) -> None:
 
 def _save_lines(random: Random, path: Path) -> None:
     points = random.normal(size=(int(random.integers(2, 9)), 2)) * one_of(random, SIZES)
-    sh.write_polylines(path, [sh.Polyline(points, closed=chance(random, 0.5))])
+    sh.io.write_polylines(path, [sh.Polyline(points, closed=chance(random, 0.5))])
 
 
 def _save_quads(random: Random, path: Path) -> None:
@@ -307,7 +307,7 @@ def _judge_file(path: Path, told: str) -> None:
             numbers = getattr(read, "vertices", np.zeros(0))
         else:
             return
-    except (sh.SignedHeatError, KeyError):
+    except (sh.errors.SignedHeatError, KeyError):
         return
     if not np.isfinite(numbers).all() and not told:
         raise Wrong("not finite without a word", f"{path.name}: {np.size(numbers) - np.isfinite(numbers).sum()}")

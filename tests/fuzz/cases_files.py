@@ -49,7 +49,7 @@ def check(subject: Damaged) -> str:
     """It is read, and everything in it is finite; or it is refused by an error that names the file."""
     try:
         found = subject.read(subject.path)
-    except sh.SignedHeatError as error:
+    except sh.errors.SignedHeatError as error:
         if error.path is None:
             raise Wrong("refused without the file's name", str(error)) from error
         raise
@@ -82,7 +82,7 @@ def shapes(ending: str) -> list[Files]:
     for shape in (BALL, SQUARES, CLOUD):
         try:
             found.append(written(shape.save, name))
-        except sh.FileFormatError:
+        except sh.errors.FileFormatError:
             continue
     return found
 
@@ -223,9 +223,9 @@ def labels() -> list[Files]:
     return found
 
 
-def read_labelled(path: Path) -> sh.LabelImage:
+def read_labelled(path: Path) -> sh.io.LabelImage:
     """An image of labels, which has a place."""
-    image = sh.read_labels(path)
+    image = sh.io.read_labels(path)
     if not (np.isfinite(image.matrix).all() and (image.spacing > 0).all() and image.labels.ndim == 3):
         raise Wrong("not finite", repr(image))
     return image
@@ -247,14 +247,16 @@ def lines() -> list[Files]:
     drawing = """<svg xmlns="http://www.w3.org/2000/svg"><g transform="translate(3 4) rotate(30)"><path
     d="M0 0 C 1 2 3 4 5 6 A 3 4 5 0 1 7 8 Q 1 1 2 2 Z m 3 3 h 4 v -5"/><rect x="1" y="2" width="3" height="4"/></g>
     <circle cx="1" cy="2" r="3"/><ellipse cx="0" cy="0" rx="2" ry="1"/><polyline points="0,0 1,1 2,0"/></svg>"""
-    files = [written(lambda path: sh.write_polylines(path, [square, square]), f"lines.{e}") for e in ("svg", "csv")]
+    files = [written(lambda path: sh.io.write_polylines(path, [square, square]), f"lines.{e}") for e in ("svg", "csv")]
     return [*files, {"lines.svg": drawing.encode()}]
 
 
 @cache
 def curves() -> list[Files]:
     """Curves and points on a surface."""
-    files = [written(lambda path: sh.write_curves(path, CURVES, BALL), f"curves.{e}") for e in ("txt", "json", "obj")]
+    files = [
+        written(lambda path: sh.io.write_curves(path, CURVES, BALL), f"curves.{e}") for e in ("txt", "json", "obj")
+    ]
     table = "x,y,z\n" + "".join(",".join(map(str, p)) + "\n" for p in BALL.vertices[[0, 1, 2]].tolist())
     segments = "#offset 0\nv 0\nv 1\ne 2 0.5\nf 1 0.2 0.3\nl 0 1 2\nl 2 3\n"
     return [
@@ -275,10 +277,10 @@ KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
     "tet fields": (sh.load_field, lambda: [f for f in tets() if b"signed_distance" in next(iter(f.values()))]),
     "fields": (sh.load_field, fields),
     "volumes": (sh.read, volumes),
-    "masks": (sh.read_mask, masks),
+    "masks": (sh.io.read_mask, masks),
     "labels": (read_labelled, labels),
-    "lines": (sh.read_polylines, lines),
-    "curves": (lambda path: sh.read_curves(path, BALL), curves),
+    "lines": (sh.io.read_polylines, lines),
+    "curves": (lambda path: sh.io.read_curves(path, BALL), curves),
     "line elements": (read_obj_lines, lambda: [f for f in curves() if "curves.obj" in f]),
 }
 

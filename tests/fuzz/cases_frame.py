@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fuzz.frame import Wrong, family
-from signedheat import GeometryError
+from signedheat.errors import GeometryError
 
 
 def build(random: np.random.Generator, folder: Path) -> float:

@@ -64,7 +64,7 @@ def check_labels(given: Subject) -> str:
         labels = spoiled(random, labels).astype(one_of(random, (float, np.float32, np.int16, np.uint8)))
     turned = np.linalg.qr(random.normal(size=(3, 3)))[0] if chance(random, 0.7) else np.eye(3)
     steps = one_of(random, (1.0, 1e-12, 1e12, 10.0 ** random.uniform(-2, 2, 3)))
-    image = sh.LabelImage(labels, turned * steps, spoiled(random, random.normal(size=3)), None)
+    image = sh.io.LabelImage(labels, turned * steps, spoiled(random, random.normal(size=3)), None)
     label = one_of(random, (None, 0, 1, *labels.ravel()[:2].tolist()))
     own = image.surface(label)
     grid = image.grid if chance(random, 0.5) else sh.Grid.around(own.bounds, int(random.integers(4, 12)))
@@ -76,7 +76,7 @@ def check_labels(given: Subject) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / one_of(random, ("phi.nrrd", "phi.nii", "phi.nii.gz", "phi.vti"))
         image.save(phi, path)
-        again = sh.read_labels(path)
+        again = sh.io.read_labels(path)
     if not (np.array_equal(again.labels, phi.values) and np.allclose(np.abs(again.axes), np.abs(turned * steps
             * (grid.spacing / image.spacing)), rtol=1e-5, atol=1e-5 * float(grid.spacing.max()))):  # fmt: skip
         raise Wrong("other values or axes when read again", path.name)

@@ -108,7 +108,16 @@ def check_solid(given: Subject) -> str:
         made, _ = announced(lambda: sh.complete(source))
         judge(made.triangles, False, np.inf, "completed")
         return "completed"
-    operation = one_of(random, (sh.dilate, sh.erode, sh.closing, sh.opening, sh.thicken))
+    operation = one_of(
+        random,
+        (
+            sh.morphology.dilate,
+            sh.morphology.erode,
+            sh.morphology.closing,
+            sh.morphology.opening,
+            sh.morphology.thicken,
+        ),
+    )
     made, _ = announced(lambda: operation(source, size * random.random() ** 2, resolution=resolution))
     judge(made.vertices, False, np.inf, operation.__name__)
     return operation.__name__
@@ -175,7 +184,7 @@ def check_arguments(given: Subject) -> str:
         (sh.GridField(sh.Grid((0, 0), 1.0, (3, 3)), np.zeros((3, 3))), {"points": np.eye(2)}),
         (sh.intrinsic_delaunay, {"mesh": ball, "keep": (), "angle": 20.0, "max_vertices": 99}),
         (sh.piecewise_distance, {"domain": ball, "sources": ball.path([0, 1]), "diffusion": 1.0}),
-        (sh.dilate, {"shape": ball, "distance": 0.1, "resolution": 8}),
+        (sh.morphology.dilate, {"shape": ball, "distance": 0.1, "resolution": 8}),
         (sh.close_curves, {"domain": ball, "curves": ball.path([0, 1])}),
         (sh.tetrahedralize, {"shape": ball, "resolution": 3, "padding": 0.1, "grading": 3.0}),
         (sh.orient, {"shape": ball}),

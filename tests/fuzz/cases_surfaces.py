@@ -215,7 +215,9 @@ def check_use(given: Subject) -> str:
         for curve in found:
             judge(curve.barycentric, False, 1.0, "closed curve")
         return "closed"
-    operation = one_of(random, (sh.dilate, sh.erode, sh.opening, sh.closing))
+    operation = one_of(
+        random, (sh.morphology.dilate, sh.morphology.erode, sh.morphology.opening, sh.morphology.closing)
+    )
     reach = float(np.nanmax(np.abs(phi.values), initial=0.0)) * random.random() ** 2
     made, _ = announced(lambda: operation(sources, reach, phi.domain))
     for curve in made:

@@ -58,7 +58,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from signedheat import SignedHeatError
+from signedheat.errors import SignedHeatError
 
 LIMIT = 30.0
 """Seconds that a case may take, of a processor; beside other work it may take longer."""

@@ -51,7 +51,7 @@ def announced(call: Callable[[], Any]) -> tuple[Any, bool]:
     with warnings.catch_warnings(record=True) as caught:
         fail_on_warnings("always")
         result = call()
-    return result, any(issubclass(w.category, sh.UnreachedWarning) for w in caught)
+    return result, any(issubclass(w.category, sh.errors.UnreachedWarning) for w in caught)
 
 
 def judge(values: np.ndarray, warned: bool, size: float, about: str = "values") -> None:

@@ -32,6 +32,6 @@ def test_a_short_run_on_damaged_files():
 
 def test_an_error_names_the_file(tmp_path):
     (tmp_path / "odd.stl").write_bytes(b"solid")
-    with pytest.raises(sh.SignedHeatError) as caught:
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.read(tmp_path / "odd.stl")
     assert caught.value.path == str(tmp_path / "odd.stl")

@@ -27,8 +27,8 @@ def some_curves(mesh):
 def test_curves_read_back_the_same(extension, tmp_path):
     mesh = sphere(2)
     curves = some_curves(mesh)
-    sh.write_curves(tmp_path / f"curves.{extension}", curves, mesh)
-    back = sh.read_curves(tmp_path / f"curves.{extension}", mesh)
+    sh.io.write_curves(tmp_path / f"curves.{extension}", curves, mesh)
+    back = sh.io.read_curves(tmp_path / f"curves.{extension}", mesh)
     assert len(back) == len(curves)
     for old, new in zip(curves, back, strict=True):
         assert type(old) is type(new)
@@ -40,19 +40,19 @@ def test_curves_read_back_the_same(extension, tmp_path):
 def test_strict_reading_refuses_points_that_share_no_face(tmp_path):
     mesh = square(5)
     walk = mesh.path([6, 7, 12, 11], closed=True)
-    sh.write_curves(tmp_path / "walk.txt", walk, mesh)
-    sh.write_curves(tmp_path / "jump.txt", [walk, mesh.path([0, 1, 24])], mesh)
-    assert len(sh.read_curves(tmp_path / "walk.txt", mesh, strict=True)) == 1
-    assert len(sh.read_curves(tmp_path / "jump.txt", mesh)) == 2
-    with refused(sh.SourceError, "curve 1"):
-        sh.read_curves(tmp_path / "jump.txt", mesh, strict=True)
+    sh.io.write_curves(tmp_path / "walk.txt", walk, mesh)
+    sh.io.write_curves(tmp_path / "jump.txt", [walk, mesh.path([0, 1, 24])], mesh)
+    assert len(sh.io.read_curves(tmp_path / "walk.txt", mesh, strict=True)) == 1
+    assert len(sh.io.read_curves(tmp_path / "jump.txt", mesh)) == 2
+    with refused(sh.errors.SourceError, "curve 1"):
+        sh.io.read_curves(tmp_path / "jump.txt", mesh, strict=True)
 
 
 def test_obj_lines_read_back_as_the_same_lines(tmp_path):
     mesh = sphere(2)
     curves = [c for c in some_curves(mesh) if not isinstance(c, sh.Curve) or c.oriented][1:]
-    sh.write_curves(tmp_path / "curves.obj", curves, mesh)
-    back = sh.read_curves(tmp_path / "curves.obj", mesh)
+    sh.io.write_curves(tmp_path / "curves.obj", curves, mesh)
+    back = sh.io.read_curves(tmp_path / "curves.obj", mesh)
     for old, new in zip(curves, back, strict=True):
         assert np.abs(positions(mesh, old) - positions(mesh, new)).max() < 1e-12
 
@@ -62,7 +62,7 @@ def test_obj_lines_on_the_vertices_of_the_mesh(tmp_path):
     path = tmp_path / "mesh.obj"
     lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
     path.write_text("\n".join([*lines, "l 6 7 11", "l 1 2 6 5 1", "l -1 -2", "p 16"]) + "\n")
-    curves = sh.read_curves(path, mesh)
+    curves = sh.io.read_curves(path, mesh)
     assert [c.n_points for c in curves] == [3, 4, 2, 1]
     assert curves[1].closed
     assert (mesh.faces[curves[0].faces, curves[0].barycentric.argmax(axis=1)] == [5, 6, 10]).all()
@@ -72,7 +72,7 @@ def test_the_demo_format(tmp_path):
     mesh = square(4)
     path = tmp_path / "curves.txt"
     path.write_text("signed_curve\nv 5\ne 4 0.25\nf 2 0.2 0.3\n\nsigned_curve 1\nl 6 7 8\nunsigned_point\nv 0\n")
-    first, second, third = sh.read_curves(path, mesh)
+    first, second, third = sh.io.read_curves(path, mesh)
     tail, head = mesh.edges.vertices[4]
     a, b, c = mesh.vertices[mesh.faces[2]]
     expected = [mesh.vertices[5], 0.75 * mesh.vertices[tail] + 0.25 * mesh.vertices[head], 0.2 * a + 0.3 * b + 0.5 * c]
@@ -85,10 +85,10 @@ def test_the_segment_format(tmp_path):
     mesh = square(5)
     path = tmp_path / "curves.txt"
     path.write_text("#offset 0\nv 6\nv 7\nl 0 1\n#l 1 2\nv 8\nn\nv 12\nl 1 2\nv 8\nl 4 3\n")
-    (curve,) = sh.read_curves(path, mesh)  # node 4 is where node 2 is: the segments form one chain
+    (curve,) = sh.io.read_curves(path, mesh)  # node 4 is where node 2 is: the segments form one chain
     assert (mesh.faces[curve.faces, curve.barycentric.argmax(axis=1)] == [6, 7, 8, 12]).all()
     path.write_text("v 6\nv 7\nl 1 2\n")
-    assert sh.read_curves(path, mesh)[0].n_points == 2
+    assert sh.io.read_curves(path, mesh)[0].n_points == 2
 
 
 def test_portable_json_joins_segments_in_any_order(tmp_path):
@@ -97,7 +97,7 @@ def test_portable_json_joins_segments_in_any_order(tmp_path):
     segments = [[3, 4], [1, 2], [0, 1], [2, 3]]
     path = tmp_path / "curves.json"
     path.write_text(json.dumps({"groups": [{"kind": "signed_curve", "nodes": nodes, "segments": segments}]}))
-    (curve,) = sh.read_curves(path, mesh)
+    (curve,) = sh.io.read_curves(path, mesh)
     assert (mesh.faces[curve.faces, curve.barycentric.argmax(axis=1)] == [6, 7, 8, 13, 12]).all()
 
 
@@ -105,46 +105,46 @@ def test_edges_of_polygons_are_numbered_by_first_appearance(tmp_path):
     mesh = sh.PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]], [[0, 1, 2, 3], [1, 4, 2]])
     path = tmp_path / "curves.txt"
     path.write_text("signed_curve\ne 0 0.25\ne 2 0.5\ne 4 0.5\n")
-    (curve,) = sh.read_curves(path, mesh)
+    (curve,) = sh.io.read_curves(path, mesh)
     assert np.abs(positions(mesh.triangulation, curve) - [[0.25, 0, 0], [0.5, 1, 0], [1.5, 0, 0]]).max() < 1e-15
 
 
 @pytest.mark.parametrize(
     ("content", "error", "element"),
     [
-        ("", sh.FileFormatError, None),
-        ("hello world\n", sh.FileFormatError, "line 1"),
-        ("signed_curve\nv x\n", sh.FileFormatError, "line 2"),
-        ("signed_curve\ne 9999 0.5\nv 1\n", sh.FileFormatError, "line 2"),
-        ("signed_curve\ne 3 1.5\nv 1\n", sh.FileFormatError, "line 2"),
-        ("signed_curve\nf 3 0.5\nv 1\n", sh.FileFormatError, "line 2"),
-        ("signed_curve\nv 1\nv 9999\n", sh.SourceError, "vertex 9999"),
-        ("signed_curve\nv 1\n", sh.SourceError, None),
-        ("v 1\nv 2\nl 1 7\n", sh.FileFormatError, "segment [0, 6]"),
-        ("# nothing\n", sh.FileFormatError, None),
+        ("", sh.errors.FileFormatError, None),
+        ("hello world\n", sh.errors.FileFormatError, "line 1"),
+        ("signed_curve\nv x\n", sh.errors.FileFormatError, "line 2"),
+        ("signed_curve\ne 9999 0.5\nv 1\n", sh.errors.FileFormatError, "line 2"),
+        ("signed_curve\ne 3 1.5\nv 1\n", sh.errors.FileFormatError, "line 2"),
+        ("signed_curve\nf 3 0.5\nv 1\n", sh.errors.FileFormatError, "line 2"),
+        ("signed_curve\nv 1\nv 9999\n", sh.errors.SourceError, "vertex 9999"),
+        ("signed_curve\nv 1\n", sh.errors.SourceError, None),
+        ("v 1\nv 2\nl 1 7\n", sh.errors.FileFormatError, "segment [0, 6]"),
+        ("# nothing\n", sh.errors.FileFormatError, None),
     ],
 )
 def test_damaged_text_is_refused_with_file_and_line(content, error, element, tmp_path):
     path = tmp_path / "broken.txt"
     path.write_text(content)
     with refused(error, element, file="broken.txt"):
-        sh.read_curves(path, square(4))
+        sh.io.read_curves(path, square(4))
 
 
 @pytest.mark.parametrize(
     ("content", "error"),
     [
-        ("{", sh.FileFormatError),
-        ("[]", sh.FileFormatError),
-        ('{"groups": [{"kind": "curve", "nodes": [], "segments": []}]}', sh.FileFormatError),
+        ("{", sh.errors.FileFormatError),
+        ("[]", sh.errors.FileFormatError),
+        ('{"groups": [{"kind": "curve", "nodes": [], "segments": []}]}', sh.errors.FileFormatError),
         (
             '{"groups": [{"kind": "signed_curve", "segments": [[0, 1]], '
             '"nodes": [{"v": [0, 15], "w": [0.5, 0.5]}, {"v": [1], "w": [1]}]}]}',
-            sh.SourceError,
+            sh.errors.SourceError,
         ),
         (
             '{"groups": [{"kind": "signed_curve", "nodes": [{"v": [0], "w": [1]}], "segments": [[0, 4]]}]}',
-            sh.FileFormatError,
+            sh.errors.FileFormatError,
         ),
     ],
 )
@@ -152,15 +152,15 @@ def test_damaged_json_is_refused(content, error, tmp_path):
     path = tmp_path / "broken.json"
     path.write_text(content)
     with refused(error):
-        sh.read_curves(path, square(4))
+        sh.io.read_curves(path, square(4))
 
 
 def test_unknown_formats_are_refused_and_nothing_is_overwritten(tmp_path):
     mesh = square(4)
-    with refused(sh.FileFormatError):
-        sh.read_curves(tmp_path / "curves.svg", mesh)
+    with refused(sh.errors.FileFormatError):
+        sh.io.read_curves(tmp_path / "curves.svg", mesh)
     path = tmp_path / "curves.txt"
     path.write_text("kept")
-    with refused(sh.SourceError, "item 0"):
-        sh.write_curves(path, ["no curve"], mesh)
+    with refused(sh.errors.SourceError, "item 0"):
+        sh.io.write_curves(path, ["no curve"], mesh)
     assert path.read_text() == "kept"

@@ -39,7 +39,7 @@ def test_confidence_comes_back(tmp_path, ending):
     back = load_field(tmp_path / f"phi.{ending}")
     np.testing.assert_array_equal(back.values, phi.values)
     np.testing.assert_array_equal(back.confidence, told.confidence)
-    with refused(sh.GeometryError, element="confidence"):
+    with refused(sh.errors.GeometryError, element="confidence"):
         sh.GridField(phi.grid, phi.values, confidence=np.ones(3))
 
 
@@ -105,7 +105,7 @@ def test_nrrd_along_turned_axes_is_refused(tmp_path):
     turned = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1.0]])
     header = {"space dimension": 3, "space directions": turned, "space origin": np.zeros(3)}
     nrrd.write(str(tmp_path / "turned.nrrd"), field().values, header, index_order="F")
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         load_field(tmp_path / "turned.nrrd")
 
 
@@ -113,7 +113,7 @@ def test_nrrd_along_turned_axes_is_refused(tmp_path):
 def test_formats_whose_package_is_missing_are_refused_before_anything_is_written(tmp_path, monkeypatch, ending, module):
     monkeypatch.setitem(sys.modules, module, None)
     for attempt in (lambda path: save_field(field(), path), ensure_field_writable):
-        with refused(sh.MissingPackageError, module):
+        with refused(sh.errors.MissingPackageError, module):
             attempt(tmp_path / f"phi.{ending}")
     assert not list(tmp_path.iterdir())
 
@@ -127,7 +127,7 @@ def test_vdb_keeps_single_precision_and_the_exact_grid(tmp_path):
     np.testing.assert_array_equal(back.grid.origin, grid.origin)
     np.testing.assert_array_equal(back.grid.spacing, grid.spacing)
     (tmp_path / "phi.vdb").write_bytes((tmp_path / "phi.vdb").read_bytes()[:200])
-    with refused(sh.FileFormatError, file="phi.vdb"):
+    with refused(sh.errors.FileFormatError, file="phi.vdb"):
         sh.load_field(tmp_path / "phi.vdb")
 
 
@@ -138,7 +138,7 @@ def test_truncated_fields_are_refused_by_name(tmp_path, ending):
     data = (tmp_path / f"phi.{ending}").read_bytes()
     for length in (0, 10, len(data) // 2, len(data) - 60):
         (tmp_path / f"phi.{ending}").write_bytes(data[:length])
-        with refused(sh.FileFormatError, file=f"phi.{ending}"):
+        with refused(sh.errors.FileFormatError, file=f"phi.{ending}"):
             load_field(tmp_path / f"phi.{ending}")
 
 
@@ -149,9 +149,9 @@ def test_files_that_hold_no_field_are_refused(tmp_path):
     np.savez(tmp_path / "spacing.npz", values=np.zeros((2, 2)), origin=[0, 0], spacing=[1, -1])
     np.savez(tmp_path / "words.npz", values=np.array([["a", "b"]] * 2), origin=[0, 0], spacing=[1, 1])
     for name in ("other.npz", "pickled.npz", "spacing.npz", "words.npz", "missing.vti", "field.stl"):
-        with refused(sh.FileFormatError, file=name):
+        with refused(sh.errors.FileFormatError, file=name):
             load_field(tmp_path / name)
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         load_field(tmp_path / "alone.npy")
 
 
@@ -160,7 +160,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, ending, monkeypatch):
     path = tmp_path / f"phi.{ending}"
     path.write_text("precious")
     monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         field().save(path)
     assert path.read_text() == "precious"
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
@@ -170,5 +170,5 @@ def test_fields_of_four_dimensions_fit_npz_only(tmp_path):
     phi = sh.GridField(sh.Grid((0, 0, 0, 0), 1.0, (2, 3, 2, 4)), np.arange(48.0).reshape(2, 3, 2, 4))
     phi.save(tmp_path / "phi.npz")
     np.testing.assert_array_equal(load_field(tmp_path / "phi.npz").values, phi.values)
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         phi.save(tmp_path / "phi.vti")

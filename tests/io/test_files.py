@@ -38,13 +38,13 @@ def leftovers(folder):
 def test_pipes_and_devices_are_not_read(tmp_path, ending):
     pipe = tmp_path / f"pipe.{ending}"
     os.mkfifo(pipe)
-    read = {"npz": sh.load_field, "nrrd": sh.load_field, "svg": sh.read_polylines}.get(ending, sh.read)
-    with pytest.raises(sh.FileFormatError) as caught:
+    read = {"npz": sh.load_field, "nrrd": sh.load_field, "svg": sh.io.read_polylines}.get(ending, sh.read)
+    with pytest.raises(sh.errors.FileFormatError) as caught:
         read(pipe)
     assert caught.value.path is not None and caught.value.remedy
     device = tmp_path / f"device.{ending}"
     device.symlink_to("/dev/zero")
-    with pytest.raises(sh.FileFormatError):
+    with pytest.raises(sh.errors.FileFormatError):
         read(device)
 
 
@@ -59,9 +59,9 @@ def test_what_is_no_regular_file_is_not_replaced(tmp_path, kind):
     link.symlink_to(target if kind != "device" else "/dev/null")
     for path in (link, *([target] if kind != "device" else [])):
         before = stat.S_IFMT(path.stat().st_mode)
-        with pytest.raises(sh.FileFormatError):
+        with pytest.raises(sh.errors.FileFormatError):
             sh.save(BALL, path)
-        with pytest.raises(sh.FileFormatError):
+        with pytest.raises(sh.errors.FileFormatError):
             ensure_writable(path, {".stl"}, "a shape")
         assert stat.S_IFMT(path.stat().st_mode) == before
     assert not leftovers(tmp_path)
@@ -132,7 +132,7 @@ def test_an_image_names_files_in_its_folder_only(tmp_path):
     good = nrrd(inner, "good.nrrd", "encoding: raw\ndata file: data.raw\n")
     np.testing.assert_array_equal(sh.load_field(good).values.ravel(order="F"), values)
     for name in (tmp_path / "data.raw", "../data.raw", "pipe.raw", "link.raw", "absent.raw"):
-        with pytest.raises(sh.FileFormatError):
+        with pytest.raises(sh.errors.FileFormatError):
             sh.load_field(nrrd(inner, "bad.nrrd", f"encoding: raw\ndata file: {name}\n"))
 
 
@@ -177,7 +177,7 @@ def test_no_more_is_unpacked_than_is_announced(tmp_path, ending):
     read = sh.read if ending in ("vtp", "vtu") else sh.load_field
     try:
         read(path)
-    except sh.SignedHeatError as error:
+    except sh.errors.SignedHeatError as error:
         assert error.path is not None
     grown = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
     assert grown < 1 << 26
@@ -188,7 +188,7 @@ def test_what_is_announced_is_compared_with_the_memory_that_is_free(tmp_path, en
     field = sh.GridField(sh.Grid([0, 0, 0], 1.0, [40, 40, 40]), np.zeros((40, 40, 40)))
     field.save(tmp_path / f"phi.{ending}")
     monkeypatch.setattr(files, "available_memory", lambda: 8 * 40**3 - 1)
-    with pytest.raises(sh.MemoryLimitError) as caught:
+    with pytest.raises(sh.errors.MemoryLimitError) as caught:
         sh.load_field(tmp_path / f"phi.{ending}")
     assert caught.value.remedy and caught.value.path
 
@@ -198,7 +198,7 @@ def test_arrays_that_announce_more_than_there_is(tmp_path, shape):
     head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
     (tmp_path / "phi.npy").write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + head.encode() + bytes(64))
     (tmp_path / "phi.json").write_text(json.dumps({"origin": [0, 0], "spacing": [1, 1]}))
-    with pytest.raises(sh.SignedHeatError) as caught:
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.load_field(tmp_path / "phi.npy")
     assert caught.value.path
 
@@ -229,7 +229,7 @@ def test_odd_headers_of_ply(tmp_path, header, body):
     begin = time.process_time()
     try:
         assert isinstance(sh.read(tmp_path / "odd.ply"), sh.PointCloud)
-    except sh.SignedHeatError as error:
+    except sh.errors.SignedHeatError as error:
         assert error.path
     assert time.process_time() - begin < 2
 
@@ -252,7 +252,7 @@ def test_tetgen_files_with_comments_and_ids_from_one(tmp_path, ending):
 def test_damaged_tetgen_files(tmp_path, content):
     (tmp_path / "bad.node").write_text(content)
     (tmp_path / "bad.ele").write_text("1 4 0\n0 0 1 2 3\n")
-    with pytest.raises(sh.SignedHeatError) as caught:
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.read(tmp_path / "bad.ele")
     assert caught.value.path and caught.value.path.endswith(("bad.node", "bad.ele"))
 
@@ -310,8 +310,8 @@ ODD_CURVES = {
 @pytest.mark.parametrize("name", ODD_CURVES)
 def test_odd_curves(tmp_path, name):
     (tmp_path / name).write_text(ODD_CURVES[name])
-    with pytest.raises(sh.SignedHeatError) as caught:
-        sh.read_curves(tmp_path / name, BALL)
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
+        sh.io.read_curves(tmp_path / name, BALL)
     assert caught.value.path == str(tmp_path / name)
 
 
@@ -343,7 +343,7 @@ def test_odd_fields(tmp_path, name):
         (tmp_path / name).write_bytes((tmp_path / name).read_bytes()[:-30])
     else:
         (tmp_path / name).write_bytes(content.encode("latin-1"))
-    with pytest.raises(sh.FileFormatError) as caught:
+    with pytest.raises(sh.errors.FileFormatError) as caught:
         sh.load_field(tmp_path / name)
     assert caught.value.path == str(tmp_path / name)
 
@@ -354,14 +354,14 @@ def test_what_cannot_be_compiled_says_nothing_about_the_file(tmp_path, monkeypat
 
     path = tmp_path / "curves.json"
     path.write_text(json.dumps({"polylines": [{"points": [[1.0, 0.1, 0.2], [0.0, 1.0, -0.1]]}]}))
-    assert len(sh.read_curves(path, BALL)) == 1
+    assert len(sh.io.read_curves(path, BALL)) == 1
     monkeypatch.setattr(type(nearest._weights), "__call__", broken)
     with pytest.raises(TypeError, match="compiler"):
-        sh.read_curves(path, samples.sphere(1))
+        sh.io.read_curves(path, samples.sphere(1))
     monkeypatch.undo()
     path.write_text(json.dumps({"polylines": [{"points": [[1.0, "a", 0.2], [0.0, 1.0, -0.1]]}]}))
-    with pytest.raises(sh.FileFormatError):
-        sh.read_curves(path, BALL)
+    with pytest.raises(sh.errors.FileFormatError):
+        sh.io.read_curves(path, BALL)
 
 
 @pytest.mark.parametrize("where", ["signedheat.domains.grid", "signedheat.compiled", "signedheat.io.ply", "meshio"])
@@ -372,7 +372,7 @@ def test_faults_of_parsers_are_damage_and_our_own_are_not(where):
         with files.reading("shape.ply"):
             namespace["parse"]()
 
-    with pytest.raises(sh.FileFormatError if where in ("signedheat.io.ply", "meshio") else IndexError):
+    with pytest.raises(sh.errors.FileFormatError if where in ("signedheat.io.ply", "meshio") else IndexError):
         read()
 
 
@@ -381,5 +381,5 @@ def test_curves_larger_than_memory_are_told_as_that(tmp_path, ending):
     path = tmp_path / f"curves{ending}"
     with path.open("wb") as file:
         file.truncate(1 << 40)  # without any block on the disk
-    with refused(sh.MemoryLimitError, file=path.name):
-        sh.read_curves(path, samples.sphere(1))
+    with refused(sh.errors.MemoryLimitError, file=path.name):
+        sh.io.read_curves(path, samples.sphere(1))

@@ -74,7 +74,7 @@ def test_what_is_only_announced_is_refused(tmp_path, old, new):
     data = TWO.decode()
     assert old in data
     (tmp_path / "odd.msh").write_text(data.replace(old, new, 1))
-    with refused(sh.SignedHeatError) as caught:
+    with refused(sh.errors.SignedHeatError) as caught:
         sh.read(tmp_path / "odd.msh")
     assert caught.value.path == str(tmp_path / "odd.msh")
 
@@ -82,5 +82,5 @@ def test_what_is_only_announced_is_refused(tmp_path, old, new):
 def test_blocks_of_version_four_that_are_only_announced(tmp_path):
     for old, new in (("0 1 0 1\n7", "0 1 0 9999999999\n7"), ("3 1 4 2", "3 1 4 -1"), ("2 5 3", "999999999999 5 3")):
         (tmp_path / "odd.msh").write_bytes(FOUR.replace(old.encode(), new.encode(), 1))
-        with refused(sh.SignedHeatError):
+        with refused(sh.errors.SignedHeatError):
             sh.read(tmp_path / "odd.msh")

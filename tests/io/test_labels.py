@@ -89,19 +89,19 @@ def test_nifti_there_and_back(tmp_path, labels, kind, ending):
 def test_spaces_are_turned_between_formats(tmp_path, labels):
     mask = tmp_path / "mask.nrrd"
     write_nrrd(mask, labels, AXES["turned"])
-    image = sh.read_labels(mask)
+    image = sh.io.read_labels(mask)
     field = sh.GridField(image.grid, np.ones(image.grid.shape))
     image.save(field, tmp_path / "phi.nii")
     affine = nibabel.load(tmp_path / "phi.nii").affine
     flip = np.diag([-1.0, -1, 1])  # left-posterior-superior to right-anterior-superior
     np.testing.assert_allclose(affine[:3, :3], flip @ AXES["turned"], atol=1e-5)
     np.testing.assert_allclose(affine[:3, 3], flip @ ORIGIN, atol=1e-4)
-    back = sh.read_labels(tmp_path / "phi.nii")
+    back = sh.io.read_labels(tmp_path / "phi.nii")
     assert back.space == "right-anterior-superior"
-    with pytest.raises(sh.FileFormatError):
+    with pytest.raises(sh.errors.FileFormatError):
         image.save(field, tmp_path / "phi.vti")  # which has no place for turned axes
-    odd = sh.LabelImage(image.labels, image.axes, image.origin, "scanner-xyz")
-    with pytest.raises(sh.FileFormatError):
+    odd = sh.io.LabelImage(image.labels, image.axes, image.origin, "scanner-xyz")
+    with pytest.raises(sh.errors.FileFormatError):
         odd.save(field, tmp_path / "phi.nii")
 
 
@@ -119,7 +119,7 @@ def test_a_grid_of_ones_own_spacing_lies_in_the_same_place(tmp_path, labels):
     write_nrrd(mask, labels, AXES["turned"])
     options = ["--spacing", "0.4", "--padding", "1", "--quiet"]
     assert main(["volume", str(mask), "--label", "3", "-o", str(output), *options]) == 0
-    image = sh.read_labels(output)
+    image = sh.io.read_labels(output)
     np.testing.assert_allclose(image.spacing, 0.4)
     index = np.linalg.solve(image.axes, AXES["turned"] @ CENTER + ORIGIN - image.origin)
     near = np.rint(index).astype(int)
@@ -143,8 +143,8 @@ def test_damaged_and_skewed_images_are_refused(tmp_path, labels):
     skewed = AXES["straight"].copy()
     skewed[0, 1] = 0.3
     write_nrrd(tmp_path / "skewed.nrrd", labels, skewed)
-    with pytest.raises(sh.FileFormatError) as caught:
-        sh.read_labels(tmp_path / "skewed.nrrd")
+    with pytest.raises(sh.errors.FileFormatError) as caught:
+        sh.io.read_labels(tmp_path / "skewed.nrrd")
     assert "resample" in caught.value.remedy
     nibabel.save(nibabel.Nifti1Image(labels, np.eye(4)), tmp_path / "whole.nii")
     whole = (tmp_path / "whole.nii").read_bytes()
@@ -155,31 +155,31 @@ def test_damaged_and_skewed_images_are_refused(tmp_path, labels):
         "noise.nii": bytes(range(256)) * 40,
     }.items():
         (tmp_path / name).write_bytes(data)
-        with pytest.raises(sh.SignedHeatError) as caught:
-            sh.read_labels(tmp_path / name)
+        with pytest.raises(sh.errors.SignedHeatError) as caught:
+            sh.io.read_labels(tmp_path / name)
         assert caught.value.path == str(tmp_path / name)
     whole = (tmp_path / "skewed.nrrd").read_bytes()
     begin = whole.index(b"space origin: (")
     end = whole.index(b"\n", begin)
     (tmp_path / "origin.nrrd").write_bytes(whole[:begin] + b"space origin: (1,2)" + whole[end:])
-    with pytest.raises(sh.FileFormatError) as caught:
-        sh.read_labels(tmp_path / "origin.nrrd")
+    with pytest.raises(sh.errors.FileFormatError) as caught:
+        sh.io.read_labels(tmp_path / "origin.nrrd")
     assert "origin" in str(caught.value)
-    with pytest.raises(sh.FileFormatError):
-        sh.read_labels(tmp_path / "labels.stl")
+    with pytest.raises(sh.errors.FileFormatError):
+        sh.io.read_labels(tmp_path / "labels.stl")
 
 
 def test_what_is_mended_in_headers_is_not_told(tmp_path, labels, caplog):
     data = bytearray(nibabel.Nifti1Image(labels, np.eye(4)).to_bytes())
     data[252:254] = np.array([77], "<i2").tobytes()  # a code of coordinates that does not exist
     (tmp_path / "mask.nii").write_bytes(bytes(data))
-    assert np.array_equal(sh.read_labels(tmp_path / "mask.nii").labels, labels)
+    assert np.array_equal(sh.io.read_labels(tmp_path / "mask.nii").labels, labels)
     assert not caplog.records  # they would go to standard error
 
 
 @pytest.mark.parametrize("kind", AXES)
 def test_the_boundary_of_voxels_goes_to_the_world(labels, kind):
-    image = sh.LabelImage(labels, AXES[kind], ORIGIN)
+    image = sh.io.LabelImage(labels, AXES[kind], ORIGIN)
     squares = image.to_world(image.surface(3))
     assert isinstance(squares, sh.PolygonMesh)
     middle = (squares.vertices.min(axis=0) + squares.vertices.max(axis=0)) / 2

@@ -54,5 +54,5 @@ def test_points_without_a_position_are_left_out(tmp_path):
 def test_odd_files_are_refused(tmp_path, change):
     path = tmp_path / "cloud.pcd"
     path.write_bytes(change(pcd("binary")))
-    with refused(sh.FileFormatError, file="cloud.pcd"):
+    with refused(sh.errors.FileFormatError, file="cloud.pcd"):
         sh.read(path)

@@ -242,17 +242,17 @@ DAMAGED = {
 def test_damaged_files_are_refused_by_name(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(DAMAGED[name])
-    with refused(sh.SignedHeatError, file=name) as caught:
+    with refused(sh.errors.SignedHeatError, file=name) as caught:
         sh.read(path)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value).replace(str(path), "")) < 200
 
 
 def test_missing_files_and_folders_are_refused(tmp_path):
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         sh.read(tmp_path / "nowhere.stl")
     (tmp_path / "folder.stl").mkdir()
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         sh.read(tmp_path / "folder.stl")
 
 
@@ -265,7 +265,7 @@ def test_every_prefix_of_a_file_is_read_or_refused(tmp_path):
             (tmp_path / f"cut.{ending}").write_bytes(data[:length])
             try:
                 mesh = sh.read(tmp_path / f"cut.{ending}")
-            except sh.SignedHeatError:
+            except sh.errors.SignedHeatError:
                 continue
             if ending != "obj":  # which has no end that could be missing
                 same(mesh, sh.read(tmp_path / f"whole.{ending}"))
@@ -275,7 +275,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "a.ply"
     path.write_text("precious")
     monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         samples.sphere(0).save(path)
     assert path.read_text() == "precious"
     assert [file.name for file in tmp_path.iterdir()] == ["a.ply"]
@@ -289,9 +289,9 @@ def test_what_a_format_cannot_hold_is_refused(tmp_path):
         (TRIANGLES, "a.pc"),
         (POINTS, "a.doc"),
     ):
-        with refused(sh.FileFormatError, file=name):
+        with refused(sh.errors.FileFormatError, file=name):
             shape.save(tmp_path / name)
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         TRIANGLES.save(tmp_path / "no" / "such" / "folder.stl")
     assert not list(tmp_path.iterdir())
 
@@ -302,7 +302,7 @@ def test_other_packages_round_trip(package):
     pytest.importorskip(package)
     for shape in (TRIANGLES, POLYGONS, POINTS):
         if package == "trimesh" and shape is POLYGONS:
-            with refused(sh.GeometryError):
+            with refused(sh.errors.GeometryError):
                 shape.to_trimesh()
             continue
         back = getattr(type(shape), f"from_{package}")(getattr(shape, f"to_{package}")())
@@ -311,7 +311,7 @@ def test_other_packages_round_trip(package):
 
 def test_triangles_are_not_made_of_polygons_in_silence():
     pytest.importorskip("meshio")
-    with refused(sh.GeometryError, "face 1"):
+    with refused(sh.errors.GeometryError, "face 1"):
         sh.TriangleMesh.from_meshio(POLYGONS.to_meshio())
 
 

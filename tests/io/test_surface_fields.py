@@ -31,7 +31,7 @@ def test_values_and_vertices_come_back(tmp_path, name, ending):
 def test_shapes_without_values_are_no_fields_but_are_looked_at(tmp_path, ending):
     path = tmp_path / f"ball.{ending}"
     samples.sphere(1).save(path)
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         sh.load_field(path)
     assert main(["view", str(path), "-o", str(tmp_path / "ball.png")]) == 0
 
@@ -44,6 +44,6 @@ def test_fields_on_surfaces_are_looked_at_and_have_levels(tmp_path):
     assert main(["view", str(tmp_path / "ball.vtp"), "-o", str(tmp_path / "ball.png")]) == 0
     assert (tmp_path / "phi.png").read_bytes() != (tmp_path / "ball.png").read_bytes()
     assert main(["contour", str(tmp_path / "phi.vtp"), "0.5", "-o", str(tmp_path / "line.json")]) == 0
-    (line,) = sh.read_curves(tmp_path / "line.json", ball)
+    (line,) = sh.io.read_curves(tmp_path / "line.json", ball)
     at = np.einsum("nk,nkd->nd", line.barycentric, ball.vertices[ball.faces[line.faces]])
     assert at[:, 2] == pytest.approx(0.5)

@@ -168,6 +168,6 @@ def test_damaged_packages_are_refused(tmp_path, kind):
         path.write_bytes(what)
     else:
         package(path, what)
-    with pytest.raises(sh.SignedHeatError) as caught:
+    with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.read(path)
     assert caught.value.path == str(path)

@@ -95,9 +95,9 @@ def test_damaged_files_are_refused(tmp_path, band):
     data = (tmp_path / "band.vdb").read_bytes()
     for length in (5, 60, 400, len(data) // 2, len(data) - 1):
         (tmp_path / "cut.vdb").write_bytes(data[:length])
-        with refused(sh.FileFormatError, file="cut.vdb"):
+        with refused(sh.errors.FileFormatError, file="cut.vdb"):
             sh.load_field(tmp_path / "cut.vdb")
-    with refused(sh.FileFormatError, file="band.vti"):
+    with refused(sh.errors.FileFormatError, file="band.vti"):
         write_vdb(band, tmp_path / "band.vti")
 
 

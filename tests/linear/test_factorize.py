@@ -49,7 +49,7 @@ def test_only_the_upper_triangle_is_read(backend):
 
 @backends
 def test_an_indefinite_matrix_is_refused(backend):
-    with refused(sh.FactorizationError, "matrix"):
+    with refused(sh.errors.FactorizationError, "matrix"):
         factorize(sparse.csr_matrix([[1.0, 2.0], [2.0, 1.0]]), backend)
 
 
@@ -152,7 +152,7 @@ def test_factors_like_others_are_independent_of_them(surface, backend, together)
             factors[k].solve(truth), factorize(matrices[k], backend, like=factors[0]).solve(truth)
         )
     indefinite = sparse.csr_matrix(first - sparse.diags_array(np.full(len(truth), 9.0)))
-    with refused(sh.FactorizationError, "matrix"):
+    with refused(sh.errors.FactorizationError, "matrix"):
         factorize(indefinite, backend, like=factors[0]).solve(truth)
     np.testing.assert_allclose(factors[0].solve(whole(matrices[0]) @ truth), truth, atol=1e-9)
     del factors[0]

@@ -133,7 +133,7 @@ def test_fields_have_values_gradients_and_contours_anywhere(ball):
         (contour,) = field.contour(level)
         assert contour.closed
         assert field(contour) == pytest.approx(level, abs=1e-9)
-    with refused(sh.OutsideError, "level 9"):
+    with refused(sh.errors.OutsideError, "level 9"):
         field.contour(9.0)
 
 
@@ -147,7 +147,7 @@ def test_a_part_without_source_is_nan_with_one_warning_and_the_rest_as_without_i
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         phi = sh.SignedHeatSolver(two).distance(kind.source(two)).values.ravel()
-    assert [w.category for w in caught] == [sh.UnreachedWarning]
+    assert [w.category for w in caught] == [sh.errors.UnreachedWarning]
     assert np.array_equal(np.isnan(phi), ~first)
     alone = known(sh.SignedHeatSolver(one).distance(kind.source(one)).values)
     exact = kind.exact(two)
@@ -160,18 +160,18 @@ def test_a_part_without_source_is_nan_with_one_warning_and_the_rest_as_without_i
     "sources", [[], sh.Curve([0, 10**7], np.eye(3)[:2]), sh.PointCloud([[0, 0, 0]]), "a circle", None]
 )
 def test_sources_that_do_not_fit_are_refused(ball, sources):
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         ball.solver.distance(sources)
 
 
 def test_a_vertex_that_does_not_exist_is_refused(ball):
     if ball.is_surface:
-        with pytest.raises(sh.SourceError):
+        with pytest.raises(sh.errors.SourceError):
             ball.domain.path([0, 10**7])
 
 
 def test_level_values_must_be_as_many_as_the_sources(ball):
-    with refused(sh.ConstraintError):
+    with refused(sh.errors.ConstraintError):
         ball.distance(ball.source, sh.LevelValues([0.0, 1.0, 2.0]))
 
 
@@ -293,7 +293,7 @@ def test_ugly_but_valid_domains_work(make):
     else:
         line = domain.polyline([[-0.9, 0.33, 0], [0.9, 0.33, 0]], max_distance=1.0)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", sh.UnreachedWarning)
+        warnings.simplefilter("ignore", sh.errors.UnreachedWarning)
         phi = sh.SignedHeatSolver(domain).distance(line, sh.Free()).values.ravel()
     place = positions(domain)
     plate = np.zeros(len(place), dtype=bool)

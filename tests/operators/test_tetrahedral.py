@@ -84,7 +84,7 @@ def test_boundary_faces_outward():
     ],
 )
 def test_bad_meshes_are_named(vertices, tets, element):
-    with refused(sh.GeometryError, element):
+    with refused(sh.errors.GeometryError, element):
         sh.TetMesh(vertices, tets)
 
 

@@ -344,7 +344,7 @@ def test_awkward_faces_do_no_harm():
 
 
 def test_only_meshes_have_faces():
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.orientation(sh.PointCloud([[0, 0, 0], [1, 0, 0]]))
 
 

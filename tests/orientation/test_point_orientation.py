@@ -148,9 +148,9 @@ def test_awkward_points_get_unit_normals(points):
 
 
 def test_too_few_points_and_points_in_the_plane_are_refused():
-    with refused(sh.GeometryError, "points"):
+    with refused(sh.errors.GeometryError, "points"):
         orient_points(sh.PointCloud([[0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0]]))
-    with refused(sh.GeometryError, "points"):
+    with refused(sh.errors.GeometryError, "points"):
         orient_points(sh.PointCloud(np.random.default_rng(0).random((9, 2))))
 
 

@@ -153,13 +153,13 @@ def test_fields_from_files_can_be_sharpened(tmp_path):
     plain.save(tmp_path / "phi.vtu")
     loaded = sh.load_field(tmp_path / "phi.vtu")
     assert np.array_equal(sh.sharpen(loaded).values, sh.sharpen(plain).values)
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         sh.sharpen(loaded, method=sh.Convex())
 
 
 def test_one_sign_is_refused():
     mesh = boxes((2, 2, 2), 1.0)
-    with refused(sh.OutsideError):
+    with refused(sh.errors.OutsideError):
         sh.sharpen(sh.TetField(mesh, 1 + mesh.vertices[:, 0]))
 
 

@@ -257,7 +257,7 @@ def test_values_that_are_zero_at_vertices():
 
 def test_one_sign_is_refused():
     mesh = sphere(2)
-    with refused(sh.OutsideError):
+    with refused(sh.errors.OutsideError):
         sh.sharpen(sh.VertexField(mesh, 1 + mesh.vertices[:, 2] ** 2))
 
 
@@ -322,7 +322,7 @@ def test_sources_without_sides_on_other_domains():
 
 def test_convex_method_needs_a_source():
     mesh = sphere(2)
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         sh.sharpen(sh.VertexField(mesh, mesh.vertices[:, 2]), method=sh.Convex())
 
 
@@ -422,6 +422,6 @@ class Doubled:
 def test_a_field_that_became_worse_is_told():
     mesh = sphere(2)
     plain = sh.SignedHeatSolver(mesh).distance(mesh.level_set(latitudes(mesh.vertices)))
-    with pytest.warns(sh.InexactWarning):
+    with pytest.warns(sh.errors.InexactWarning):
         sharp = sh.sharpen(plain, Doubled())
     assert sharp.diagnostics.note(SlopeErrors).worse

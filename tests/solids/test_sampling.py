@@ -127,21 +127,21 @@ def taken_below(taken):
 
 def test_what_cannot_be_sampled_says_so(tmp_path, box):
     plain = sh.GridField(box.grid, box.values)
-    with pytest.raises(sh.SourceError) as caught:
+    with pytest.raises(sh.errors.SourceError) as caught:
         sh.sample(plain, 10)
     assert "signed_distance" in caught.value.remedy
     for wrong in ({"n": 0}, {"near": 1.5}, {"widths": [-0.1]}, {"widths": [np.nan]}):
-        with pytest.raises(sh.SignedHeatError):
+        with pytest.raises(sh.errors.SignedHeatError):
             sh.sample(box, **{"n": 10, **wrong})
-    with pytest.raises(sh.FileFormatError):
+    with pytest.raises(sh.errors.FileFormatError):
         sh.sample(box, 10).save(tmp_path / "samples.txt")
     assert WIDTHS[0] ** 2 == pytest.approx(10 * WIDTHS[1] ** 2, rel=0.01)
 
 
 def test_numbers_of_samples_that_make_no_sense_or_do_not_fit_are_refused(box):
     for n in (0, -3, 2.5, "many", None, np.nan, True):
-        with refused(sh.SignedHeatError, "the number of samples"):
+        with refused(sh.errors.SignedHeatError, "the number of samples"):
             sh.sample(box, n)
     for n in (10**15, 10**30):
-        with pytest.raises(sh.MemoryLimitError):
+        with pytest.raises(sh.errors.MemoryLimitError):
             sh.sample(box, n)

@@ -9,12 +9,12 @@ from signedheat import (
     Grid,
     PointCloud,
     PolygonMesh,
-    SourceError,
     TriangleMesh,
     samples,
     signed_distance,
 )
 from signedheat.diagnostics import BoundsNothing, CompletedArea, LeftOut, ReachesBox, ShapeOriented
+from signedheat.errors import SourceError
 
 
 def only(mesh, chosen):

@@ -76,7 +76,7 @@ def test_vertices_at_which_cones_touch_are_not_regular():
 def test_what_is_saved_is_the_same_solid(tmp_path, name):
     solid = complete(SHAPES[name]())
     solid.save(tmp_path / "solid.npz")
-    again, points = sh.load(tmp_path / "solid.npz"), points_around(solid)
+    again, points = sh.io.load(tmp_path / "solid.npz"), points_around(solid)
     for one, other in zip(vars(solid.closest(points)).values(), vars(again.closest(points)).values(), strict=True):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(solid.inside(points), again.inside(points))
@@ -86,14 +86,14 @@ def test_files_that_hold_no_solid_are_refused(tmp_path):
     solid = complete(box((-1, -1, -1), (1, 1, 1)))
     solid.field(resolution=8).save(tmp_path / "field.npz")
     with pytest.raises(sh.errors.FileFormatError, match="no solid"):
-        sh.load(tmp_path / "field.npz")
+        sh.io.load(tmp_path / "field.npz")
     solid.save(tmp_path / "solid.npz")
     arrays = dict(np.load(tmp_path / "solid.npz"))
     np.savez(tmp_path / "later.npz", **{**arrays, "solid_version": 99})
     np.savez(tmp_path / "short.npz", **{**arrays, "origins": arrays["origins"][1:]})
     with pytest.raises(sh.errors.FileFormatError, match="later version"):
-        sh.load(tmp_path / "later.npz")
+        sh.io.load(tmp_path / "later.npz")
     with pytest.raises(sh.errors.FileFormatError, match="do not fit"):
-        sh.load(tmp_path / "short.npz")
+        sh.io.load(tmp_path / "short.npz")
     with pytest.raises(sh.errors.FileFormatError, match="solid"):
         solid.save(tmp_path / "solid.stl")

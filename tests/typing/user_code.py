@@ -79,7 +79,7 @@ pieces = sh.piecewise_distance(mesh, [curve])
 assert_type(pieces, sh.PiecewiseField)
 assert_type(pieces.gradient(mesh.points_at([0])), NDArray[np.float64])
 assert_type(sh.close_curves(mesh, [curve, curve]), list[sh.Curve])
-assert_type(sh.read_curves("curves.txt", mesh), list[sh.Curve | sh.SurfacePoints])
+assert_type(sh.io.read_curves("curves.txt", mesh), list[sh.Curve | sh.SurfacePoints])
 
 # --- unions where it truly is one
 field = sh.load_field("phi.npz")
@@ -89,15 +89,15 @@ for surface in (mesh, polygons):
     assert_type(sh.SignedHeatSolver(surface).distance(curve), sh.VertexField[sh.TriangleMesh | sh.PolygonMesh])
 
 # --- morphology
-assert_type(sh.dilate(shape, 0.1), sh.TriangleMesh)
-assert_type(sh.opening(line, 0.1), list[sh.Polyline])
-assert_type(sh.closing(curve, 0.1, mesh), list[sh.Curve])
-assert_type(sh.shell(mesh, 0.0, 0.1), sh.TriangleMesh)
-assert_type(sh.thicken(mesh, 0.1), sh.TriangleMesh)
+assert_type(sh.morphology.dilate(shape, 0.1), sh.TriangleMesh)
+assert_type(sh.morphology.opening(line, 0.1), list[sh.Polyline])
+assert_type(sh.morphology.closing(curve, 0.1, mesh), list[sh.Curve])
+assert_type(sh.morphology.shell(mesh, 0.0, 0.1), sh.TriangleMesh)
+assert_type(sh.morphology.thicken(mesh, 0.1), sh.TriangleMesh)
 
 # --- what does not fit is told: mypy fails where an ignore is not needed
 sh.signed_distance(curve)  # type: ignore[call-overload]
 sh.SignedHeatSolver("mesh")  # type: ignore[type-var]
-sh.dilate(curve, 0.1)  # type: ignore[call-overload]
+sh.morphology.dilate(curve, 0.1)  # type: ignore[call-overload]
 _ = sdf.contour(0).normals  # type: ignore[attr-defined]
 mesh.path("abc", closed="yes")  # type: ignore[arg-type]

@@ -129,7 +129,7 @@ def test_grids_go_to_pyvista_with_their_walls():
     assert image.dimensions == (5, 5, 1)
     solid = np.asarray(image.points)[image.point_data["solid"]]
     assert np.array_equal(solid[:, 0], solid[:, 1]) and len(solid) == 5
-    with pytest.raises(sh.GeometryError) as told:
+    with pytest.raises(sh.errors.GeometryError) as told:
         sh.Grid((0.0,), 1.0, (4,)).to_pyvista()
     assert told.value.element == "grid"
 

@@ -52,5 +52,5 @@ def test_completed_parts_of_levels_are_dashed():
 
 
 def test_a_picture_of_unknown_kind_is_refused(tmp_path):
-    with refused(sh.FileFormatError):
+    with refused(sh.errors.FileFormatError):
         view.save_scene(samples.sphere(0), tmp_path / "a.bmp")

@@ -88,7 +88,7 @@ def run_skfmm(folder: Path) -> list[tuple[str, str, str]]:
         several = None if np.ndim(periodic) == 0 else [bool(each) for each in periodic]
         try:
             return sh.redistance(phi, dx, periodic=bool(periodic) if several is None else several)
-        except sh.SignedHeatError as error:
+        except sh.errors.SignedHeatError as error:
             raise ValueError(str(error)) from None
 
     def theirs(*arguments: Any, **options: Any) -> Any:

@@ -41,7 +41,7 @@ def run(arguments: Namespace) -> Summary:
     field, image = images.field_or_image(arguments.field), None
     if field is None:
         field = io.load_field(arguments.field)  # on tets, or refused
-    if isinstance(field, sh.LabelImage):
+    if isinstance(field, sh.io.LabelImage):
         field, image = images.field_of(field), field
     if isinstance(field, sh.VertexField):
         return lines(field, arguments)

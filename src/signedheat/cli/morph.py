@@ -84,7 +84,7 @@ def run(arguments: Namespace) -> Summary:
     options = {} if arguments.operation == "thicken" else {"measure": measure}
     with computing.prefix_errors(arguments.shape):
         grid = computing.grid_for(shape, arguments, max(abs(distance) for distance in arguments.distances))
-        surface = getattr(sh, arguments.operation)(shape, *arguments.distances, domain=grid, **options)
+        surface = getattr(sh.morphology, arguments.operation)(shape, *arguments.distances, domain=grid, **options)
     io.save(surface, arguments.output)
     if arguments.preview and fields:
         view.save_slices(fields[0], arguments.preview, shape, levels(arguments))

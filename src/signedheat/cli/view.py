@@ -90,16 +90,16 @@ def display_answers() -> bool:
 def shape_or_field(path: str) -> Any:
     """What a file holds; those of tets may hold either."""
     found = images.field_or_image(path)
-    if isinstance(found, sh.LabelImage):
+    if isinstance(found, sh.io.LabelImage):
         with computing.prefix_errors(path):
             return images.thing_of(found)
     if found is not None:
         return found
     if io.files.extension(path) in io.VALUE_FORMATS:
-        with suppress(sh.FileFormatError):  # a shape without values
+        with suppress(sh.errors.FileFormatError):  # a shape without values
             return io.load_field(path)
     thing = io.read(path)
     if isinstance(thing, sh.TetMesh) and io.files.extension(path) in io.TET_FIELD_FORMATS:
-        with suppress(sh.FileFormatError):
+        with suppress(sh.errors.FileFormatError):
             return io.load_field(path)
     return thing

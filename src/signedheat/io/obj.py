@@ -26,7 +26,7 @@ def read_obj(path: PathLike) -> SurfaceShape:
     if "l" in lines:
         raise FileFormatError(
             f"there are {len(lines['l'])} line elements and no face",
-            remedy="read them with sh.read_curves(path, mesh)",
+            remedy="read them with sh.io.read_curves(path, mesh)",
             path=path,
         )
     normals = _coordinates(lines["vn"], path, "normals") if "vn" in lines else None

@@ -67,7 +67,7 @@ def load(path: PathLike) -> Solid:
     >>> solid = sh.complete(samples.broken_duck())
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     solid.save(f"{folder}/duck.npz")
-    ...     again = sh.load(f"{folder}/duck.npz")
+    ...     again = sh.io.load(f"{folder}/duck.npz")
     >>> bool(again.distance([[0.1, 0.2, 0.3]]) == solid.distance([[0.1, 0.2, 0.3]]))
     True
     """

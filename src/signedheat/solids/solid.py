@@ -282,7 +282,7 @@ class Solid(Frozen, ShortRepr):
         return dense_field(self, where, progress).contour(height)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a ``.npz`` file, without notes; `signedheat.load` reads it, and nothing is completed again."""
+        """Write to a ``.npz`` file, without notes; `signedheat.io.load` reads it, and nothing is completed again."""
         save_solid(self, path)
 
     def _in_order(self, points: NDArray[np.float64], function) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]

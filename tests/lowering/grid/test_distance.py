@@ -31,7 +31,7 @@ def test_sphere_plain_and_sharpened():
 def test_points_that_are_lost_in_one_cell_are_refused():
     """Their area, 1e−59 of that of a cell, is no number in single precision."""
     points = sphere(100).vertices
-    with refused(sh.SourceError, "source"):
+    with refused(sh.errors.SourceError, "source"):
         sh.SignedHeatSolver(sh.Grid((-1, -1, -1), 0.3, (8, 8, 8))).distance(sh.PointCloud(1e-30 * points, points))
 
 
@@ -183,7 +183,7 @@ def test_levels_of_several_sources_and_components():
             assert spread < 0.3 * h
     free = solver.distance(both, sh.EachComponent())
     assert max(level_at(free, left)[1], level_at(free, right)[1]) < 0.3 * h
-    with refused(sh.ConstraintError):
+    with refused(sh.errors.ConstraintError):
         solver.distance([left, right], sh.LevelValues([0, 1, 2]))
 
 
@@ -196,24 +196,24 @@ def test_sides_that_coincide_are_told_and_refused_when_nothing_is_left():
     outside = np.abs(field.grid.points[..., 2]) > 0.1
     assert (field.values[outside] > 0).all()
     twice = sh.TriangleMesh(thin.vertices, np.concatenate([thin.faces, thin.faces[:, ::-1]]))
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         sh.SignedHeatSolver(sh.Grid.around(twice, 32)).distance(twice)
 
 
 def test_what_cannot_be_done_is_refused_with_the_remedy():
     shape = sphere(300)
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         sh.SignedHeatSolver(box(16)).distance(sh.PointCloud(shape.vertices))
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         sh.SignedHeatSolver(sh.Grid((5, 5, 5), 0.1, (9, 9, 9))).distance(shape)
-    with refused(sh.SourceError, "source"):
+    with refused(sh.errors.SourceError, "source"):
         sh.SignedHeatSolver(box(16)).distance(sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]))
-    with refused(sh.SourceError, "source 0"):
+    with refused(sh.errors.SourceError, "source 0"):
         sh.SignedHeatSolver(box(16)).distance(sh.PointCloud([[0, 0]], [[0, 1]]))
-    with refused(sh.SourceError, "source"):
+    with refused(sh.errors.SourceError, "source"):
         sh.SignedHeatSolver(box(16)).distance(box(4))
-    with refused(sh.MemoryLimitError):
+    with refused(sh.errors.MemoryLimitError):
         sh.SignedHeatSolver(sh.Grid.around(shape, 20000)).distance(shape)
-    with refused(sh.OutsideError, "values"):
+    with refused(sh.errors.OutsideError, "values"):
         sh.sharpen(sh.GridField(box(8), np.ones((8, 8, 8))))
     assert memory_estimate(box(512)) < 10e9

@@ -122,7 +122,7 @@ def test_levels_and_components():
     np.testing.assert_allclose(phi([[0.3, 1.5], [0.6, 1.5]]), [0, 0.3], atol=0.01)
     each = sh.SignedHeatSolver(grid).distance(sources, sh.EachComponent())
     np.testing.assert_allclose(np.diff(each([[0.3, 1.5], [0.6, 1.5]])), 0.3, atol=0.01)
-    with refused(sh.ConstraintError):
+    with refused(sh.errors.ConstraintError):
         sh.SignedHeatSolver(grid).distance(sources, sh.LevelValues([0.0, 0.3, 1.0]))
 
 
@@ -140,7 +140,7 @@ def test_a_room_without_a_source_is_nan_and_says_so():
     solid = np.zeros((30, 20), dtype=bool)
     solid[18:20] = True
     grid = sh.Grid((0, 0), 1.0, solid.shape, solid)
-    with pytest.warns(sh.UnreachedWarning, match="200 of 560 free nodes are cut off"):
+    with pytest.warns(sh.errors.UnreachedWarning, match="200 of 560 free nodes are cut off"):
         phi = sh.SignedHeatSolver(grid).distance(sh.Polyline([[5.0, 19.0], [5.0, 0.0]]))
     assert np.isnan(phi.values[18:]).all() and np.isfinite(phi.values[:18]).all()
     assert len(phi.diagnostics.unreached) == 200
@@ -149,7 +149,7 @@ def test_a_room_without_a_source_is_nan_and_says_so():
     [line] = phi.contour(3.5)
     assert not line.closed
     np.testing.assert_allclose(line.points[:, 0], 8.5, atol=1e-4)
-    with refused(sh.GeometryError, "field"):
+    with refused(sh.errors.GeometryError, "field"):
         sh.sharpen(phi)
 
 
@@ -213,15 +213,15 @@ def test_contours_among_any_solid_nodes_are_closed_manifold_surfaces(level):
 
 
 def test_masks_are_checked():
-    with refused(sh.GeometryError, "mask"):
+    with refused(sh.errors.GeometryError, "mask"):
         sh.Grid((0, 0), 1.0, (3, 3), np.zeros((3, 4), dtype=bool))
-    with refused(sh.GeometryError, "mask"):
+    with refused(sh.errors.GeometryError, "mask"):
         sh.Grid((0, 0), 1.0, (3, 3), np.zeros((3, 3)))
-    with refused(sh.GeometryError, "mask"):
+    with refused(sh.errors.GeometryError, "mask"):
         sh.Grid((0, 0), 1.0, (3, 3), np.ones((3, 3), dtype=bool))
     solid = np.zeros((10, 10), dtype=bool)
     solid[4:8] = True
-    with refused(sh.SourceError, "source 0"):
+    with refused(sh.errors.SourceError, "source 0"):
         sh.SignedHeatSolver(sh.Grid((0, 0), 1.0, (10, 10), solid)).distance(sh.Polyline([[5.2, 1.0], [5.2, 8.0]]))
 
 

@@ -132,9 +132,9 @@ def test_lines_of_equal_distance_are_oriented_and_close():
     assert again([[0, 0]])[0] < 0 < again([[1.4, 0]])[0]
     [out] = phi.offset(-0.5)
     assert -out.signed_area == pytest.approx(np.pi * 0.25, rel=2e-3)
-    with refused(sh.OutsideError):
+    with refused(sh.errors.OutsideError):
         phi.offset(0.5)
-    with pytest.raises(sh.OutsideError):
+    with pytest.raises(sh.errors.OutsideError):
         phi.contour(10.0)
 
 
@@ -175,20 +175,20 @@ def test_boolean_images():
     assert rms(phi.values - exact) < 0.03
     [border] = sh.Polyline.from_mask(np.ones((3, 3), dtype=bool))  # what meets the border of the image is closed
     assert border.closed and border.bounds.tolist() == [[-0.5, -0.5], [2.5, 2.5]]
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.Polyline.from_mask(np.ones((3, 3)))
-    with refused(sh.GeometryError):
+    with refused(sh.errors.GeometryError):
         sh.Polyline.from_mask(np.zeros((3, 3), dtype=bool))
 
 
 def test_polylines_are_checked():
-    with refused(sh.GeometryError, "points"):
+    with refused(sh.errors.GeometryError, "points"):
         sh.Polyline([[0, 0]])
-    with refused(sh.GeometryError, "points"):
+    with refused(sh.errors.GeometryError, "points"):
         sh.Polyline([[1, 1], [1, 1], [1, 1]])
-    with refused(sh.GeometryError, "number 1"):
+    with refused(sh.errors.GeometryError, "number 1"):
         sh.Polyline([[0, 0], [np.nan, 1]])
-    with refused(sh.GeometryError, "points"):
+    with refused(sh.errors.GeometryError, "points"):
         sh.Polyline([[0, 0, 0], [1, 0, 0]])
     assert sh.Polyline([[0, 0], [1, 0], [1, 1], [0, 0]], closed=True).n_points == 3
     repeated = sh.Polyline([[-1, 0], [0, 0], [0, 0], [1, 0]])  # ugly, but valid
@@ -197,11 +197,11 @@ def test_polylines_are_checked():
 
 
 def test_sources_of_the_wrong_dimension_are_refused():
-    with refused(sh.SourceError, "source 0"):
+    with refused(sh.errors.SourceError, "source 0"):
         sh.SignedHeatSolver(sh.Grid((0, 0, 0), 0.1, (4, 4, 4))).distance(SQUARE)
-    with refused(sh.SourceError, "source 0"):
+    with refused(sh.errors.SourceError, "source 0"):
         sh.SignedHeatSolver(sh.Grid((0, 0), 0.1, (4, 4))).distance(sh.TriangleMesh(np.eye(3), [[0, 1, 2]]))
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         sh.SignedHeatSolver(sh.Grid((5, 5), 0.1, (4, 4))).distance(SQUARE)
 
 

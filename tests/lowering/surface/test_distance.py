@@ -246,7 +246,7 @@ def almost_the_same(mesh, rng):
     return [curve, curve, mesh.polyline(points + 1e-6)]
 
 
-@pytest.mark.filterwarnings("ignore:closed curves smaller:signedheat.InexactWarning")  # round_a_vertex
+@pytest.mark.filterwarnings("ignore:closed curves smaller:signedheat.errors.InexactWarning")  # round_a_vertex
 @pytest.mark.parametrize("make", [level_sets, zigzag, there_and_back, round_a_vertex, random_polyline, almost_the_same])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_zero_set_holds_however_curves_cross_the_mesh(make, seed):
@@ -265,7 +265,7 @@ def test_levels_that_contradict_each_other_are_refused():
     mesh = bumpy()
     x, y, _ = mesh.vertices.T
     crossing = [mesh.level_set(x, 0.1)[0], mesh.level_set(y, 0.1)[0], mesh.level_set(x, 0.1)[0]]
-    with refused(sh.ConstraintError, "vertex 281"):
+    with refused(sh.errors.ConstraintError, "vertex 281"):
         sh.SignedHeatSolver(mesh, intrinsic=False).distance(crossing, sh.LevelValues([0.0, 0.0, 1.0]))
 
 
@@ -297,7 +297,7 @@ def test_parts_do_not_know_of_each_other(constraint):
         np.concatenate([one.faces, one.faces + one.n_vertices]),
     )
     curve = loops(one)[0]
-    with pytest.warns(sh.UnreachedWarning, match=f"{one.n_vertices + 1} of"):
+    with pytest.warns(sh.errors.UnreachedWarning, match=f"{one.n_vertices + 1} of"):
         field = sh.SignedHeatSolver(both, 1.0, intrinsic=False).distance(curve, constraint)
     assert np.array_equal(field.diagnostics.unreached, np.arange(one.n_vertices, both.n_vertices))
     assert np.isnan(field.values[one.n_vertices :]).all()
@@ -306,7 +306,7 @@ def test_parts_do_not_know_of_each_other(constraint):
     )
     if isinstance(constraint, sh.ZeroSet | sh.EachComponent | sh.LevelValues):  # springs are measured in h
         constraint = replace(constraint, hard=True)
-        with pytest.warns(sh.UnreachedWarning):
+        with pytest.warns(sh.errors.UnreachedWarning):
             field = sh.SignedHeatSolver(both, 1.0, intrinsic=False).distance(curve, constraint)
     np.testing.assert_allclose(field.values[: one.n_vertices], solver.distance(curve, constraint).values, atol=1e-10)
 
@@ -324,7 +324,7 @@ def test_parts_that_meet_in_a_vertex_only_are_not_reached():
         np.concatenate([mesh.vertices, mesh.vertices[1:] + np.array([2, 2, 0])]),
         np.concatenate([mesh.faces, ids[mesh.faces]]),
     )
-    with pytest.warns(sh.UnreachedWarning, match=f"{mesh.n_vertices - 1} of"):
+    with pytest.warns(sh.errors.UnreachedWarning, match=f"{mesh.n_vertices - 1} of"):
         field = sh.SignedHeatSolver(bow, intrinsic=False).distance(bow.path([0, 1, 2, 3, 4]))
     assert np.isfinite(field.values[: mesh.n_vertices]).all() and np.isnan(field.values[mesh.n_vertices :]).all()
 

@@ -132,7 +132,7 @@ def test_level_values_and_groups(cube):
     middle = exact(cube.vertices) - gap / 2  # the mean over both sheets is zero
     inner = (cube.vertices > 0.5).all(axis=1) & (cube.vertices < 1.5).all(axis=1)
     assert np.abs(grouped.values - middle)[inner].max() < 0.1
-    with refused(sh.ConstraintError):
+    with refused(sh.errors.ConstraintError):
         distance(cube, [low, high], sh.LevelValues([0.0, 1.0, 2.0]))
 
 
@@ -171,7 +171,7 @@ def test_polygons_and_points_are_sources(cube):
     assert np.abs(phi.values - exact).max() < 1e-7
     cloud = sh.PointCloud(vertices, normals=np.tile(normal, (625, 1)))
     assert np.abs(distance(cube, cloud).values - exact).max() < 1e-7
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         distance(cube, sh.PointCloud(vertices))
 
 
@@ -222,7 +222,7 @@ def test_parts_without_a_source_are_nan_with_one_warning():
         np.concatenate([left.tets, left.tets + left.n_vertices]),
     )
     wall = rectangle([0.4, -1, -1], [0, 3, 0], [0, 0, 3])
-    with pytest.warns(sh.UnreachedWarning, match="384 of 768 tets") as record:
+    with pytest.warns(sh.errors.UnreachedWarning, match="384 of 768 tets") as record:
         phi = distance(right, wall)
     assert len(record) == 1
     assert np.isnan(phi.values).sum() == left.n_vertices
@@ -239,7 +239,7 @@ def test_tets_that_share_no_face_are_not_connected(shared):
     mesh = sh.TetMesh(np.concatenate([near, far[shared:]]), [[0, 1, 2, 3], [*range(shared), *range(4, 8 - shared)]])
     cut = rectangle([-3, -3, 0.25], [6, 0, 0], [0, 6, 0])
     keep = rectangle([0.1, 0.1, 0.25], [0.3, 0, 0], [0, 0.3, 0])
-    with pytest.warns(sh.UnreachedWarning, match="1 of 2 tets"):
+    with pytest.warns(sh.errors.UnreachedWarning, match="1 of 2 tets"):
         phi = distance(mesh, keep)
     assert phi.values[:4] == pytest.approx(near[:, 2] - 0.25, abs=1e-9)
     assert np.isnan(phi.values[4:]).all()
@@ -286,19 +286,19 @@ def test_directions_survive_beyond_the_range_of_numbers():
 
 def test_bad_sources_are_named(cube):
     far = rectangle([10, 10, 10], [1, 0, 0], [0, 1, 0])
-    with refused(sh.SourceError, "source 1"):
+    with refused(sh.errors.SourceError, "source 1"):
         distance(cube, [tilted()[0], far])
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         distance(cube, [])
-    with refused(sh.SourceError, "source 0"):
+    with refused(sh.errors.SourceError, "source 0"):
         distance(cube, sh.TriangleMesh([[1, 1, 1], [1.5, 1, 1], [0.5, 1, 1]], [[0, 1, 2]]))
-    with refused(sh.SourceError, "source 0"):
+    with refused(sh.errors.SourceError, "source 0"):
         distance(cube, sh.PointCloud([[1.0, 1.0], [0.5, 1.0]], normals=[[0, 1], [0, 1]], areas=[1, 1]))
-    with pytest.raises(sh.SourceError):
+    with pytest.raises(sh.errors.SourceError):
         distance(cube, sh.Curve([0], [[1, 0, 0]]))
     wall = tilted()[0]
     both = sh.TriangleMesh(wall.vertices, np.concatenate([wall.faces, wall.faces[:, ::-1]]))
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         distance(cube, both)
 
 

@@ -29,8 +29,8 @@ def test_parts_make_the_same_surface(tmp_path, cut):
 
 def test_levels_and_files_that_cannot_be_are_refused(tmp_path):
     band = sh.signed_distance(sphere(300), resolution=40, band=0.2)
-    with refused(sh.OutsideError, element="level 0.5"):
+    with refused(sh.errors.OutsideError, element="level 0.5"):
         band.save_contour(tmp_path / "a.ply", 0.5)
-    with refused(sh.FileFormatError, file="a.stl"):
+    with refused(sh.errors.FileFormatError, file="a.stl"):
         band.save_contour(tmp_path / "a.stl")
     assert not list(tmp_path.iterdir())

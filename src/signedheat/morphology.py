@@ -1,5 +1,7 @@
 """Morphological operations on broken shapes: successive offsets of their signed distance (Sec. 9.3.1).
 
+Also the smooth unions, intersections and differences of fields.
+
 Every step recomputes the distance, since the distance to an offset equals that to the shape, up to a constant, on one
 side only.
 """
@@ -12,25 +14,38 @@ from typing import Literal, Protocol, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints
-from ..domains.grid import Grid, room_around
-from ..domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
-from ..domains.polygon_mesh import PolygonMesh
-from ..domains.polyline import Polyline
-from ..domains.tet_mesh import TetMesh
-from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import finite_number
-from ..errors import SignedHeatError, SourceError, UnsupportedTypeError
-from ..fields.grid_field import GridField
-from ..fields.to_field import Field
-from ..fields.vertex_field import VertexField
-from ..geometry.face_features import FaceFeatures
-from ..geometry.face_tree import FaceTree
-from ..lowering.area_elements import area_elements, bounds_around
-from ..lowering.grid.discretization import refuse_beyond_memory
-from ..sharpening.sharpen import sharpen
-from ..signed_distance import signed_distance
-from ..solver import SignedHeatSolver, as_list
+from .domains.curves import Curve, CurveOrPoints, CurvesAndPoints
+from .domains.grid import Grid, room_around
+from .domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
+from .domains.polygon_mesh import PolygonMesh
+from .domains.polyline import Polyline
+from .domains.tet_mesh import TetMesh
+from .domains.triangle_mesh import TriangleMesh
+from .domains.validation import finite_number
+from .errors import SignedHeatError, SourceError, UnsupportedTypeError
+from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
+from .fields.grid_field import GridField
+from .fields.to_field import Field
+from .fields.vertex_field import VertexField
+from .geometry.face_features import FaceFeatures
+from .geometry.face_tree import FaceTree
+from .lowering.area_elements import area_elements, bounds_around
+from .lowering.grid.discretization import refuse_beyond_memory
+from .sharpening.sharpen import sharpen
+from .signed_distance import signed_distance
+from .solver import SignedHeatSolver, as_list
+
+__all__ = [
+    "closing",
+    "dilate",
+    "erode",
+    "opening",
+    "shell",
+    "smooth_difference",
+    "smooth_intersection",
+    "smooth_union",
+    "thicken",
+]
 
 RESOLUTION = 128
 ROOM = 0.15

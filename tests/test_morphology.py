@@ -44,7 +44,10 @@ def waved_sheet(n=20):
     return sh.TriangleMesh(vertices, faces)
 
 
-@pytest.mark.parametrize(("operation", "radius"), [(sh.dilate, 1.4), (sh.erode, 0.6), (sh.opening, 1), (sh.closing, 1)])
+@pytest.mark.parametrize(
+    ("operation", "radius"),
+    [(sh.morphology.dilate, 1.4), (sh.morphology.erode, 0.6), (sh.morphology.opening, 1), (sh.morphology.closing, 1)],
+)
 def test_balls_stay_balls(operation, radius):
     ball = operation(BALL, 0.4, resolution=64)
     assert is_closed_and_manifold(ball)
@@ -54,14 +57,14 @@ def test_balls_stay_balls(operation, radius):
 
 def test_a_broken_ball_grows_as_if_it_were_whole():
     broken = samples.with_flipped_faces(samples.without_patches(BALL, 4, 0.35), 0.05)
-    grown = sh.dilate(broken, 0.3, resolution=64)
+    grown = sh.morphology.dilate(broken, 0.3, resolution=64)
     assert is_closed_and_manifold(grown)
     # Holes of angular radius 0.35 leave 1 − cos 0.35 = 0.06 open to interpretation.
     assert np.quantile(np.abs(radii(grown) - 1.3), 0.99) < 0.06
     np.testing.assert_allclose(radii(grown), 1.3, atol=0.1)
 
 
-@pytest.mark.parametrize("operation", [sh.opening, sh.closing])
+@pytest.mark.parametrize("operation", [sh.morphology.opening, sh.morphology.closing])
 def test_a_second_time_changes_nothing_beyond_a_cell(operation):
     grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=80, padding=0.5)
     once = operation(box_with_arms(), 0.2, grid)
@@ -71,14 +74,14 @@ def test_a_second_time_changes_nothing_beyond_a_cell(operation):
 
 
 def test_opening_takes_thin_arms_off():
-    opened = sh.opening(box_with_arms(), 0.2, resolution=80)
+    opened = sh.morphology.opening(box_with_arms(), 0.2, resolution=80)
     assert np.abs(opened.vertices).max() < 0.56
 
 
 @pytest.mark.parametrize("sides", [(0.1,), (0.1, 0.0), (0.0, 0.1), (0.15, 0.1)])
 def test_a_sheet_gains_twice_its_area_times_the_distance(sides):
     sheet = waved_sheet()
-    solid = sh.thicken(sheet, *sides, resolution=96)
+    solid = sh.morphology.thicken(sheet, *sides, resolution=96)
     assert is_closed_and_manifold(solid)
     above, below = sides if len(sides) == 2 else 2 * sides
     reach, rim = max(above, below), 8.2
@@ -89,7 +92,7 @@ def test_a_sheet_gains_twice_its_area_times_the_distance(sides):
 
 def test_a_triangle_is_thickened_to_its_exact_distance():
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    solid = sh.thicken(sh.TriangleMesh(corners, [[0, 1, 2]]), 0.3, resolution=96)
+    solid = sh.morphology.thicken(sh.TriangleMesh(corners, [[0, 1, 2]]), 0.3, resolution=96)
     assert is_closed_and_manifold(solid)
     prism, slant = 2 * 0.3 * 0.5, np.sqrt(2.0)
     rounded = 0.5 * np.pi * 0.3**2 * (2 + slant) + 4 / 3 * np.pi * 0.3**3
@@ -98,8 +101,8 @@ def test_a_triangle_is_thickened_to_its_exact_distance():
 
 def test_thickening_beyond_memory_is_refused(monkeypatch):
     monkeypatch.setattr(memory, "_free", lambda: 100_000_000)
-    with pytest.raises(sh.MemoryLimitError) as caught:
-        sh.thicken(waved_sheet(), 0.1, resolution=400)
+    with pytest.raises(sh.errors.MemoryLimitError) as caught:
+        sh.morphology.thicken(waved_sheet(), 0.1, resolution=400)
     assert caught.value.remedy
 
 
@@ -107,12 +110,13 @@ def test_thickening_evenly_does_not_ask_which_side_is_which():
     sheet = waved_sheet()
     flipped = samples.with_flipped_faces(sheet, 0.5)
     np.testing.assert_array_equal(
-        sh.thicken(sheet, 0.1, resolution=48).vertices, sh.thicken(flipped, 0.1, resolution=48).vertices
+        sh.morphology.thicken(sheet, 0.1, resolution=48).vertices,
+        sh.morphology.thicken(flipped, 0.1, resolution=48).vertices,
     )
 
 
 def test_a_shell_lies_between_two_offsets():
-    wall = sh.shell(BALL, 0.0, 0.2, resolution=64)
+    wall = sh.morphology.shell(BALL, 0.0, 0.2, resolution=64)
     assert is_closed_and_manifold(wall)
     assert volume(wall) == pytest.approx(4 / 3 * np.pi * (1.2**3 - 1), rel=0.01)
     assert radii(wall).min() == pytest.approx(1.0, abs=0.005)
@@ -126,7 +130,12 @@ def test_a_disk_on_a_plane_grows():
     faces = np.concatenate([np.stack([i, i + n + 1, i + n + 2], 1), np.stack([i, i + n + 2, i + 1], 1)])
     mesh = sh.TriangleMesh(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces)
     circles = mesh.level_set(np.hypot(x, y).ravel(), 0.4)
-    for operation, radius in [(sh.dilate, 0.6), (sh.erode, 0.2), (sh.closing, 0.4), (sh.opening, 0.4)]:
+    for operation, radius in [
+        (sh.morphology.dilate, 0.6),
+        (sh.morphology.erode, 0.2),
+        (sh.morphology.closing, 0.4),
+        (sh.morphology.opening, 0.4),
+    ]:
         (grown,) = operation(circles, 0.2, mesh)
         assert grown.closed
         positions = np.einsum("ij,ijk->ik", grown.barycentric, mesh.vertices[mesh.faces[grown.faces]])
@@ -136,13 +145,17 @@ def test_a_disk_on_a_plane_grows():
 @pytest.mark.parametrize(
     ("call", "kind", "element"),
     [
-        (lambda: sh.dilate(BALL, -0.1), sh.SignedHeatError, "the distance"),
-        (lambda: sh.dilate(BALL, np.nan), sh.SignedHeatError, "the distance"),
-        (lambda: sh.erode(BALL, 2.0, resolution=32), sh.OutsideError, "level -2"),
-        (lambda: sh.shell(BALL, 0.2, 0.1), sh.SignedHeatError, None),
-        (lambda: sh.shell(BALL, 0.0, 0.001, resolution=32), sh.SignedHeatError, None),
-        (lambda: sh.thicken(samples.oriented_points(BALL, 50), 0.1, resolution=32), sh.SignedHeatError, None),
-        (lambda: sh.thicken(waved_sheet(), 0.0), sh.SignedHeatError, None),
+        (lambda: sh.morphology.dilate(BALL, -0.1), sh.errors.SignedHeatError, "the distance"),
+        (lambda: sh.morphology.dilate(BALL, np.nan), sh.errors.SignedHeatError, "the distance"),
+        (lambda: sh.morphology.erode(BALL, 2.0, resolution=32), sh.errors.OutsideError, "level -2"),
+        (lambda: sh.morphology.shell(BALL, 0.2, 0.1), sh.errors.SignedHeatError, None),
+        (lambda: sh.morphology.shell(BALL, 0.0, 0.001, resolution=32), sh.errors.SignedHeatError, None),
+        (
+            lambda: sh.morphology.thicken(samples.oriented_points(BALL, 50), 0.1, resolution=32),
+            sh.errors.SignedHeatError,
+            None,
+        ),
+        (lambda: sh.morphology.thicken(waved_sheet(), 0.0), sh.errors.SignedHeatError, None),
     ],
 )
 def test_bad_input_is_named(call, kind, element):

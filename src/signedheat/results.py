@@ -1,0 +1,10 @@
+"""Classes of what functions and methods return, for annotations; users make none of them."""
+
+from .curves.orientation import CurveOrientation
+from .diagnostics import Diagnostics
+from .fields.known_solid import Closest
+from .orientation.meshes import Orientation
+from .solids.deviation import Deviation
+from .solids.sampling import Samples
+
+__all__ = ["Closest", "CurveOrientation", "Deviation", "Diagnostics", "Orientation", "Samples"]
