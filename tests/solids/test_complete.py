@@ -120,6 +120,15 @@ def test_scale_is_local():
         assert np.mean(solid.inside(points * r + c) != alone.inside(points)) < 2e-3
 
 
+def test_boxes_that_touch_along_an_edge_where_each_lacks_a_side_stay_solid():
+    """The wall that stands on the board looks like a fold of its upper side."""
+    board, wall = box((2.0, 1.0, 0.2), without=(0,)), box((0.2, 1.0, 1.5), (0.0, 0.0, 0.2), without=(4,))
+    for given in (joined(board, wall), joined(wall, board)):
+        solid = sh.complete(given)
+        assert volume(solid) == pytest.approx(2 * 0.2 + 0.2 * 1.5, rel=1e-9)
+        assert solid.inside([[0.1, 0.5, 0.1], [1.0, 0.5, 0.1], [0.1, 0.5, 1.0]]).all()
+
+
 @pytest.mark.parametrize("shift", [0.0, 1e-9, -1e-9, 1e-6, 1e-3, 0.3])
 def test_boxes_that_overlap_by_any_depth_are_one(shift):
     solid = sh.complete(joined(box(n=2), box(origin=(1.0 - shift, 0.0, 0.0), n=3)))

@@ -18,7 +18,10 @@ Mesh = TriangleMesh | PolygonMesh
 
 @dataclass(frozen=True, eq=False)
 class MeshFaces:
-    """Faces of triangle and polygon meshes alike, and the triangles that they are made of."""
+    """Faces of triangle and polygon meshes alike, and the triangles that they are made of.
+
+    Those that stand apart hang together with none that they do not agree with as given.
+    """
 
     positions: NDArray[np.float64]
     corners: NDArray[np.int64]
@@ -27,6 +30,7 @@ class MeshFaces:
     triangle_faces: NDArray[np.int64]
     bounds: NDArray[np.float64]
     unit: float
+    apart: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, shape: Mesh) -> MeshFaces:
@@ -57,7 +61,7 @@ class MeshFaces:
     @cached_property
     def surface(self) -> SurfaceParts:
         """The faces' parts."""
-        return SurfaceParts(self.positions, self.corners, self.offsets, self.measures[0])
+        return SurfaceParts(self.positions, self.corners, self.offsets, self.measures[0], self.apart)
 
     def normals(self, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
         """(p, 3) unit normals of the faces, some of them turned; zero without area."""

@@ -15,7 +15,7 @@ from ..errors import GeometryError
 from ..frozen import Frozen
 from ..reprs import ShortRepr
 from .mesh_faces import Mesh, MeshFaces
-from .parts import PartOrientation, Parts, orient_parts
+from .parts import LEAST_CLOSED, PartOrientation, Parts, clear, orient_parts
 from .points import orient_triangles
 from .soups import agreement, disagreeing_with_neighbors, odds_at_corners
 from .stabbing_lines import LineCrossings, aimed_lines, joined, stabbing_lines
@@ -163,8 +163,10 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
             remedy="pass a TriangleMesh or PolygonMesh",
         )
     faces = MeshFaces.of(shape)
+    lines, crossed = _lines(faces)
+    faces = _bodies_apart(faces, lines, crossed)
     surface = faces.surface
-    lines, crossed = _crossings(faces)
+    lines, crossed = _crossings(faces, lines, crossed)
     walls = _doubled_walls(surface, lines, surface.orientation.parts[crossed])
     parts = _table(faces, walls)
     if walls.any():
@@ -194,19 +196,52 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
     return _oriented(shape, surface, found, turned, wrong, walls, undecided)
 
 
-def _crossings(faces: MeshFaces) -> tuple[LineCrossings, NDArray[np.int64]]:
+def _bodies_apart(faces: MeshFaces, lines: LineCrossings, crossed: NDArray[np.int64]) -> MeshFaces:
+    """Faces of which those stand apart that bound something as they were given, where one such body must turn.
+
+    Two that touch along an edge, where each lacks a side, look like neighbours that disagree; if they are made to
+    agree, what one of them bounds the other undoes.
+    """
+    surface = faces.surface
+    if not surface.orientation.disagreeing:
+        return faces
+    pieces, part = surface.given.parts, surface.orientation.parts
+    found = votes(lines.starts, pieces[crossed], lines.entering, len(surface.given.orientable))
+    bodies = clear(found.own_votes, found.own, LEAST_CLOSED)
+    facing = np.where(surface.orientation.turned, -1, 1) * np.sign(found.own_votes)[pieces] * bodies[pieces]
+    areas = surface.areas * surface.is_first
+    sides = [np.bincount(part, areas * (facing == side), surface.n_parts) for side in (-1, 1)]
+    against = facing == np.where(sides[1] >= sides[0], -1, 1)[part]
+    apart = against & (facing != 0) & surface.is_first
+    return replace(faces, apart=apart) if apart.any() else faces
+
+
+def _lines(faces: MeshFaces) -> tuple[LineCrossings, NDArray[np.int64]]:
+    """Lines through first faces as they were given, and the faces that they cross."""
+    drawn = _drawn(faces)
+    count = 16 if len(drawn) < MANY else 8
+    lines = stabbing_lines(faces.positions, faces.triangles[drawn], faces.bounds, N_LINES, count)
+    return lines, faces.triangle_faces[drawn][lines.triangles]
+
+
+def _drawn(faces: MeshFaces) -> NDArray[np.int64]:
+    """Triangles of first faces."""
+    return np.flatnonzero(faces.surface.is_first[faces.triangle_faces])
+
+
+def _crossings(
+    faces: MeshFaces, lines: LineCrossings, crossed: NDArray[np.int64]
+) -> tuple[LineCrossings, NDArray[np.int64]]:
     """Lines through first faces as they agree with their neighbours, and the faces they cross."""
     surface = faces.surface
     parts, turned = surface.orientation.parts, surface.orientation.turned
-    drawn = np.flatnonzero(surface.is_first[faces.triangle_faces])
-    triangles, owners = faces.triangles[drawn], faces.triangle_faces[drawn]
-    lines = stabbing_lines(faces.positions, triangles, faces.bounds, N_LINES, 16 if len(triangles) < MANY else 8)
-    counts = np.bincount(parts[owners[lines.triangles]], minlength=surface.n_parts)
+    counts = np.bincount(parts[crossed], minlength=surface.n_parts)
     missed = np.flatnonzero(surface.orientation.closed & surface.is_part & (counts < N_AIMED))
     if len(missed):
         aims = _middles_of_largest(faces, missed)
-        lines = joined(lines, aimed_lines(faces.positions, triangles, faces.bounds, aims))
-    crossed = owners[lines.triangles]
+        drawn = _drawn(faces)
+        aimed = aimed_lines(faces.positions, faces.triangles[drawn], faces.bounds, aims)
+        lines, crossed = joined(lines, aimed), np.concatenate([crossed, faces.triangle_faces[drawn][aimed.triangles]])
     return replace(lines, entering=lines.entering != turned[crossed]), crossed
 
 

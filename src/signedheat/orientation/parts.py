@@ -113,10 +113,10 @@ def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.
     flat = np.abs(parts.volumes) <= 1e-12 * parts.areas**1.5
     by_volume = parts.closed & ~flat
     signs = np.where(by_volume, np.where(parts.volumes < 0, -1, 1), np.where(found.own_votes < 0, -1, 1))
-    return signs, by_volume | _clear(found.own_votes, found.own, LEAST_VOTE)
+    return signs, by_volume | clear(found.own_votes, found.own, LEAST_VOTE)
 
 
-def _clear(ballots: NDArray[np.int64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
+def clear(ballots: NDArray[np.int64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
     """Whether a vote is no accident of few lines: beyond the share and two standard deviations of a coin's."""
     return np.abs(ballots) > share * cast + 2.0 * np.sqrt(cast)
 
@@ -127,8 +127,8 @@ def _by_sight(found: Votes) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     As logarithms of odds: 6 at most, where all crossings vote and there are many. For hidden parts half of that, and
     the less the fewer parts that are seen are entered and left in turn: overlapping and doubled ones are not.
     """
-    seen = _clear(found.seen_votes, found.seen, LEAST_VOTE)
-    even = _clear(found.even_votes, found.even, 2 * LEAST_VOTE) & (3 * found.even > found.crossings)
+    seen = clear(found.seen_votes, found.seen, LEAST_VOTE)
+    even = clear(found.even_votes, found.even, 2 * LEAST_VOTE) & (3 * found.even > found.crossings)
     in_turn = (np.sign(found.seen_votes) * found.even_votes)[seen].sum() / max(int(found.even[seen].sum()), 1)
     by_seen, by_even = found.seen_votes / (found.seen + 16.0), found.even_votes / (found.even + 16.0)
     return np.where(seen, 6.0 * by_seen, 3.0 * max(in_turn, 0.0) * by_even), seen | even

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,12 +38,15 @@ class SurfaceParts:
         Vertex ids of all faces, and where those of each begin; one more offset than faces.
     areas : (p,) float
         Areas of the faces.
+    apart : (p,) bool, optional
+        Faces that hang together with none that they do not agree with as given.
     """
 
     vertices: NDArray[np.float64]
     corners: NDArray[np.int64]
     offsets: NDArray[np.int64]
     areas: NDArray[np.float64]
+    apart: NDArray[np.bool_] | None = None
 
     @property
     def n_faces(self) -> int:
@@ -162,8 +165,22 @@ class SurfaceParts:
     @cached_property
     def orientation(self) -> FaceOrientation:
         """Parts of first faces, and how they agree. Any other face is a part of its own, without meaning."""
+        return self._oriented(np.zeros(self.n_faces, dtype=bool) if self.apart is None else self.apart)
+
+    @cached_property
+    def given(self) -> FaceOrientation:
+        """The same where faces hang together only with those that they agree with as given."""
+        return self._oriented(np.ones(self.n_faces, dtype=bool))
+
+    def _oriented(self, apart: NDArray[np.bool_]) -> FaceOrientation:
         alike, opposite = self.copies
-        return orient_faces(self.pairs, self.tails, self.owners, self.areas * (alike - opposite))
+        pairs = self.pairs
+        if apart.any():
+            two, first, second = pairs.counts == 2, pairs.first, pairs.second
+            severed = two & (self.tails[first] == self.tails[second])
+            severed &= apart[self.owners[first]] | apart[self.owners[second]]
+            pairs = replace(pairs, counts=np.where(severed, np.int32(1), pairs.counts))
+        return orient_faces(pairs, self.tails, self.owners, self.areas * (alike - opposite))
 
     @property
     def n_parts(self) -> int:
