@@ -117,10 +117,7 @@ def add_placing_options(parser: Parser) -> None:
         "and .glb do",
     )
     place.add_argument(
-        "--transform",
-        nargs="+",
-        metavar="M",
-        help="16 numbers of a matrix by rows, or 12, or a file of them",
+        "--transform", nargs="+", metavar="M", help="16 numbers of a matrix by rows, or 12, or a file of them"
     )
 
 
@@ -209,11 +206,7 @@ def add_method_options(parser: Parser) -> None:
 def add_step_options(parser: Parser) -> None:
     """Add the options that leave out steps which are taken by default."""
     steps = add_repair_options(parser)
-    steps.add_argument(
-        "--plain",
-        action="store_true",
-        help="the method's own field, not measured to the shape itself",
-    )
+    steps.add_argument("--plain", action="store_true", help="the method's own field, not measured to the shape itself")
 
 
 def add_repair_options(parser: Parser) -> argparse._ArgumentGroup:

@@ -46,12 +46,7 @@ def report(file: str, arguments: Namespace) -> Summary:
     shape = read(file)
     counts = inspect(shape)
     found = orientation(shape) if isinstance(shape, TriangleMesh | PolygonMesh) else None
-    summary = {
-        "verdict": verdict(counts, found),
-        "file": file,
-        "kind": type(shape).__name__,
-        **asdict(counts),
-    }
+    summary = {"verdict": verdict(counts, found), "file": file, "kind": type(shape).__name__, **asdict(counts)}
     if (unit := unit_of(file)) is not None:
         summary["units"] = unit
     if extension(file) == ".obj":

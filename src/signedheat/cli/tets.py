@@ -37,8 +37,7 @@ def run(arguments: Namespace) -> Summary:
     mesh = read(given) if given else None
     if mesh is not None and not isinstance(mesh, TetMesh):
         raise GeometryError(
-            f"{given} holds no tets, but a {type(mesh).__name__}",
-            remedy="use a .mesh, .msh, .vtu or .ele file",
+            f"{given} holds no tets, but a {type(mesh).__name__}", remedy="use a .mesh, .msh, .vtu or .ele file"
         )
     with prefix_errors(arguments.shape):
         if mesh is None:

@@ -96,7 +96,8 @@ def snapped(values: NDArray[np.float64], ends: NDArray[np.int64], level: float) 
     >>> snapped(np.array([-1.0, 1e-16, 2.0]), chain, 0.0).tolist()
     [-1.0, 0.0, 2.0]
     """
-    steps = np.abs(values[ends[:, 0]] - values[ends[:, 1]])
+    with np.errstate(invalid="ignore"):  # values may be infinite
+        steps = np.abs(values[ends[:, 0]] - values[ends[:, 1]])
     steps[~np.isfinite(steps)] = 0.0
     steepest = np.zeros(len(values))
     np.maximum.at(steepest, ends, steps[:, None])

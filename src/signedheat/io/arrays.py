@@ -13,7 +13,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from .files import PathLike, contents, ensure_fits, reading
+from .files import PathLike, contents, damaged, ensure_fits, reading
 
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
@@ -49,20 +49,14 @@ def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
     """An array of numbers, from a file of `size` bytes."""
     version = npy.read_magic(file)
     if version not in _HEADERS:
-        raise FileFormatError(f"its version {version} of NumPy's format is not known", path=path)
+        raise FileFormatError(f"its version {version} of NumPy's format is not known")
     shape, is_fortran, dtype = _HEADERS[version](file)
     if dtype.kind not in "biufc":
-        raise FileFormatError(
-            f"the values are no numbers but {dtype}",
-            remedy="save numbers",
-            path=path,
-        )
+        raise FileFormatError(f"the values are no numbers but {dtype}", remedy="save numbers")
     announced, there = math.prod(shape) * dtype.itemsize, size - file.tell()
     if not 0 <= announced <= there or min(shape, default=0) < 0:
-        raise FileFormatError(
-            f"an array of shape {shape} needs {announced} bytes, of which {there} are there: the file is truncated",
-            remedy="write or download it again",
-            path=path,
+        raise damaged(
+            f"an array of shape {shape} needs {announced} bytes, of which {there} are there: the file is truncated"
         )
     ensure_fits(announced, path)
     values = np.empty(shape, dtype, order="F" if is_fortran else "C")
@@ -71,7 +65,7 @@ def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
     while at < announced:
         part = file.read(min(announced - at, 1 << 24))
         if not part:
-            raise FileFormatError("the data end early", remedy="write or download it again", path=path)
+            raise damaged("the data end early")
         flat[at : at + len(part)] = part
         at += len(part)
     return values

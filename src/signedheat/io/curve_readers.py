@@ -51,11 +51,11 @@ def read_text(path: PathLike, domain: EmbeddedSurface) -> list[Group]:
     """Curves in either of the two text formats."""
     lines = [line.split() for line in text(path).splitlines()]
     if any(words and words[0] in (SIGNED, UNSIGNED, POINTS) for words in lines):
-        return read_groups(path, lines, domain)
-    return read_segments(path, lines, domain)
+        return read_groups(lines, domain)
+    return read_segments(lines, domain)
 
 
-def read_groups(path: PathLike, lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
+def read_groups(lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
     """The format of the published demo."""
     groups: list[tuple[Group, bool]] = []
     edges = None
@@ -66,7 +66,7 @@ def read_groups(path: PathLike, lines: list[list[str]], domain: EmbeddedSurface)
             groups.append((Group(words[0], []), words[1:2] == ["1"]))
             continue
         if not groups:
-            raise damaged(path, number, words, f"a node comes before any {SIGNED}, {UNSIGNED} or {POINTS}")
+            raise damaged(number, words, f"a node comes before any {SIGNED}, {UNSIGNED} or {POINTS}")
         nodes = groups[-1][0].nodes
         try:
             if words[0] == "l":
@@ -75,11 +75,11 @@ def read_groups(path: PathLike, lines: list[list[str]], domain: EmbeddedSurface)
                 edges = edge_vertices(domain) if edges is None and words[0] == "e" else edges
                 nodes.append(parsed(words, edges, domain))
         except (ValueError, IndexError) as error:
-            raise damaged(path, number, words, str(error)) from error
+            raise damaged(number, words, str(error)) from error
     return [Group(g.kind, g.nodes[::-1] if reverse else g.nodes) for g, reverse in groups]
 
 
-def read_segments(path: PathLike, lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
+def read_segments(lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
     """Nodes, and oriented segments between them."""
     nodes: list[Node] = []
     segments: list[tuple[int, int]] = []
@@ -87,7 +87,7 @@ def read_segments(path: PathLike, lines: list[list[str]], domain: EmbeddedSurfac
     for number, words in enumerate(lines, start=1):
         if words[:1] == ["#offset"] and len(words) > 1:
             if not re.fullmatch(r"[-+]?\d{1,18}", words[1]):
-                raise damaged(path, number, words, "the offset is no whole number")
+                raise damaged(number, words, "the offset is no whole number")
             offset = int(words[1])
         if not words or words[0].startswith("#") or words[0] == "n":
             continue
@@ -99,8 +99,8 @@ def read_segments(path: PathLike, lines: list[list[str]], domain: EmbeddedSurfac
                 edges = edge_vertices(domain) if edges is None and words[0] == "e" else edges
                 nodes.append(parsed(words, edges, domain))
         except (ValueError, IndexError) as error:
-            raise damaged(path, number, words, str(error)) from error
-    return polylines_of_segments(path, SIGNED, nodes, segments)
+            raise damaged(number, words, str(error)) from error
+    return polylines_of_segments(SIGNED, nodes, segments)
 
 
 def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: EmbeddedSurface) -> Node:
@@ -122,16 +122,13 @@ def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: EmbeddedSu
     return Node(tuple(v for v, _ in pairs), tuple(w for _, w in pairs))
 
 
-def polylines_of_segments(
-    path: PathLike, kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]
-) -> list[Group]:
+def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]) -> list[Group]:
     """Segments between nodes, joined to curves; nodes at the same position count as one."""
     bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
     if bad:
         raise FileFormatError(
             f"segment {list(bad[0])} names a node that does not exist: there are {len(nodes)}",
             element=f"segment {list(bad[0])}",
-            path=path,
         )
     if not len(segments):
         return []
@@ -156,7 +153,7 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
     try:
         content = json.loads(text(path))
         if "polylines" not in content:
-            return groups_of(path, content)
+            return groups_of(content)
         lines = [
             (np.array(line["points"], dtype=np.float64), bool(line.get("closed", False)))
             for line in content["polylines"]
@@ -164,14 +161,11 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         if isinstance(error, SignedHeatError):
             raise
-        raise FileFormatError(
-            f"these are no curves with vertex ids and weights ({error!r})",
-            path=path,
-        ) from error
+        raise FileFormatError(f"these are no curves with vertex ids and weights ({error!r})") from error
     return [domain.polyline(points, closed=closed) for points, closed in lines]
 
 
-def groups_of(path: PathLike, content: dict[str, Any]) -> list[Group]:
+def groups_of(content: dict[str, Any]) -> list[Group]:
     """Curves with vertex ids and weights."""
     base, groups = int(content.get("index_base", 0)), []
     for group in content["groups"]:
@@ -184,7 +178,7 @@ def groups_of(path: PathLike, content: dict[str, Any]) -> list[Group]:
             groups.append(Group(POINTS, nodes))
         elif group["kind"] in (SIGNED, UNSIGNED):
             segments = [(int(i), int(j)) for i, j in group["segments"]]
-            groups += polylines_of_segments(path, group["kind"], nodes, segments)
+            groups += polylines_of_segments(group["kind"], nodes, segments)
         else:
             raise ValueError(f"the kind '{group['kind']}' is none of {SIGNED}, {UNSIGNED}, {POINTS}")
     return groups
@@ -210,14 +204,13 @@ def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]
                 ids = [i - 1 if i > 0 else len(vertices) + i for i in ids]
                 (lines if words[0] == "l" else points).append(ids)
         except ValueError as error:
-            raise damaged(path, number, words, str(error)) from error
+            raise damaged(number, words, str(error)) from error
     positions = np.array(vertices, dtype=np.float64).reshape(-1, 3)
     bad = [i for ids in lines + points for i in ids if not 0 <= i < len(positions)]
     if bad:
         raise FileFormatError(
             f"vertex {bad[0] + 1} of an element does not exist: there are {len(positions)}",
             element=f"vertex {bad[0] + 1}",
-            path=path,
         )
     corners = domain.triangulation.vertices
     scale = 1e-6 * float(np.ptp(corners, axis=0).max())
@@ -240,12 +233,10 @@ def projected_nodes(domain: EmbeddedSurface, points: NDArray[np.float64]) -> lis
     return nodes_of(faces, weights, domain)
 
 
-def damaged(path: PathLike, number: int, words: list[str], reason: str) -> FileFormatError:
+def damaged(number: int, words: list[str], reason: str) -> FileFormatError:
     """The error for a line that cannot be parsed."""
     return FileFormatError(
-        f"line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})",
-        element=f"line {number}",
-        path=path,
+        f"line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})", element=f"line {number}"
     )
 
 

@@ -89,11 +89,7 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
         if strict:
             refuse_gaps(sources, domain.triangulation)
     if not sources:
-        raise FileFormatError(
-            "there is no curve and no point",
-            remedy="check that it is a file of curves",
-            path=path,
-        )
+        raise FileFormatError("there is no curve and no point", remedy="check that it is a file of curves", path=path)
     return sources
 
 
@@ -184,8 +180,7 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[NDArray[np
         shared = set.intersection(*(set(around.get(v, ())) for v in ids))
         if not shared:
             raise SourceError(
-                f"point {k} lies between vertices {list(ids)}, which no face has in common",
-                element=f"point {k}",
+                f"point {k} lies between vertices {list(ids)}, which no face has in common", element=f"point {k}"
             )
         faces[k] = min(shared)
         corners = mesh.faces[faces[k]].tolist()

@@ -25,7 +25,5 @@ def face_lists(shape: SurfaceShape) -> Sequence[Sequence[int]]:
 def refuse(shape: object, path: PathLike, holds: str, instead: str) -> FileFormatError:
     """The error for a format that does not support a kind of shape."""
     return FileFormatError(
-        f"{extension(path)} files hold {holds}, not a {type(shape).__name__}",
-        remedy=f"save it as {instead}",
-        path=path,
+        f"{extension(path)} files hold {holds}, not a {type(shape).__name__}", remedy=f"save it as {instead}", path=path
     )

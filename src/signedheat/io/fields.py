@@ -49,11 +49,7 @@ def _(field: object, path: PathLike) -> None:
     elif isinstance(field, VertexField):
         save_vertex_field(field, path)
     else:
-        raise FileFormatError(
-            f"a {type(field).__name__} is no field",
-            remedy="pass what a solver returned",
-            path=path,
-        )
+        raise FileFormatError(f"a {type(field).__name__} is no field", remedy="pass what a solver returned", path=path)
 
 
 def save_field(field: GridField, path: PathLike) -> None:
@@ -75,15 +71,10 @@ def save_field(field: GridField, path: PathLike) -> None:
         If the format is unknown, does not support the dimension of the field, or the file cannot be written.
     """
     if not isinstance(field, GridField):
-        raise FileFormatError(
-            f"a {type(field).__name__} is no field on a grid: it has formats of its own",
-            path=path,
-        )
+        raise FileFormatError(f"a {type(field).__name__} is no field on a grid: it has formats of its own", path=path)
     if field.grid.dimension not in _DIMENSIONS.get(extension(path), (field.grid.dimension,)):
         raise FileFormatError(
-            f"the field has {field.grid.dimension} axes, too many or few",
-            remedy="save it as .npz",
-            path=path,
+            f"the field has {field.grid.dimension} axes, too many or few", remedy="save it as .npz", path=path
         )
     ensure_field_writable(path, in_band=field.blocks is not None)
     write = BAND_WRITERS[extension(path)] if field.blocks is not None else _FORMATS[extension(path)][0]
@@ -157,10 +148,7 @@ def _field_of(parts: Parts, path: PathLike) -> GridField:
     values, origin, spacing, mask, confidence = (*parts, None, None)[:5]
     try:
         if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
-            raise FileFormatError(
-                f"the values are no real numbers but {values.dtype}: it holds no field",
-                path=path,
-            )
+            raise FileFormatError(f"the values are no real numbers but {values.dtype}: it holds no field", path=path)
         grid = Grid(origin, spacing, values.shape, mask)
         return GridField(grid, np.ascontiguousarray(values), confidence=confidence)
     except GeometryError as error:
@@ -189,9 +177,7 @@ def _read_npz(path: PathLike) -> Parts:
     lacking = [name for name in ("values", "origin", "spacing") if name not in found]
     if lacking:
         raise FileFormatError(
-            f"it has no {lacking[0]}: a field has values, origin and spacing",
-            element=lacking[0],
-            path=path,
+            f"it has no {lacking[0]}: a field has values, origin and spacing", element=lacking[0], path=path
         )
     return found["values"], found["origin"], found["spacing"], found.get("mask"), found.get(CONFIDENCE)
 
@@ -229,11 +215,7 @@ def _read_nrrd(path: PathLike) -> Parts:
     directions = np.atleast_2d(header.get("space directions", np.diag(header.get("spacings", np.ones(values.ndim)))))
     spacing = np.diag(directions) if directions.shape == (values.ndim, values.ndim) else np.zeros(values.ndim)
     if not np.array_equal(directions, np.diag(spacing)):
-        raise FileFormatError(
-            "its axes are not x, y, z",
-            remedy="resample the image along them",
-            path=path,
-        )
+        raise FileFormatError("its axes are not x, y, z", remedy="resample the image along them", path=path)
     return values, np.asarray(header.get("space origin", np.zeros(values.ndim))), spacing
 
 

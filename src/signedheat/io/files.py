@@ -58,15 +58,16 @@ def told_apart(numbers: Sequence[float]) -> list[str]:
     return names
 
 
+def damaged(cause: str, element: str | None = None) -> FileFormatError:
+    """The error for a file that is truncated or damaged; `reading` says which file it is."""
+    return FileFormatError(cause, remedy="write or download it again", element=element)
+
+
 def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> FileFormatError:
     """The error for an extension that is not supported."""
     ending = extension(path)
     cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
-    return FileFormatError(
-        f"{cause} for {purpose}",
-        remedy=f"use one of {' '.join(sorted(known))}",
-        path=path,
-    )
+    return FileFormatError(f"{cause} for {purpose}", remedy=f"use one of {' '.join(sorted(known))}", path=path)
 
 
 @contextmanager
@@ -92,18 +93,14 @@ def reading(path: PathLike) -> Iterator[None]:
         raise error.at(path) from error
     except MemoryError as error:
         raise MemoryLimitError(
-            "what it announces does not fit into memory",
-            remedy="check that it is not damaged",
-            path=path,
+            "what it announces does not fit into memory", remedy="check that it is not damaged", path=path
         ) from error
     except Exception as error:  # parsers, ours and those of others, meet damage with exceptions of any type
         if _is_ours(error):
             raise
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(
-            f"it is damaged, or of another kind ({reason:.200})",
-            remedy="write or download it again",
-            path=path,
+            f"it is damaged, or of another kind ({reason:.200})", remedy="write or download it again", path=path
         ) from error
 
 
@@ -175,33 +172,19 @@ def contents(path: PathLike) -> bytes:
             ensure_fits(TAKEN.get(extension(path), 1) * status.st_size, path)
             data = file.read()
     except FileNotFoundError:
-        raise FileFormatError(
-            "there is no such file",
-            remedy="check the name",
-            path=path,
-        ) from None
+        raise FileFormatError("there is no such file", remedy="check the name", path=path) from None
     except IsADirectoryError:
-        raise FileFormatError(
-            "this is a folder",
-            remedy="name a file in it",
-            path=path,
-        ) from None
+        raise FileFormatError("this is a folder", remedy="name a file in it", path=path) from None
     except OSError as error:
         raise FileFormatError(
-            f"cannot be read ({error.strerror})",
-            remedy="check its permissions",
-            path=path,
+            f"cannot be read ({error.strerror})", remedy="check its permissions", path=path
         ) from error
     except ValueError as error:  # a name with a null character
         if isinstance(error, SignedHeatError):
             raise
         raise FileFormatError(f"this is no name of a file ({error})", remedy="check the name", path=path) from error
     if not data:
-        raise FileFormatError(
-            "the file is empty",
-            remedy="write or download it again",
-            path=path,
-        )
+        raise FileFormatError("the file is empty", remedy="write or download it again", path=path)
     return data
 
 
@@ -217,10 +200,7 @@ def contents_beside(path: PathLike, name: str) -> bytes:
     named = os.path.realpath(os.path.join(folder, name))
     if os.path.isabs(name) or os.path.commonpath([folder, named]) != folder:
         raise FileFormatError(
-            f"it refers to {name!r}, outside its folder",
-            remedy="put both into one folder",
-            element=name,
-            path=path,
+            f"it refers to {name!r}, outside its folder", remedy="put both into one folder", element=name, path=path
         )
     return contents(named)
 
@@ -257,11 +237,7 @@ def unpacked(data: bytes | memoryview, machine: Any, size: int) -> bytes:
 def _no_file(path: PathLike, mode: int) -> FileFormatError:
     kinds = ((stat.S_ISDIR, "folder"), (stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
     kind = next((name for test, name in kinds if test(mode)), "device")
-    return FileFormatError(
-        f"this is a {kind}",
-        remedy="name a regular file",
-        path=path,
-    )
+    return FileFormatError(f"this is a {kind}", remedy="name a regular file", path=path)
 
 
 def text(path: PathLike) -> str:
@@ -375,19 +351,13 @@ def writing(path: PathLike) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise FileFormatError(
-            f"cannot be written ({reason})",
-            remedy="choose a folder that exists, is yours and has room",
-            path=path,
+            f"cannot be written ({reason})", remedy="choose a folder that exists, is yours and has room", path=path
         ) from error
 
 
-def numbers(tokens: list[Any], path: PathLike, what: str, kind: type = float) -> NDArray[Any]:
+def numbers(tokens: list[Any], what: str, kind: type = float) -> NDArray[Any]:
     """Words of a text file as an array of numbers."""
     try:
         return np.array(tokens, dtype=np.float64 if kind is float else np.int64)
     except (ValueError, OverflowError) as error:
-        raise FileFormatError(
-            f"{what} are not all numbers ({error}): the file is damaged",
-            remedy="write or download it again",
-            path=path,
-        ) from error
+        raise damaged(f"{what} are not all numbers ({error}): the file is damaged") from error

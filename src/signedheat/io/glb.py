@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..packages import lazy_module
-from .files import PathLike, contents, contents_beside, ensure_fits, extension, parsed_by_others
+from .files import PathLike, contents, contents_beside, damaged, ensure_fits, extension, parsed_by_others
 
 trimesh = lazy_module("trimesh", ".glb and .gltf files")
 
@@ -37,11 +37,7 @@ def read_glb(path: PathLike) -> TriangleMesh:
 
     bodies = parsed_by_others(parse, len(data))
     if not bodies:
-        raise FileFormatError(
-            "the scene holds no triangles",
-            remedy="export the shape as a mesh",
-            path=path,
-        )
+        raise FileFormatError("the scene holds no triangles", remedy="export the shape as a mesh")
     starts = np.cumsum([0] + [len(vertices) for vertices, _ in bodies])
     faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
     return TriangleMesh(np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces))
@@ -63,11 +59,7 @@ def _without_looks(data: bytes, path: PathLike) -> tuple[bytes, dict[str, bytes]
     }
     most = len(data) + sum(map(len, files.values()))
     if any(not 0 <= accessor.get("count", 0) <= most for accessor in tree.get("accessors", [])):
-        raise FileFormatError(
-            "it announces more numbers than it has bytes: it is damaged",
-            remedy="write or download it again",
-            path=path,
-        )
+        raise damaged("it announces more numbers than it has bytes: it is damaged")
     ensure_fits(BYTES * sum(accessor.get("count", 0) for accessor in tree.get("accessors", [])), path)
     for looks in ("materials", "textures", "images", "samplers"):
         tree.pop(looks, None)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError
 from ..packages import lazy_module
-from .files import PathLike, contents, contents_beside, ensure_fits, numbers, unpacked
+from .files import PathLike, contents, contents_beside, damaged, ensure_fits, numbers, unpacked
 
 nrrd = lazy_module("nrrd", "NRRD files")
 
@@ -57,16 +57,12 @@ def read_image(path: PathLike) -> tuple[NDArray[Any], dict[str, Any]]:
     beside = header.get("data file", header.get("datafile"))
     if beside is not None:
         if beside.startswith("LIST") or "%" in beside:
-            raise FileFormatError("its data are in several files", remedy="save it as one", path=path)
+            raise FileFormatError("its data are in several files", remedy="save it as one")
         rest = contents_beside(path, beside)
     sizes = [int(n) for n in header["sizes"]]
     code = _CODES.get(header["type"])
     if code is None or len(sizes) != header["dimension"] or min(sizes, default=0) < 1:
-        raise FileFormatError(
-            f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} make no image",
-            remedy="write or download it again",
-            path=path,
-        )
+        raise damaged(f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} make no image")
     dtype = np.dtype(code).newbyteorder(">" if header.get("endian") == "big" else "<")
     for _ in range(header.get("line skip") or header.get("lineskip") or 0):
         rest = rest.partition(b"\n")[2]
@@ -105,24 +101,20 @@ def _values(data: bytes, header: dict[str, Any], count: int, dtype: np.dtype[Any
     if encoding in ("ascii", "text", "txt"):
         words = data[max(skip, 0) :].split()
         if len(words) < count:
-            raise _truncated(len(words), count, path)
-        return numbers(words[:count], path, "values").astype(dtype.newbyteorder("="))
+            raise _truncated(len(words), count)
+        return numbers(words[:count], "values").astype(dtype.newbyteorder("="))
     ensure_fits(size, path)
     if encoding in ("gzip", "gz"):
         data = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), size + max(skip, 0))
     elif encoding in ("bzip2", "bz2"):
         data = unpacked(data, bz2.BZ2Decompressor(), size + max(skip, 0))
     elif encoding != "raw":
-        raise FileFormatError(f"packed by '{encoding}'", remedy="save it as raw or gzip", path=path)
+        raise FileFormatError(f"packed by '{encoding}'", remedy="save it as raw or gzip")
     start = len(data) - size if skip == -1 else max(skip, 0)
     if start < 0 or len(data) - start < size:
-        raise _truncated(max(len(data) - start, 0), size, path)
+        raise _truncated(max(len(data) - start, 0), size)
     return np.frombuffer(data, dtype, count, start).astype(dtype.newbyteorder("="))
 
 
-def _truncated(there: int, announced: int, path: PathLike) -> FileFormatError:
-    return FileFormatError(
-        f"it announces {announced}, and {there} are there: it is truncated",
-        remedy="write or download it again",
-        path=path,
-    )
+def _truncated(there: int, announced: int) -> FileFormatError:
+    return damaged(f"it announces {announced}, and {there} are there: it is truncated")

@@ -21,14 +21,14 @@ def read_pcd(path: PathLike) -> PointCloud:
     while "DATA" not in header:
         end = content.find(b"\n", at)
         if end < 0:
-            raise FileFormatError("there is no line DATA: this is no PCD file, or it is truncated", path=path)
+            raise FileFormatError("there is no line DATA: this is no PCD file, or it is truncated")
         words = content[at:end].decode("ascii", "replace").partition("#")[0].split()
         if words:
             header[words[0].upper()] = words[1:]
         at = end + 1
-    table = _table(header, content[at:], path)
+    table = _table(header, content[at:])
     if not {"x", "y", "z"} <= table.keys():
-        raise FileFormatError(f"the fields are {', '.join(table)}, without x, y and z", path=path)
+        raise FileFormatError(f"the fields are {', '.join(table)}, without x, y and z")
     points = np.column_stack([table[axis] for axis in "xyz"])
     known = np.isfinite(points).all(axis=1)
     names = [f"normal_{axis}" for axis in "xyz"]
@@ -37,7 +37,7 @@ def read_pcd(path: PathLike) -> PointCloud:
     return PointCloud(points[known], normals[known] if normals is not None and whole else None)
 
 
-def _table(header: dict[str, list[str]], body: bytes, path: PathLike) -> dict[str, NDArray[np.float64]]:
+def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.float64]]:
     """Columns of numbers by name of the field."""
     try:
         names, kind = header["FIELDS"], header["DATA"][0].lower()
@@ -49,18 +49,18 @@ def _table(header: dict[str, list[str]], body: bytes, path: PathLike) -> dict[st
         if len(names) != len(fields) or n < 0:
             raise ValueError
     except (KeyError, ValueError, IndexError, TypeError):
-        raise FileFormatError("the header of the PCD file is not complete, or contradicts itself", path=path) from None
+        raise FileFormatError("the header of the PCD file is not complete, or contradicts itself") from None
     if kind == "binary":
         if len(body) < n * row.itemsize:
-            raise FileFormatError(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow", path=path)
+            raise FileFormatError(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow")
         rows = np.frombuffer(body, row, n)
         return {name: rows[f"{k}"][:, 0].astype(np.float64) for k, name in enumerate(names)}
     if kind != "ascii":
-        raise FileFormatError(f"data are {kind}", remedy="write them as ascii or binary", path=path)
+        raise FileFormatError(f"data are {kind}", remedy="write them as ascii or binary")
     try:
         numbers = np.array([line.split() for line in body.decode("ascii").splitlines() if line.strip()], dtype=float)
         numbers = numbers.reshape(n, sum(counts))
     except (ValueError, UnicodeDecodeError):
-        raise FileFormatError(f"there are no {n} lines of {sum(counts)} numbers", path=path) from None
+        raise FileFormatError(f"there are no {n} lines of {sum(counts)} numbers") from None
     begins = np.concatenate([[0], np.cumsum(counts)])
     return {name: numbers[:, begins[k]] for k, name in enumerate(names)}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
 from .elements import SurfaceShape, assemble, faces_of, points_of
-from .files import PathLike, contents, numbers
+from .files import PathLike, contents, damaged, numbers
 
 _TYPES = {
     name: code
@@ -51,15 +51,12 @@ def read_ply(path: PathLike) -> SurfaceShape:
     tables = _tables(path)
     vertex = {name: column for name, column in tables.get("vertex", {}).items() if not isinstance(column, tuple)}
     if not {"x", "y", "z"} <= vertex.keys():
-        raise FileFormatError(
-            "there is no element 'vertex' with x, y and z: this holds no shape",
-            path=path,
-        )
+        raise FileFormatError("there is no element 'vertex' with x, y and z: this holds no shape")
     vertices = _columns(vertex, "xyz")
     face = tables.get("face", {})
     lists = face.get("vertex_indices", face.get("vertex_index"))
     if lists is not None and not isinstance(lists, tuple):
-        raise FileFormatError("the vertex ids of faces are no lists", remedy="write it again", path=path)
+        raise damaged("the vertex ids of faces are no lists")
     if lists is not None and len(lists[1]):
         return assemble(vertices, *lists)
     strips = next((column for column in tables.get("tristrips", {}).values() if isinstance(column, tuple)), None)
@@ -96,8 +93,8 @@ def write_ply(shape: SurfaceShape, path: PathLike) -> bytes:
 
 def _tables(path: PathLike) -> dict[str, dict[str, Any]]:
     """The columns of each element."""
-    form, elements, body = _header(contents(path), path)
-    read_element = _text_reader(body, path) if form == "ascii" else _BinaryReader(body, form, path).read
+    form, elements, body = _header(contents(path))
+    read_element = _text_reader(body) if form == "ascii" else _BinaryReader(body, form).read
     return {element.name: read_element(element) for element in elements}
 
 
@@ -115,20 +112,13 @@ def _unrolled(strip: NDArray[np.int64]) -> NDArray[np.int64]:
     return windows[(windows >= 0).all(axis=1)]
 
 
-def _header(data: bytes, path: PathLike) -> tuple[str, list[_Element], bytes]:
+def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
     if not data.startswith(b"ply"):
-        raise FileFormatError(
-            "it does not begin with 'ply': this is no PLY file",
-            path=path,
-        )
+        raise FileFormatError("it does not begin with 'ply': this is no PLY file")
     end = data.find(b"end_header")
     newline = data.find(b"\n", end)
     if end < 0 or newline < 0:
-        raise FileFormatError(
-            "the header has no end: the file is truncated",
-            remedy="write or download it again",
-            path=path,
-        )
+        raise damaged("the header has no end: the file is truncated")
     form, elements = "", []
     for line in data[:end].decode("ascii", errors="replace").splitlines()[1:]:
         words = line.split()
@@ -143,17 +133,9 @@ def _header(data: bytes, path: PathLike) -> tuple[str, list[_Element], bytes]:
                 case ["property"]:
                     elements[-1].add(words[2], _TYPES[words[1]])
         except (IndexError, KeyError, ValueError):
-            raise FileFormatError(
-                f"the header line '{line}' makes no sense: the file is damaged",
-                remedy="write or download it again",
-                path=path,
-            ) from None
+            raise damaged(f"the header line '{line}' makes no sense: the file is damaged") from None
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise FileFormatError(
-            f"the format '{form}' is none that PLY has: the file is damaged",
-            remedy="write or download it again",
-            path=path,
-        )
+        raise damaged(f"the format '{form}' is none that PLY has: the file is damaged")
     return form, elements, data[newline + 1 :]
 
 
@@ -164,11 +146,9 @@ def _count(word: str) -> int:
     return int(word)
 
 
-def _truncated(path: PathLike, element: _Element) -> FileFormatError:
-    return FileFormatError(
-        f"the data end within the {element.count} announced of element '{element.name}': the file is truncated",
-        remedy="write or download it again",
-        path=path,
+def _truncated(element: _Element) -> FileFormatError:
+    return damaged(
+        f"the data end within the {element.count} announced of element '{element.name}': the file is truncated"
     )
 
 
@@ -178,7 +158,6 @@ class _BinaryReader:
 
     body: bytes
     form: str
-    path: PathLike
     at: int = 0
 
     def __post_init__(self) -> None:
@@ -193,7 +172,7 @@ class _BinaryReader:
             int(kind[1]) if isinstance(kind, str) else int(kind[0][1]) for kind in element.properties.values()
         )
         if element.count * smallest > len(self.body) - self.at:
-            raise _truncated(self.path, element)
+            raise _truncated(element)
         table = self._all_alike(element, lists)
         return self._row_by_row(element) if table is None else table
 
@@ -260,12 +239,12 @@ class _BinaryReader:
         """The next numbers."""
         size = length * int(code[1])
         if length < 0 or self.at + size > len(self.body):
-            raise _truncated(self.path, element)
+            raise _truncated(element)
         self.at += size
         return self._numbers(code, self.at - size, length)
 
 
-def _text_reader(body: bytes, path: PathLike) -> Any:
+def _text_reader(body: bytes) -> Any:
     lines = iter([line for line in body.decode("ascii", errors="replace").splitlines() if line.strip()])
 
     def read(element: _Element) -> dict[str, Any]:
@@ -273,16 +252,16 @@ def _text_reader(body: bytes, path: PathLike) -> Any:
             return {}
         rows = [line.split() for _, line in zip(range(element.count), lines, strict=False)]
         if len(rows) < element.count:
-            raise _truncated(path, element)
+            raise _truncated(element)
         table: dict[str, Any] = {}
         starts = [0] * len(rows)
         try:
             for name, kind in element.properties.items():
                 if isinstance(kind, str):
-                    table[name] = numbers([row[k] for row, k in zip(rows, starts, strict=True)], path, f"'{name}'")
+                    table[name] = numbers([row[k] for row, k in zip(rows, starts, strict=True)], f"'{name}'")
                     starts = [k + 1 for k in starts]
                     continue
-                counts = numbers([row[k] for row, k in zip(rows, starts, strict=True)], path, f"'{name}'", int)
+                counts = numbers([row[k] for row, k in zip(rows, starts, strict=True)], f"'{name}'", int)
                 ends = [k + 1 + n for k, n in zip(starts, counts.tolist(), strict=True)]
                 if any(n < 0 for n in counts.tolist()):
                     raise IndexError
@@ -290,10 +269,10 @@ def _text_reader(body: bytes, path: PathLike) -> Any:
                     raise IndexError
                 flat = [word for row, k, end in zip(rows, starts, ends, strict=True) for word in row[k + 1 : end]]
                 entry = float if kind[1].startswith("f") else int
-                table[name] = numbers(flat, path, f"'{name}'", entry), counts
+                table[name] = numbers(flat, f"'{name}'", entry), counts
                 starts = ends
         except IndexError:
-            raise _truncated(path, element) from None
+            raise _truncated(element) from None
         return table
 
     return read

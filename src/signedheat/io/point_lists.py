@@ -40,15 +40,10 @@ def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.fl
                     f"line {number}, '{line.strip()[:60]}', does not hold {dimension} numbers",
                     remedy="give one point a line, and an empty line between polylines",
                     element=f"line {number}",
-                    path=path,
                 )
     lists = [np.array(block) for block in blocks if block]
     if not lists:
-        raise FileFormatError(
-            "there is no point in it",
-            remedy=f"give {dimension} numbers a line",
-            path=path,
-        )
+        raise FileFormatError("there is no point in it", remedy=f"give {dimension} numbers a line")
     closed = [len(points) > 3 and bool((points[0] == points[-1]).all()) for points in lists]
     return [(points[:-1] if end else points, end) for points, end in zip(lists, closed, strict=True)]
 

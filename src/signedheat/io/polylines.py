@@ -101,9 +101,7 @@ def read_svg(path: PathLike) -> list[tuple[NDArray[np.float64], bool]]:
     found = parsed_by_others(lambda: _subpaths(data), len(data))
     if not found:
         raise FileFormatError(
-            "there is no line in the drawing",
-            remedy="convert text and images to paths first",
-            path=path,
+            "there is no line in the drawing", remedy="convert text and images to paths first", path=path
         )
     return [(np.stack([points.real, -points.imag], axis=1), closed) for points, closed in found]
 

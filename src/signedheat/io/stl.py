@@ -10,7 +10,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..geometry.welding import distinct_rows
 from .elements import SurfaceShape, refuse
-from .files import PathLike, contents, numbers
+from .files import PathLike, contents, damaged, numbers
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER = 84  # bytes: 80 of comment, 4 that count the facets
@@ -25,12 +25,11 @@ def read_stl(path: PathLike) -> TriangleMesh:
     announced = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else 0
     is_text = data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:1000].lower()
     if is_text and len(data) != _HEADER + 50 * announced:
-        corners = _text_corners(data, path)
+        corners = _text_corners(data)
     elif len(data) < _HEADER + 50 * announced or len(data) < _HEADER:
         raise FileFormatError(
             f"{announced} facets need {_HEADER + 50 * announced} bytes, the file has {len(data)}: it "
-            "is truncated, or no STL file",
-            path=path,
+            "is truncated, or no STL file"
         )
     else:
         corners = np.frombuffer(data, _FACET, announced, _HEADER)["corners"].astype(np.float32)
@@ -46,9 +45,7 @@ def write_stl(shape: SurfaceShape, path: PathLike) -> bytes:
     facets["corners"] = shape.vertices[shape.faces]
     if not np.isfinite(facets["corners"]).all():
         raise FileFormatError(
-            "coordinates are too large for the single precision of STL",
-            remedy="save it as .ply",
-            path=path,
+            "coordinates are too large for the single precision of STL", remedy="save it as .ply", path=path
         )
     lengths = np.maximum(2 * shape.face_areas, np.finfo(float).tiny)
     facets["normal"] = 2 * shape.face_area_vectors / lengths[:, None]
@@ -56,22 +53,14 @@ def write_stl(shape: SurfaceShape, path: PathLike) -> bytes:
     return result
 
 
-def _text_corners(data: bytes, path: PathLike) -> NDArray[np.float64]:
+def _text_corners(data: bytes) -> NDArray[np.float64]:
     words = data.lower().split()
     if words.count(b"solid") and b"endsolid" not in words[-40:]:
-        raise FileFormatError(
-            "the last solid has no end: the file is truncated",
-            remedy="write or download it again",
-            path=path,
-        )
+        raise damaged("the last solid has no end: the file is truncated")
     at = [k for k, word in enumerate(words) if word == b"vertex"]
     if len(at) % 3 or (at and at[-1] + 3 >= len(words)):
-        raise FileFormatError(
-            "a facet has fewer than 3 vertices: the file is truncated or damaged",
-            remedy="write or download it again",
-            path=path,
-        )
-    return numbers([words[k + 1 : k + 4] for k in at], path, "vertices").reshape(-1, 3)
+        raise damaged("a facet has fewer than 3 vertices: the file is truncated or damaged")
+    return numbers([words[k + 1 : k + 4] for k in at], "vertices").reshape(-1, 3)
 
 
 def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:

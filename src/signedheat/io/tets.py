@@ -58,10 +58,7 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
         return TetMesh.from_meshio(mesh)
     if kinds & {"tetra10", "hexahedron", "wedge", "hierarchy"} or not kinds & {"triangle", "quad"}:
         found = ", ".join(sorted(kinds)) or "no cells"
-        raise GeometryError(
-            f"{path} holds no tets, but {found}",
-            remedy="convert it to linear tetrahedra first",
-        )
+        raise GeometryError(f"{path} holds no tets, but {found}", remedy="convert it to linear tetrahedra first")
     return (TriangleMesh if "quad" not in kinds else PolygonMesh).from_meshio(mesh)
 
 
@@ -90,10 +87,7 @@ def load_tet_field(path: PathLike) -> TetField:
     with reading(path):
         mesh = _load(path)
         if NAME not in mesh.point_data:
-            raise FileFormatError(
-                f"it has no point data '{NAME}': it was not written as a field",
-                path=path,
-            )
+            raise FileFormatError(f"it has no point data '{NAME}': it was not written as a field", path=path)
         values = np.asarray(mesh.point_data[NAME], dtype=np.float64)
         try:
             return TetField(TetMesh.from_meshio(mesh), values)
@@ -113,12 +107,7 @@ def _load(path: PathLike) -> Any:
 
 def _store(mesh: Any, path: PathLike) -> None:
     module = _module(path)
-    with (
-        writing(path),
-        tempfile.TemporaryDirectory() as folder,
-        warnings.catch_warnings(),
-        redirect_stderr(StringIO()),
-    ):
+    with writing(path), tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), redirect_stderr(StringIO()):
         warnings.simplefilter("ignore")
         made = Path(folder, f"mesh{extension(path)}")
         module.write(str(made), mesh)

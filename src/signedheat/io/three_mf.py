@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
-from .files import PathLike, contents, ensure_fits, extension, reading
+from .files import PathLike, contents, damaged, ensure_fits, extension, reading
 
 METRES = {
     "micron": 1e-6,
@@ -65,10 +65,10 @@ def read_3mf(path: PathLike) -> TriangleMesh:
         if not items:  # nothing is said about what to build: everything that is a mesh
             own = [_key(each, package.root, "id") for each in _all(root, "object")]
             items = [(key, np.eye(4, 3)) for key in own if len(package.object(key).faces)]
-        ensure_fits(BYTES * sum(package.count(key, 0, path) for key, _ in items), path)
+        ensure_fits(BYTES * sum(package.count(key, 0) for key, _ in items), path)
         placed = [body for key, matrix in items for body in package.placed(key, matrix)]
         if not placed:
-            raise FileFormatError("the package holds no triangles", remedy="export the shape as a mesh", path=path)
+            raise FileFormatError("the package holds no triangles", remedy="export the shape as a mesh")
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in placed)])
         faces = [own + start for (_, own), start in zip(placed, starts, strict=False)]
         return TriangleMesh(np.concatenate([vertices for vertices, _ in placed]), np.concatenate(faces))
@@ -90,9 +90,7 @@ def unit_of(path: PathLike) -> str | None:
         package = _Package(path)
         unit = package.model(package.root).get("unit", "millimeter")
         if unit not in METRES:
-            raise FileFormatError(
-                f"it has the unit '{unit}', which 3MF does not know", remedy="write it again", path=path
-            )
+            raise damaged(f"it has the unit '{unit}', which 3MF does not know")
         return unit
 
 
@@ -128,23 +126,16 @@ class _Package:
             for element in _all(self.model(part), "object"):
                 self._objects[part, element.get("id", "")] = _object(element, part)
             if key not in self._objects:
-                raise FileFormatError(
-                    f"object {wanted} does not exist",
-                    remedy="write it again",
-                    element=f"object {wanted}",
-                    path=self._path,
-                )
+                raise damaged(f"object {wanted} does not exist", element=f"object {wanted}")
         return self._objects[key]
 
-    def count(self, key: Key, depth: int, path: PathLike) -> int:
+    def count(self, key: Key, depth: int) -> int:
         """Number of triangles of an object with all its components, found without placing them."""
         if depth > DEPTH:
-            raise FileFormatError(
-                "its components contain themselves, or too many others", remedy="write it again", path=path
-            )
+            raise damaged("its components contain themselves, or too many others")
         if key not in self._counts:
             found = self.object(key)
-            inner = sum(self.count(part, depth + 1, path) for part, _ in found.parts)
+            inner = sum(self.count(part, depth + 1) for part, _ in found.parts)
             self._counts[key] = len(found.faces) + inner
         return self._counts[key]
 
@@ -164,7 +155,7 @@ class _Package:
         with self._zip.open(entry) as file:
             data = file.read(entry.file_size)
         if b"<!DOCTYPE" in data[:4096] or b"<!ENTITY" in data:
-            raise FileFormatError("its model defines entities", remedy="write it again", path=self._path)
+            raise damaged("its model defines entities")
         return data
 
 
@@ -196,9 +187,7 @@ def _object(element: ElementTree.Element, part: str) -> _Object:
     parts = [(_key(each, part), _matrix(each)) for each in _all(element, "component")]
     ids = np.array(faces, dtype=np.int64).reshape(-1, 3)
     if len(ids) and (ids.min() < 0 or ids.max() >= len(vertices)):
-        raise FileFormatError(
-            f"object {element.get('id')} names a vertex that it does not have",
-            remedy="write it again",
-            element=f"object {element.get('id')}",
+        raise damaged(
+            f"object {element.get('id')} names a vertex that it does not have", element=f"object {element.get('id')}"
         )
     return _Object(np.array(vertices, dtype=np.float64).reshape(-1, 3), ids, parts)

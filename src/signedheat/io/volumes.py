@@ -56,10 +56,7 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     """
     values, origin, spacing = _read(path, VOLUME_READERS, "a volume")
     if values.ndim != 3:
-        raise FileFormatError(
-            f"the image has {values.ndim} axes, and a volume has 3",
-            path=path,
-        )
+        raise FileFormatError(f"the image has {values.ndim} axes, and a volume has 3", path=path)
     with reading(path):
         return DigitalSurface(values if level is None else values > level, spacing, origin, radius)
 
@@ -115,10 +112,7 @@ def _read(
     with reading(path):
         values, origin, spacing = reader(path)
     if values.dtype.kind not in "biuf":
-        raise FileFormatError(
-            f"the values are no real numbers but {values.dtype}: it holds no image",
-            path=path,
-        )
+        raise FileFormatError(f"the values are no real numbers but {values.dtype}: it holds no image", path=path)
     return values, origin, spacing
 
 

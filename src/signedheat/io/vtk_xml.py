@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
 from .elements import SurfaceShape, assemble, faces_of, points_of
-from .files import PathLike, contents, ensure_fits, numbers, unpacked
+from .files import PathLike, contents, damaged, ensure_fits, numbers, unpacked
 
 _TYPES = {
     "Int8": "i1",
@@ -76,53 +76,36 @@ def read_vti_with(
     """The same, and a further array of this name, if there is one."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
-    extent = numbers(image.get("WholeExtent", "").split() if image is not None else [], path, "extent", int)
+    extent = numbers(image.get("WholeExtent", "").split() if image is not None else [], "extent", int)
     if (
         image is None
         or piece is None
         or len(extent) != 6
         or piece.get("Extent", "").split() != image.get("WholeExtent", "").split()
     ):
-        raise FileFormatError(
-            "the image is not in one piece",
-            remedy="write it anew as a single .vti file",
-            path=path,
-        )
+        raise FileFormatError("the image is not in one piece", remedy="write it anew as a single .vti file")
     direction = image.get("Direction", "1 0 0 0 1 0 0 0 1")
-    if numbers(direction.split(), path, "direction").tolist() != np.eye(3).ravel().tolist():
-        raise FileFormatError(
-            f"the axes of the image are turned ({direction})",
-            remedy="resample it along x, y, z",
-            path=path,
-        )
+    if numbers(direction.split(), "direction").tolist() != np.eye(3).ravel().tolist():
+        raise FileFormatError(f"the axes of the image are turned ({direction})", remedy="resample it along x, y, z")
     shape = extent[1::2] - extent[::2] + 1
     n_nodes = math.prod(shape.tolist())
     if shape.min() < 1 or abs(extent).max() >= 2**53:
-        raise FileFormatError(
-            f"its extent is {' '.join(map(str, extent.tolist()))}: it is damaged",
-            remedy="write or download it again",
-            path=path,
-        )
+        raise damaged(f"its extent is {' '.join(map(str, extent.tolist()))}: it is damaged")
     dimension = 3 if shape[2] > 1 else 2 if shape[1] > 1 else 1
-    spacing = numbers(image.get("Spacing", "1 1 1").split(), path, "spacing")
-    origin = numbers(image.get("Origin", "0 0 0").split(), path, "origin")
+    spacing = numbers(image.get("Spacing", "1 1 1").split(), "spacing")
+    origin = numbers(image.get("Origin", "0 0 0").split(), "origin")
     if extent[::2].any():
         origin = origin + spacing * extent[::2]
     nodes = piece.find("PointData")
     found = [] if nodes is None else nodes.findall("DataArray")
     if not found:
-        raise FileFormatError(
-            "there are no values at the nodes",
-            remedy="save them as point data",
-            path=path,
-        )
+        raise FileFormatError("there are no values at the nodes", remedy="save them as point data")
     images = []
     for element in [found[0], *(each for each in found[1:] if each.get("Name") == other)][:2]:
         if element.get("NumberOfComponents", "1") not in ("1", ""):
             raise FileFormatError(
                 f"'{element.get('Name')}' has {element.get('NumberOfComponents')} numbers at each node",
                 remedy="save a scalar",
-                path=path,
             )
         images.append(arrays.of(element, n_nodes).reshape(shape[:dimension], order="F"))
     return images[0], origin[:dimension], spacing[:dimension], images[1] if len(images) > 1 else None
@@ -159,23 +142,15 @@ def read_vtp(path: PathLike) -> SurfaceShape:
     for piece in root.iterfind("PolyData/Piece"):
         table = {(group.tag, element.get("Name")): element for group in piece for element in group.iter("DataArray")}
         if arrays.count(piece, "NumberOfStrips"):
-            raise FileFormatError(
-                "there are triangle strips",
-                remedy="turn them into triangles before saving",
-                path=path,
-            )
+            raise FileFormatError("there are triangle strips", remedy="turn them into triangles before saving")
         n_own, n_faces = arrays.count(piece, "NumberOfPoints"), arrays.count(piece, "NumberOfPolys")
         xyz = next((element for (tag, _), element in table.items() if tag == "Points"), None)
         offsets = arrays.of(table.get(("Polys", "offsets")), n_faces).astype(np.int64)
         if n_faces == 0 and piece.get("NumberOfPolys") is None and piece.find("Polys/DataArray") is not None:
-            raise FileFormatError("it does not announce NumberOfPolys", element="NumberOfPolys", path=path)
+            raise FileFormatError("it does not announce NumberOfPolys", element="NumberOfPolys")
         steps = np.diff(offsets, prepend=0)
         if (steps < 0).any():
-            raise FileFormatError(
-                "its offsets decrease: it is damaged",
-                remedy="write or download it again",
-                path=path,
-            )
+            raise damaged("its offsets decrease: it is damaged")
         n_corners = int(offsets[-1]) if n_faces else 0
         corners.append(arrays.of(table.get(("Polys", "connectivity")), n_corners).astype(np.int64) + n_points)
         counts.append(steps)
@@ -186,10 +161,7 @@ def read_vtp(path: PathLike) -> SurfaceShape:
         points.append(arrays.of(xyz, 3 * n_own).astype(np.float64).reshape(-1, 3))
         n_points += n_own
     if not n_points:
-        raise FileFormatError(
-            "there are no points: the file holds no shape",
-            path=path,
-        )
+        raise FileFormatError("there are no points: the file holds no shape")
     positions = np.concatenate(points)
     if any(len(c) for c in counts):
         return assemble(positions, np.concatenate(corners), np.concatenate(counts))
@@ -257,12 +229,7 @@ class _Arrays:
         """A number that a piece announces, 0 by default."""
         word = piece.get(name, "0").strip()
         if not word.isdecimal() or len(word) > 18:
-            raise FileFormatError(
-                f"{name} is {word!r}: it is damaged",
-                remedy="write or download it again",
-                element=name,
-                path=self.path,
-            )
+            raise damaged(f"{name} is {word!r}: it is damaged", element=name)
         return int(word)
 
     def of(self, element: ElementTree.Element | None, count: int) -> NDArray[Any]:
@@ -271,14 +238,10 @@ class _Arrays:
             return self._counted(np.empty(0), count)
         code = _TYPES.get(element.get("type", ""))
         if code is None:
-            raise FileFormatError(
-                f"arrays of type '{element.get('type')}' are not supported",
-                remedy="use Float64",
-                path=self.path,
-            )
+            raise FileFormatError(f"arrays of type '{element.get('type')}' are not supported", remedy="use Float64")
         form, inline = element.get("format"), (element.text or "").split()
         if form == "ascii":
-            return self._counted(numbers(inline, self.path, "values").astype(code), count)
+            return self._counted(numbers(inline, "values").astype(code), count)
         size = count * np.dtype(code).itemsize
         ensure_fits(size, self.path)
         try:
@@ -289,19 +252,13 @@ class _Arrays:
                 data = self._block(memoryview(self.appended)[max(start, 0) :], self.encoding == "base64", size)
             values = np.frombuffer(data, self.order + code)
         except (ValueError, IndexError, zlib.error, binascii.Error) as error:
-            raise FileFormatError(
-                f"an array cannot be decoded ({error}): the file is truncated",
-                remedy="write or download it again",
-                path=self.path,
-            ) from error
+            raise damaged(f"an array cannot be decoded ({error}): the file is truncated") from error
         return self._counted(values, count).astype(code, copy=False)
 
     def _counted(self, values: NDArray[Any], count: int) -> NDArray[Any]:
         if values.size != count:
-            raise FileFormatError(
-                f"an array has {values.size} numbers, where {count} are announced: it is truncated or damaged",
-                remedy="write or download it again",
-                path=self.path,
+            raise damaged(
+                f"an array has {values.size} numbers, where {count} are announced: it is truncated or damaged"
             )
         return values
 
@@ -330,11 +287,7 @@ class _Arrays:
                 raise ValueError(f"it has {announced} bytes instead of {size}")
             return (take(0, width + size)[0])[width:] if is_base64 else take(at, size)[0]
         if "ZLib" not in self.compressor:
-            raise FileFormatError(
-                f"compressed by {self.compressor}",
-                remedy="save it without compression",
-                path=self.path,
-            )
+            raise FileFormatError(f"compressed by {self.compressor}", remedy="save it without compression")
         n_blocks = sizes(1)[0][0]
         if n_blocks * width > len(data):
             raise ValueError(f"{n_blocks} blocks are announced")
@@ -363,24 +316,12 @@ def parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
-        raise FileFormatError(
-            f"it is no XML ({error}): the file is truncated or damaged",
-            remedy="write or download it again",
-            path=path,
-        ) from error
+        raise damaged(f"it is no XML ({error}): the file is truncated or damaged") from error
     if root.tag != "VTKFile" or root.get("type") != kind:
-        raise FileFormatError(
-            f"it holds {root.get('type', root.tag)}, not {kind}",
-            remedy="check the extension",
-            path=path,
-        )
+        raise FileFormatError(f"it holds {root.get('type', root.tag)}, not {kind}", remedy="check the extension")
     order = "<" if root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
     width = {"UInt32": "u4", "UInt64": "u8"}.get(root.get("header_type", "UInt32"))
     if width is None:
-        raise FileFormatError(
-            f"its header_type '{root.get('header_type')}' is none that VTK has: it is damaged",
-            remedy="write or download it again",
-            path=path,
-        )
+        raise damaged(f"its header_type '{root.get('header_type')}' is none that VTK has: it is damaged")
     header = np.dtype(order + width)
     return root, _Arrays(path, order, header, root.get("compressor"), encoding, appended)

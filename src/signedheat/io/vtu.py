@@ -49,11 +49,7 @@ def read_vtu(path: PathLike, names: tuple[str, ...] = ()) -> Cells:
     root, arrays = parse(path, "UnstructuredGrid")
     pieces = root.findall("UnstructuredGrid/Piece")
     if len(pieces) != 1:
-        raise FileFormatError(
-            f"it has {len(pieces)} pieces",
-            remedy="write it anew as one",
-            path=path,
-        )
+        raise FileFormatError(f"it has {len(pieces)} pieces", remedy="write it anew as one", path=path)
     [piece] = pieces
     n_points, n_cells = arrays.count(piece, "NumberOfPoints"), arrays.count(piece, "NumberOfCells")
     element = piece.find("Points/DataArray")

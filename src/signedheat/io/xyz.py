@@ -14,10 +14,7 @@ def read_xyz(path: PathLike) -> PointCloud:
     """Lines of 3 numbers (positions) or 6 (positions and normals), separated by spaces or commas."""
     rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].replace(",", " ").split())]
     if not rows:
-        raise FileFormatError(
-            "there is no line of numbers: the file holds no points",
-            path=path,
-        )
+        raise FileFormatError("there is no line of numbers: the file holds no points")
     columns = len(rows[0])
     odd = next((k for k, row in enumerate(rows) if len(row) != columns), None)
     if odd is not None:
@@ -25,15 +22,10 @@ def read_xyz(path: PathLike) -> PointCloud:
             f"line {odd} of the points has {len(rows[odd])} numbers, the first has {columns}",
             remedy="it may be truncated, so write or download it again",
             element=f"line {odd}",
-            path=path,
         )
     if columns not in (3, 6):
-        raise FileFormatError(
-            f"{columns} numbers a line",
-            remedy="write 3 (x y z) or 6 (x y z nx ny nz)",
-            path=path,
-        )
-    table = numbers(rows, path, "coordinates")
+        raise FileFormatError(f"{columns} numbers a line", remedy="write 3 (x y z) or 6 (x y z nx ny nz)")
+    table = numbers(rows, "coordinates")
     return PointCloud(table[:, :3], table[:, 3:] if columns == 6 else None)
 
 
