@@ -68,6 +68,12 @@ def samples_near(
 ) -> Samples:
     """Samples of triangles that are within reach of a rim, at most reach / `SAMPLES` apart."""
     size = reach / SAMPLES
+    a, b, c = triangles.transpose(1, 0, 2)
+    in_box = (np.maximum(np.maximum(a, b), c) > rim.mins - reach) & (
+        np.minimum(np.minimum(a, b), c) < rim.maxes + reach
+    )
+    in_box = in_box.all(axis=1)
+    triangles, patches = triangles[in_box], patches[in_box]
     near, labels = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)]
     while len(triangles):
         centres = triangles.mean(axis=1)
@@ -121,51 +127,61 @@ def continuation(
         1 where the surface bends as it must, 0 where it does not.
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
-    at_rim, curvatures, held = np.zeros((n, 3)), np.zeros(n), np.zeros(n)
     reach = REACH * width
     steps = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     m = max(1, min(n // 4, round(reach / steps.mean())))
-    along = np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
-    outside = rim_normals(lid)
-    if not len(samples.positions):
-        return at_rim, curvatures, held
-    tree = scipy.spatial.cKDTree(samples.positions)
-    for i, near in enumerate(tree.query_ball_point(loop, reach)):
-        near = np.array(near)[samples.patches[near] == patches[i]] if near else near
-        if len(near) < 3:
-            continue
-        x, normals, areas = samples.positions[near] - loop[i], samples.normals[near], samples.areas[near]
-        lengths = np.linalg.norm(x, axis=1)
-        close = areas / (lengths**2 + (NEAR * reach) ** 2) ** 1.5
-        normal = close @ normals
-        length = np.linalg.norm(normal)
-        if length == 0.0:
-            continue
-        way = np.cross(normal / length, along[i])
-        if (size := np.linalg.norm(way)) < 1e-6:
-            continue
-        way /= size
-        weights = areas * (1.0 - (lengths / reach) ** 2)  # what comes into reach weighs nothing yet
-        weights /= weights.sum()
-        frame = np.stack([way, np.cross(normal / length, way)])
-        at = x @ frame.T
-        mean, middle = weights @ at, weights @ normals
-        at = at - mean
-        spread = (at * weights[:, None]).T @ at + (STIFF * reach) ** 2 * np.eye(2)
-        slopes = np.linalg.solve(spread, (at * weights[:, None]).T @ (normals - middle))
-        slope, curvatures[i] = slopes[0], (slopes * frame).sum()
-        normal = middle - mean @ slopes  # at the rim
-        normal /= max(np.linalg.norm(normal), 1e-300)
-        way = np.cross(normal, along[i])
-        way /= max(np.linalg.norm(way), 1e-300)
-        bends, must = width * (slope @ way), 2.0 * (way @ outside[i])
-        at_rim[i], held[i] = normal, _agreement(bends, must)
+    along = _units(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
+    rows, near = _within(samples, loop, patches, reach)
+
+    def sums(weights: NDArray[np.float64], *factors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sums over the samples near each place, of products."""
+        columns = np.einsum("k,k...->k...", weights, np.prod(np.broadcast_arrays(*factors), axis=0))
+        flat = columns.reshape(len(rows), -1)
+        totals = np.stack([np.bincount(rows, column, n) for column in flat.T], axis=1)
+        return np.asarray(totals.reshape(n, *columns.shape[1:]))
+
+    x, normals, areas = samples.positions[near] - loop[rows], samples.normals[near], samples.areas[near]
+    squares = (x * x).sum(axis=1)
+    behind = _units(sums(areas / (squares + (NEAR * reach) ** 2) ** 1.5, normals))
+    way = np.cross(behind, along)
+    told = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
+    way = _units(way)
+    frame = np.stack([way, np.cross(behind, way)], axis=1)
+    weights = areas * (1.0 - squares / reach**2)  # what comes into reach weighs nothing yet
+    weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
+    at = np.einsum("kij,kj->ki", frame[rows], x)
+    mean, middle = sums(weights, at), sums(weights, normals)
+    at = at - mean[rows]
+    spread = sums(weights, at[:, :, None], at[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
+    slopes = np.linalg.solve(spread, sums(weights, at[:, :, None], (normals - middle[rows])[:, None, :]))
+    at_rim = _units(middle - np.einsum("ni,nij->nj", mean, slopes)) * told[:, None]
+    outwards = _units(np.cross(at_rim, along))
+    bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * rim_normals(lid)).sum(axis=1)
+    curvatures = np.where(told, (slopes * frame).sum(axis=(1, 2)), 0.0)
+    held = np.where(told, _agreement(bends, must), 0.0)
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
 
 
-def _agreement(one: float, other: float) -> float:
+def _within(
+    samples: Samples, loop: NDArray[np.float64], patches: NDArray[np.int64], reach: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of a place of a rim and a sample within reach of it, of the patch that ends there."""
+    if not len(samples.positions):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    found = scipy.spatial.cKDTree(samples.positions).query_ball_point(loop, reach, return_sorted=True)
+    rows = np.repeat(np.arange(len(loop)), [len(each) for each in found])
+    near = np.concatenate([np.asarray(each, dtype=np.int64) for each in found])
+    own = samples.patches[near] == patches[rows]
+    return rows[own], near[own]
+
+
+def _units(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None]
+
+
+def _agreement(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
     """1 where two numbers are alike within a factor of 1 / `AGREEMENT`, 0 where they differ by its square or are 0."""
-    low, high = sorted((one, other), key=abs)
-    ratio = low * np.sign(high) / max(abs(high), FLAT)
-    return float(np.clip((ratio - AGREEMENT**2) / (AGREEMENT - AGREEMENT**2), 0.0, 1.0))
+    swap = np.abs(one) > np.abs(other)
+    low, high = np.where(swap, other, one), np.where(swap, one, other)
+    ratio = low * np.sign(high) / np.maximum(np.abs(high), FLAT)
+    return np.asarray(np.clip((ratio - AGREEMENT**2) / (AGREEMENT - AGREEMENT**2), 0.0, 1.0))
