@@ -144,7 +144,7 @@ def test_bad_polylines_are_one_line(tmp_path, capsys, name, content, message):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["volume", "arcs.csv", "-o", "o.npz", "--spacing", "0.1", "0.1", "0.1"], "--spacing: one number or 2, not 3"),
+        (["volume", "arcs.csv", "-o", "o.npz", "--spacing", "0.1", "0.1", "0.1"], "--spacing: 1 or 2"),
         (["volume", "arcs.csv", "-o", "o.npz", "--origin", "0", "--spacing", "1", "--shape", "5", "5"], "--origin: 2"),
         (["volume", "arcs.csv", "-o", "o.npz", "--origin", "0", "0", "--spacing", "1", "--shape", "5"], "--shape: 2"),
     ],
@@ -245,7 +245,7 @@ def test_walls_come_from_pictures_and_volumes(tmp_path, capsys):
     succeed(capsys, "offset", tmp_path / "wall.stl", "4.4", "--mask", tmp_path / "room.npy", "-o", tmp_path / "at.stl")
     assert sh.read(tmp_path / "at.stl").n_faces > 0
     message = fail(capsys, *flat, "--resolution", "9", code=2)
-    assert "do not go with --mask" in message
+    assert "--mask" in message and "--resolution" in message
     message = fail(capsys, "volume", tmp_path / "wall.stl", "--mask", tmp_path / "room.png", "-o", tmp_path / "x.vti")
     assert "room.png" in message or "wall.stl" in message
     (tmp_path / "bad.png").write_bytes(b"no picture")
@@ -291,7 +291,7 @@ def test_tets_from_the_command_line(tmp_path, capsys):
     fields[0].mesh.save(tmp_path / "bare.vtu")
     succeed(capsys, "view", tmp_path / "bare.vtu", "-o", tmp_path / "picture.png")
     message = fail(capsys, "volume", tmp_path / "ball.stl", *flags, "--mask", "x.npy", "-o", tmp_path / "x.vtu", code=2)
-    assert "do not go with --tets" in message
+    assert "--mask" in message and "--tets" in message
 
 
 def test_who_reads_the_output_may_stop_reading(tmp_path):

@@ -21,7 +21,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from signal import SIG_IGN, SIGINT, SIGKILL, signal
+from signal import SIG_IGN, SIGINT, Signals, signal
 from typing import Any
 
 from ..errors import MemoryLimitError, SignedHeatError
@@ -130,6 +130,7 @@ class Worker:
             begin = time.perf_counter()
             if time_limit is not None:
                 timer = threading.Timer(time_limit, process.kill)
+                timer.daemon = True
                 timer.start()
             process.stdin.write(message)  # type: ignore[union-attr]
             process.stdin.flush()  # type: ignore[union-attr]
@@ -163,10 +164,11 @@ class Worker:
         with self._errors:
             self._errors.seek(0)
             lines = self._errors.read().decode("utf-8", errors="replace").splitlines()
-        if process.returncode == -SIGKILL:
+        code = process.returncode
+        if code < 0 and Signals(-code).name == "SIGKILL":
             return "its process was killed, as it is where memory ends"
         last = next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
-        return f"its process died (status {process.returncode}: {last:.200})"
+        return f"its process died (status {code}: {last:.200})"
 
     def _started(self) -> subprocess.Popen[bytes]:
         self._errors = tempfile.TemporaryFile()

@@ -17,6 +17,7 @@ from .options import (
     add_room_options,
     add_sampling_options,
     add_step_options,
+    check_grid_options,
     finite,
     positive,
     whole_number,
@@ -76,21 +77,16 @@ def add_to(commands: Any) -> None:
     add_room_options(parser)
     add_step_options(parser)
     add_method_options(parser)
+    parser.set_defaults(origin=None, grid_shape=None, mask=None)
 
 
 def check(arguments: Namespace) -> None:
     """Reject what asks for nothing, and options that contradict each other."""
-    error = arguments.parser.error
-    if arguments.spacing is not None and len(arguments.spacing) not in (1, 3):
-        error(f"argument --spacing: one number or 3, not {len(arguments.spacing)}")
-    if arguments.spacing is not None and arguments.resolution is not None:
-        error("--resolution does not go with --spacing: give one of them")
-    if arguments.scheduler is not None and arguments.workers is not None:
-        error("--workers does not go with --scheduler, which has workers of its own")
+    check_grid_options(arguments)
     try:
         job_of(arguments)
     except SignedHeatError as problem:
-        error(str(problem))
+        arguments.parser.error(str(problem))
 
 
 def run(arguments: Namespace) -> Summary:

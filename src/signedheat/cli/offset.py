@@ -16,6 +16,7 @@ from .options import (
     add_shape,
     add_tile_options,
     check_grid_options,
+    check_tile_options,
     finite,
     is_planar,
 )
@@ -55,6 +56,7 @@ def add_to(commands: Any) -> None:
 def check(arguments: Namespace) -> None:
     """Reject options that contradict each other, and distances beyond a band."""
     check_grid_options(arguments)
+    check_tile_options(arguments)
     if arguments.output == "-" and len(arguments.distances) > 1:
         arguments.parser.error("standard output takes one surface: name a file, or give one distance")
     reach = max(abs(distance) for distance in arguments.distances)

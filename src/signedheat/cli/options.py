@@ -359,41 +359,43 @@ def is_planar(path: Any) -> bool:
     return Path(path).suffix.lower() in PLANAR
 
 
+def refuse_together(arguments: argparse.Namespace, first: str, *others: str) -> None:
+    """Exit if an option is given, and one of some others with it."""
+
+    def is_given(option: str) -> bool:
+        name = "grid_shape" if option == "--shape" else option.lstrip("-").replace("-", "_")
+        return not any(getattr(arguments, name, None) is absent for absent in (None, False))
+
+    for other in others:
+        if is_given(first) and is_given(other):
+            arguments.parser.error(f"{other} and {first} do not go together: give one of them")
+
+
 def check_grid_options(arguments: argparse.Namespace) -> None:
-    """Reject options that contradict each other."""
-    parser = arguments.parser
-    own = arguments.origin is not None or arguments.grid_shape is not None
-    spacing = arguments.spacing
-    dimension = 2 if is_planar(arguments.shape) else 3
-    if spacing is not None and len(spacing) not in (1, dimension):
-        parser.error(f"argument --spacing: one number or {dimension}, not {len(spacing)}")
-    for name, numbers in (("--origin", arguments.origin), ("--shape", arguments.grid_shape)):
-        if numbers is not None and len(numbers) != dimension:
-            parser.error(f"argument {name}: {dimension} numbers, not {len(numbers)}")
-    if arguments.mask is not None:
-        if any(given is not None for given in (arguments.resolution, arguments.padding, arguments.grid_shape)):
-            parser.error("--resolution, --padding and --shape do not go with --mask, whose nodes are the grid's")
-        if arguments.band is not None:
-            parser.error("--band does not go with --mask")
-        return
-    if arguments.band is not None and (dimension == 2 or arguments.plain):
-        parser.error("--band is for shapes in space, and does not go with --plain")
-    check_tile_options(arguments)
-    if own and (arguments.origin is None or arguments.grid_shape is None or spacing is None):
-        parser.error("a grid of your own needs all of --origin, --spacing and --shape")
-    if own and (arguments.resolution is not None or arguments.padding is not None):
-        parser.error("--resolution and --padding do not go with --origin and --shape")
-    if spacing is not None and arguments.resolution is not None:
-        parser.error("--resolution does not go with --spacing: give one of them")
+    """Reject options that contradict each other, and numbers for another dimension."""
+    error, own = arguments.parser.error, (arguments.origin, arguments.spacing, arguments.grid_shape)
+    dimension = 2 if is_planar(getattr(arguments, "shape", "")) else 3
+    for name, numbers, counts in (
+        ("--spacing", arguments.spacing, (1, dimension)),
+        ("--origin", arguments.origin, (dimension,)),
+        ("--shape", arguments.grid_shape, (dimension,)),
+    ):
+        if numbers is not None and len(numbers) not in counts:
+            error(f"argument {name}: {' or '.join(map(str, counts))} numbers, not {len(numbers)}")
+    refuse_together(arguments, "--mask", "--resolution", "--padding", "--shape", "--band")
+    refuse_together(arguments, "--origin", "--resolution", "--padding")
+    refuse_together(arguments, "--spacing", "--resolution")
+    refuse_together(arguments, "--band", "--plain")
+    refuse_together(arguments, "--scheduler", "--workers")
+    if arguments.band is not None and dimension == 2:
+        error("--band is for shapes in space")
+    if arguments.mask is None and (arguments.origin, arguments.grid_shape) != (None, None) and None in own:
+        error("a grid of your own needs all of --origin, --spacing and --shape")
 
 
 def check_tile_options(arguments: argparse.Namespace) -> None:
-    """Reject tiles without a band, and two kinds of workers at a time."""
-    tiles, workers = getattr(arguments, "tiles", None), getattr(arguments, "workers", None)
-    scheduler = getattr(arguments, "scheduler", None)
-    if tiles is not None and arguments.band is None:
+    """Reject tiles without a band, and workers without tiles."""
+    if arguments.tiles is not None and arguments.band is None:
         arguments.parser.error("--tiles goes with --band")
-    if tiles is None and (workers is not None or scheduler is not None):
+    if arguments.tiles is None and (arguments.workers, arguments.scheduler) != (None, None):
         arguments.parser.error("--workers and --scheduler go with --tiles")
-    if workers is not None and scheduler is not None:
-        arguments.parser.error("--workers does not go with --scheduler, which has workers of its own")

@@ -17,7 +17,7 @@ from ..io.labels import LabelImage
 from ..io.obj import read_obj_lines
 from ..io.three_mf import unit_of
 from ..lowering.area_elements import bounds_around
-from ..lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
+from ..lowering.grid.discretization import fitting_spacing, memory_estimate
 from ..memory import available_memory
 from ..orientation.meshes import Orientation, orientation
 from ..solids.fields import BYTES_AT_WORK, BYTES_PER_NODE
@@ -185,7 +185,7 @@ def _least_spacing(shape: Any) -> float | None:
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None
     grid = Grid.around(shape.bounds, 128)
-    spacing = fitting_spacing(grid, available, *_most(shape))
+    spacing = fitting_spacing(grid, available, BYTES_PER_NODE, BYTES_AT_WORK, 0.0)
     return float(spacing.max()) if (spacing < grid.upper - grid.origin).all() else None
 
 
@@ -193,12 +193,7 @@ def _memory(shape: Any, resolution: int) -> int | None:
     """Estimate for a grid around the shape; nothing where the shape is a single place."""
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None
-    grid, (per_node, beside, area) = Grid.around(shape.bounds, resolution), _most(shape)
-    return memory_estimate(grid, per_node, beside) + int(bytes_of_area(area, grid.spacing, grid.n_nodes))
-
-
-def _most(shape: Any) -> tuple[float, float, float]:
-    return BYTES_PER_NODE, BYTES_AT_WORK, 0.0
+    return memory_estimate(Grid.around(shape.bounds, resolution), BYTES_PER_NODE, BYTES_AT_WORK)
 
 
 def _table(summary: dict[str, Any]) -> str:

@@ -16,6 +16,8 @@ from .options import (
     add_shape,
     add_tile_options,
     check_grid_options,
+    check_tile_options,
+    refuse_together,
 )
 from .parts import computing, io, placing, tets, view
 
@@ -50,12 +52,11 @@ def add_to(commands: Any) -> None:
 
 def check(arguments: Namespace) -> None:
     """Reject options that contradict each other."""
-    if arguments.tets is None:
-        return check_grid_options(arguments)
-    if any(x is not None for x in (arguments.spacing, arguments.origin, arguments.grid_shape, arguments.mask)):
-        arguments.parser.error("--spacing, --origin, --shape and --mask are for grids, and do not go with --tets")
-    if arguments.tets and (arguments.resolution is not None or arguments.padding is not None):
-        arguments.parser.error("--resolution and --padding do not go with a mesh of your own")
+    refuse_together(arguments, "--tets", "--spacing", "--origin", "--shape", "--mask", "--band")
+    if arguments.tets:  # a mesh of one's own
+        refuse_together(arguments, "--tets", "--resolution", "--padding")
+    check_grid_options(arguments)
+    check_tile_options(arguments)
 
 
 def run(arguments: Namespace) -> Summary:

@@ -7,7 +7,7 @@ from typing import Any
 
 import signedheat as sh
 
-from .options import MOST_WORKERS, Summary, add_command, positive, whole_number
+from .options import MOST_WORKERS, Summary, add_command, positive, refuse_together, whole_number
 from .parts import watertight
 from .progress import ProgressBar
 from .streams import say, tell
@@ -43,8 +43,7 @@ def add_to(commands: Any) -> None:
 
 def check(arguments: Namespace) -> None:
     """Reject options that contradict each other."""
-    if arguments.resolution is not None and arguments.spacing is not None:
-        arguments.parser.error("--resolution does not go with --spacing: give one of them")
+    refuse_together(arguments, "--spacing", "--resolution")
 
 
 def run(arguments: Namespace) -> Summary:
