@@ -28,7 +28,14 @@ def runs() -> dict[str, np.ndarray]:
     found["sharpened surface"] = sh.sharpen(surface).values
     angles = np.linspace(0.0, 5.9, 9)
     stroke = ball.polyline(np.stack([np.cos(angles), np.sin(angles), 0.1 + 0.2 * np.cos(angles + 0.3)], axis=1))
-    lines = [*sh.close_curves(ball, stroke), *ball.level_set(ball.vertices[:, 2]), *surface.contour(0.1)]
+    angles = np.linspace(0.0, 2 * np.pi - 3.1, 9)
+    ring = ball.polyline(np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1))  # where ways and cuts tie
+    lines = [
+        *sh.close_curves(ball, stroke),
+        *sh.close_curves(ball, ring),
+        *ball.level_set(ball.vertices[:, 2]),
+        *surface.contour(0.1),
+    ]
     found["lines"] = np.array([line.n_points for line in lines])
     found["refined"] = np.sort(sh.intrinsic_delaunay(ball, refine=True).triangles.edge_lengths, axis=None)
     found["points"] = sh.SignedHeatSolver(sh.PointCloud(ball.vertices)).distance(ball.points_at(3)).values

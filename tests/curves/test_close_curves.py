@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import signedheat as sh
+from shapes.surface_cases import sphere
+from signedheat.geometry.surface_points import VERTEX
 
 
 def box() -> sh.TriangleMesh:
@@ -59,3 +62,30 @@ def test_gaps_of_curves_far_smaller_than_the_triangles_are_closed(radius, seed):
     assert len(found) == 1 and found[0].closed
     places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
     assert np.abs(np.linalg.norm(places - center, axis=1) / radius - 1).max() < 0.6
+
+
+@pytest.mark.parametrize(("n", "gap"), [(9, 0.6), (9, 3.1), (13, 0.0)])
+def test_rounding_chooses_between_no_equals(n, gap):
+    """Strokes along a great circle of symmetric triangles, of which many are mirrored: paths, cuts, refinements tie."""
+    ball, noise = sphere(1), np.random.default_rng(0)
+    angles = np.linspace(0, 2 * np.pi - gap, n)
+    ring = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    counts, values = [], []
+    for size in (0.0, 1.2e-16, 1.2e-16, 1.2e-16):
+        mesh = sh.TriangleMesh(ball.vertices * (1 + size * noise.choice([-1, 0, 1], ball.vertices.shape)), ball.faces)
+        stroke = mesh.polyline(ring)
+        counts.append([len(stroke.faces), *(curve.n_points for curve in sh.close_curves(mesh, stroke))])
+        values.append(sh.SignedHeatSolver(mesh, intrinsic=True).distance(stroke).values)
+    assert counts[1:] == counts[:-1]
+    np.testing.assert_allclose(values[1:], values[:-1], rtol=0, atol=1e-11)
+
+
+def test_curves_along_edges_stay_on_them():
+    """Refinement only adds vertices to them, however the sphere is turned: no points between, which rounding makes."""
+    angles = np.linspace(0, 5.7, 9)
+    ring = np.stack([np.cos(angles), np.sin(angles), 0.3 + 0 * angles], axis=1)
+    for turn in Rotation.random(12, random_state=0).as_matrix():
+        mesh = sh.TriangleMesh(sphere(2).vertices @ turn.T, sphere(2).faces)
+        stroke = mesh.polyline(ring @ turn.T)
+        refined = sh.intrinsic_delaunay(mesh, [stroke], refine=True)
+        assert (refined.transfer(stroke).nodes.kinds == VERTEX).all()

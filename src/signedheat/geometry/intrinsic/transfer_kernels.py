@@ -22,6 +22,9 @@ BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2,
 
 OUTWARD = 1e-6
 """Sine of the angle up to which a line that leaves the surface is one along its boundary, but for rounding."""
+ALONG = 1e-9
+"""Barycentric coordinates of a point and of a direction, beside the largest, below which a line runs along an edge.
+From face to face lines drift by some 1e-15; results are the same from 1e-12 to 1e-7."""
 ROUNDING = 1e-10
 """Of squared lengths, in parts of the size of their terms."""
 
@@ -230,6 +233,15 @@ def squared_length(g: Gluing, f: int, v: NDArray[np.float64]) -> tuple[float, fl
 
 
 @kernel
+def keep_on_edges(w: NDArray[np.float64], v: NDArray[np.float64]) -> None:
+    """Let a line that runs along an edge but for rounding run along it: else it may cross to the other side midway."""
+    largest = max(abs(v[0]), abs(v[1]), abs(v[2]))
+    for k in range(3):
+        if w[k] < ALONG and abs(v[k]) < ALONG * largest:
+            w[k] = v[k] = 0.0
+
+
+@kernel
 def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
     """Trace a geodesic from a point along its first vector, or against it, over its length; other vectors are carried.
 
@@ -242,6 +254,7 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
     longest = 4.0 * (abs(square) + ROUNDING * rounding)
     sign = 1.0 if forward else -1.0
     for _ in range(1000000):
+        keep_on_edges(w, v[0])
         step, leaving = left, -1
         for k in range(3):
             slope = sign * v[0, k]
