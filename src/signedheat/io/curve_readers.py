@@ -18,7 +18,7 @@ from ..domains.projection import closest_points
 from ..errors import FileFormatError, SignedHeatError
 from ..geometry.polylines import assemble_polylines
 from .files import PathLike, text
-from .point_lists import read_point_lists
+from .points import read_point_lists
 
 SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
 

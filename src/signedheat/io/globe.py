@@ -16,7 +16,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, UnsupportedTypeError
 from .files import PathLike, extension, reading, text, unknown_extension
-from .point_lists import read_point_lists
+from .points import read_point_lists
 
 GLOBE_FORMATS = frozenset({".csv", ".json", ".geojson"})
 

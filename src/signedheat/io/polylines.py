@@ -13,7 +13,7 @@ from ..domains.polyline import Polyline
 from ..errors import FileFormatError, GeometryError
 from ..packages import lazy_module
 from .files import PathLike, contents, extension, parsed_by_others, reading, replacing, unknown_extension
-from .point_lists import read_point_lists, write_point_lists
+from .points import read_point_lists, write_point_lists
 
 svgpathtools = lazy_module("svgpathtools", "SVG drawings")
 

@@ -15,8 +15,8 @@ from .files import PathLike, extension, reading, replacing, unknown_extension
 from .glb import read_glb
 from .obj import read_obj, write_obj, write_pc
 from .off import read_off, write_off
-from .pcd import read_pcd
 from .ply import read_ply, write_ply
+from .points import read_pcd, read_xyz, write_xyz
 from .scans import read_e57, read_las
 from .step import step_mesh
 from .stl import read_stl, write_stl
@@ -24,7 +24,6 @@ from .tets import TET_FORMATS, read_tets, write_tets
 from .three_mf import read_3mf
 from .volumes import read_volume
 from .vtk_xml import read_vtp, write_vtp
-from .xyz import read_xyz, write_xyz
 
 READERS: dict[str, Callable[[PathLike], Shape]] = {
     ".3mf": read_3mf,

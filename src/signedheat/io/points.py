@@ -1,0 +1,137 @@
+"""Lists of points: text with one on each line (XYZ, CSV), and PCD, the format of the Point Cloud Library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.point_cloud import PointCloud
+from ..errors import FileFormatError
+from .elements import SurfaceShape, refuse
+from .files import PathLike, contents, text
+
+SEPARATORS = str.maketrans(",;", "  ")
+NUMBERS = {"F": "f", "I": "i", "U": "u"}
+"""Types of fields, and their letters for NumPy."""
+
+
+def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[NDArray[np.float64]]:
+    """Numbers of each block of lines, between empty lines: all lines have as many, one of `widths`.
+
+    They are separated by commas, semicolons, tabs or spaces. What follows ``#`` and a header line are skipped.
+
+    Raises
+    ------
+    FileFormatError
+        If a line has other numbers, or there is no line of numbers.
+    """
+    blocks: list[list[list[float]]] = [[]]
+    columns = 0
+    for number, line in enumerate(text(path).removeprefix("\ufeff").splitlines(), start=1):
+        words = line.partition("#")[0].translate(SEPARATORS).split()
+        if not words:
+            if not line.strip():
+                blocks.append([])
+            continue
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = []
+        if values and len(values) == (columns or len(values)) and len(values) in widths:
+            columns = len(values)
+            blocks[-1].append(values)
+        elif values or columns:
+            wanted = " or ".join(map(str, [columns] if columns else widths))
+            raise FileFormatError(
+                f"line {number}, '{line.strip()[:60]}', does not hold {wanted} numbers",
+                remedy="give one point a line",
+                element=f"line {number}",
+            )
+    if not columns:
+        raise FileFormatError("there is no point in it", remedy=f"give {' or '.join(map(str, widths))} numbers a line")
+    return [np.array(block) for block in blocks if block]
+
+
+def read_point_lists(path: PathLike, dimension: int) -> list[tuple[NDArray[np.float64], bool]]:
+    """Points (n, dimension) of each polyline, and whether it is closed (its last point equals its first)."""
+    lists = read_rows(path, (dimension,))
+    closed = [len(points) > 3 and bool((points[0] == points[-1]).all()) for points in lists]
+    return [(points[:-1] if end else points, end) for points, end in zip(lists, closed, strict=True)]
+
+
+def write_point_lists(lists: Sequence[tuple[NDArray[np.float64], bool]]) -> str:
+    """The text that `read_point_lists` reads."""
+    blocks = []
+    for points, closed in lists:
+        rows = [*points.tolist(), *([points[0].tolist()] if closed else [])]
+        blocks.append("".join(",".join(map(repr, row)) + "\n" for row in rows))
+    return "\n".join(blocks)
+
+
+def read_xyz(path: PathLike) -> PointCloud:
+    """Lines of 3 numbers (positions) or 6 (positions and normals)."""
+    table = np.concatenate(read_rows(path, (3, 6)))
+    return PointCloud(table[:, :3], table[:, 3:] if table.shape[1] == 6 else None)
+
+
+def write_xyz(shape: SurfaceShape, path: PathLike) -> bytes:
+    """One line per point."""
+    if not isinstance(shape, PointCloud):
+        raise refuse(shape, path, "points", ".obj or .ply")
+    table = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
+    return "".join(" ".join(map(repr, row)) + "\n" for row in table.tolist()).encode()
+
+
+def read_pcd(path: PathLike) -> PointCloud:
+    """Points of a file with DATA ascii or binary; those without a position (NaN), as scanners write them, left out."""
+    content = contents(path)
+    header: dict[str, list[str]] = {}
+    at = 0
+    while "DATA" not in header:
+        end = content.find(b"\n", at)
+        if end < 0:
+            raise FileFormatError("there is no line DATA: this is no PCD file, or it is truncated")
+        words = content[at:end].decode("ascii", "replace").partition("#")[0].split()
+        if words:
+            header[words[0].upper()] = words[1:]
+        at = end + 1
+    table = _table(header, content[at:])
+    if not {"x", "y", "z"} <= table.keys():
+        raise FileFormatError(f"the fields are {', '.join(table)}, without x, y and z")
+    points = np.column_stack([table[axis] for axis in "xyz"])
+    known = np.isfinite(points).all(axis=1)
+    names = [f"normal_{axis}" for axis in "xyz"]
+    normals = np.column_stack([table[name] for name in names]) if set(names) <= table.keys() else None
+    whole = normals is not None and np.isfinite(normals[known]).all()
+    return PointCloud(points[known], normals[known] if normals is not None and whole else None)
+
+
+def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.float64]]:
+    """Columns of numbers by name of the field."""
+    try:
+        names, kind = header["FIELDS"], header["DATA"][0].lower()
+        counts = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
+        n = int(header["POINTS"][0]) if "POINTS" in header else int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
+        types = [NUMBERS[letter] + size for letter, size in zip(header["TYPE"], header["SIZE"], strict=True)]
+        fields = [(f"{k}", f"<{code}", (count,)) for k, (code, count) in enumerate(zip(types, counts, strict=True))]
+        row = np.dtype(fields)
+        if len(names) != len(fields) or n < 0:
+            raise ValueError
+    except (KeyError, ValueError, IndexError, TypeError):
+        raise FileFormatError("the header of the PCD file is not complete, or contradicts itself") from None
+    if kind == "binary":
+        if len(body) < n * row.itemsize:
+            raise FileFormatError(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow")
+        rows = np.frombuffer(body, row, n)
+        return {name: rows[f"{k}"][:, 0].astype(np.float64) for k, name in enumerate(names)}
+    if kind != "ascii":
+        raise FileFormatError(f"data are {kind}", remedy="write them as ascii or binary")
+    try:
+        numbers = np.array([line.split() for line in body.decode("ascii").splitlines() if line.strip()], dtype=float)
+        numbers = numbers.reshape(n, sum(counts))
+    except (ValueError, UnicodeDecodeError):
+        raise FileFormatError(f"there are no {n} lines of {sum(counts)} numbers") from None
+    begins = np.concatenate([[0], np.cumsum(counts)])
+    return {name: numbers[:, begins[k]] for k, name in enumerate(names)}
