@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import signedheat as sh
@@ -13,18 +15,18 @@ from .options import (
     MOST_WORKERS,
     Summary,
     add_command,
+    add_many_options,
     add_method_options,
     add_room_options,
     add_sampling_options,
     add_step_options,
     check_grid_options,
     finite,
-    positive,
     whole_number,
 )
 from .parts import computing, pool
 from .progress import ProgressBar
-from .streams import say
+from .streams import say, tell
 
 
 def add_to(commands: Any) -> None:
@@ -38,14 +40,8 @@ def add_to(commands: Any) -> None:
         description="Fields, offsets, samples and reports of many shapes, each in a process of its own, with a "
         "manifest of what came of each. What is done is skipped when the batch is started again.",
     )
-    parser.usage = "%(prog)s INPUT [INPUT ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]"
-    parser.add_argument(
-        "inputs",
-        metavar="INPUT",
-        nargs="+",
-        help="files, folders with all in them, patterns in quotes; - takes a list from standard input, a line for each",
-    )
-    parser.add_argument("-o", "--output", required=True, metavar="FOLDER", help="results, and manifest.jsonl")
+    parser.usage = "%(prog)s FILE [FILE ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]"
+    add_many_options(parser)
     wanted = parser.add_argument_group("what is made of each shape, one or more of")
     wanted.add_argument(
         "--volume",
@@ -58,21 +54,14 @@ def add_to(commands: Any) -> None:
         "--offset", type=finite, nargs="+", default=[], metavar="D", help="closed surfaces at distances"
     )
     wanted.add_argument(
-        "--surface", choices=("stl", "obj", "ply", "off", "vtp"), default="stl", help="their files (stl)"
-    )
-    wanted.add_argument(
         "--sample", type=whole_number(1), nargs="?", const=250_000, metavar="N", help="points to learn from (250000)"
     )
     wanted.add_argument("--info", action="store_true", help="counts and defects, in the manifest")
     running = parser.add_argument_group("running")
     running.add_argument(
-        "--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help="processes (one for each processor)"
-    )
-    running.add_argument(
         "--threads", type=whole_number(1, MOST_WORKERS), default=1, metavar="N", help="threads of each process (1)"
     )
     running.add_argument("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
-    running.add_argument("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up")
     add_sampling_options(parser)
     add_room_options(parser)
     add_step_options(parser)
@@ -90,25 +79,9 @@ def check(arguments: Namespace) -> None:
 
 
 def run(arguments: Namespace) -> Summary:
-    """Do the job for every shape; a line on standard error for each that is not done."""
-    with ProgressBar(arguments.quiet or arguments.json) as progress:
-
-        def report(outcome: sh.batches.Outcome) -> None:
-            if not outcome.is_done:
-                progress.clear()
-                say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
-
-        done = sh.batches.run(
-            listed(arguments.inputs),
-            arguments.output,
-            job_of(arguments),
-            workers=arguments.workers,
-            threads=arguments.threads,
-            scheduler=arguments.scheduler,
-            time_limit=arguments.time_limit,
-            progress=progress,
-            report=report,
-        )
+    """Do the job for every shape."""
+    options = {"threads": arguments.threads, "scheduler": arguments.scheduler}
+    done = made_of_each(arguments, job_of(arguments), **options)
     states = [outcome.state for outcome in done.outcomes]
     counts = {state: states.count(state) for state in dict.fromkeys(states)}
     seconds = sum(outcome.seconds for outcome in done.outcomes)
@@ -124,6 +97,47 @@ def run(arguments: Namespace) -> Summary:
     told = ", ".join(f"{number} {state}" for state, number in counts.items())
     before = f" ({done.skipped} of them before)" if done.skipped else ""
     return summary, f"{done.manifest}: {len(states)} shapes, {told}{before}, {pool.duration(seconds)} of work"
+
+
+def made_of_each(
+    arguments: Namespace,
+    job: Callable[[Path, Path], Mapping[str, object]],
+    in_words: Callable[[dict[str, object]], str] | None = None,
+    **options: Any,
+) -> sh.batches.Batch:
+    """Do a job for every shape: a line on standard error for each that is not done, and perhaps one for each that is.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        With those of `add_many_options`.
+    job : callable
+        As for `signedheat.batches.run`.
+    in_words : callable, optional
+        The line about a shape that is done, from its figures.
+    **options
+        Further ones of `signedheat.batches.run`.
+    """
+    with ProgressBar(arguments.quiet or arguments.json) as progress:
+
+        def report(outcome: sh.batches.Outcome) -> None:
+            if not outcome.is_done:
+                progress.clear()
+                say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
+            elif in_words is not None and not (arguments.quiet or arguments.json):
+                progress.clear()
+                tell(f"{outcome.outputs[0]}: {in_words(dict(outcome.figures))}")
+
+        return sh.batches.run(
+            listed(arguments.inputs),
+            arguments.output,
+            job,
+            workers=arguments.workers,
+            time_limit=arguments.time_limit,
+            progress=progress,
+            report=report,
+            **options,
+        )
 
 
 def listed(inputs: list[str]) -> list[str]:

@@ -165,6 +165,24 @@ def add_room_options(parser: Parser) -> argparse._ArgumentGroup:
     return grid
 
 
+def add_many_options(parser: Parser) -> None:
+    """Add the arguments of commands that make something of many shapes."""
+    parser.add_argument(
+        "inputs",
+        metavar="FILE",
+        nargs="+",
+        help="files, folders with all in them, patterns in quotes; - takes a list from standard input, a line for each",
+    )
+    parser.add_argument("-o", "--output", required=True, metavar="FOLDER", help="results, and manifest.jsonl")
+    parser.add_argument(
+        "--surface", choices=("stl", "obj", "ply", "off", "vtp"), default="stl", help="files of surfaces (stl)"
+    )
+    parser.add_argument(
+        "--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help="processes (one for each processor)"
+    )
+    parser.add_argument("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up")
+
+
 def add_tile_options(parser: Parser) -> None:
     """Add the options of a band that is computed tile by tile."""
     tiles = parser.add_argument_group("tiles of a band")

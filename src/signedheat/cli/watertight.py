@@ -5,12 +5,9 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import Any
 
-import signedheat as sh
-
-from .options import MOST_WORKERS, Summary, add_command, positive, refuse_together, whole_number
+from .batch import made_of_each
+from .options import Summary, add_command, add_many_options, positive, refuse_together, whole_number
 from .parts import watertight
-from .progress import ProgressBar
-from .streams import say, tell
 
 
 def add_to(commands: Any) -> None:
@@ -26,19 +23,13 @@ def add_to(commands: Any) -> None:
         "and join with its completion; otherwise the surface is contoured with its edges and corners. Sheets are "
         "refused unless they are given a thickness.",
     )
-    parser.add_argument("inputs", metavar="FILE", nargs="+", help="files, folders with all in them, patterns in quotes")
-    parser.add_argument("-o", "--output", required=True, metavar="FOLDER", help="meshes, and manifest.jsonl")
-    parser.add_argument("--surface", choices=("stl", "obj", "ply", "off", "vtp"), default="stl", help="files (stl)")
+    add_many_options(parser)
     parser.add_argument("--thickness", type=positive, metavar="D", help="of the solids around sheets")
     parser.add_argument("--contour", action="store_true", help="contour everything: even triangles in place of few")
     parser.add_argument(
         "--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side, for contours (256)"
     )
     parser.add_argument("--spacing", type=positive, metavar="H", help="cells of contours, in units of the file")
-    parser.add_argument(
-        "--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help="processes (one for each processor)"
-    )
-    parser.add_argument("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up")
 
 
 def check(arguments: Namespace) -> None:
@@ -48,30 +39,14 @@ def check(arguments: Namespace) -> None:
 
 def run(arguments: Namespace) -> Summary:
     """Do it for every shape; a line for each."""
-    with ProgressBar(arguments.quiet or arguments.json) as progress:
-
-        def report(outcome: sh.batches.Outcome) -> None:
-            progress.clear()
-            if not outcome.is_done:
-                say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
-            elif not (arguments.quiet or arguments.json):
-                tell(f"{outcome.outputs[0]}: {watertight.in_words(dict(outcome.figures))}")
-
-        done = sh.batches.run(
-            arguments.inputs,
-            arguments.output,
-            watertight.Watertight(
-                surfaces=f".{arguments.surface}",
-                thickness=arguments.thickness,
-                contoured=arguments.contour,
-                resolution=arguments.resolution or 256,
-                spacing=arguments.spacing,
-            ),
-            workers=arguments.workers,
-            time_limit=arguments.time_limit,
-            progress=progress,
-            report=report,
-        )
+    job = watertight.Watertight(
+        surfaces=f".{arguments.surface}",
+        thickness=arguments.thickness,
+        contoured=arguments.contour,
+        resolution=arguments.resolution or 256,
+        spacing=arguments.spacing,
+    )
+    done = made_of_each(arguments, job, watertight.in_words)
     summary = {
         "inputs": arguments.inputs,
         "manifest": str(done.manifest),
