@@ -7,20 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.coincident_faces import coincident_faces
-from ..geometry.halfedges import following_corners, may_coincide, pair_halfedges
-from ..geometry.inspection_kernels import (
-    count_components,
-    count_edges,
-    count_nonmanifold_vertices,
-    inspect_faces,
-)
-from ..geometry.welding import distinct_rows
+from ..geometry.components import connected_components
+from ..geometry.halfedges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
+from ..geometry.triangle_kernels import areas_of_polygons
+from ..geometry.welding import coincident_faces, same_positions
 from ..operators.tetrahedral import FLAT
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .tet_mesh import TetMesh
 from .triangle_mesh import TriangleMesh
+from .validation import used_bounds
 
 
 @dataclass(frozen=True)
@@ -193,42 +189,65 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
     following = following_corners(offsets)
     heads, sides = corners[following], np.diff(offsets)
     pairs = pair_halfedges(corners, heads, mesh.n_vertices)
-    table = pairs.edges, pairs.counts, pairs.first, pairs.second
-    open_edges, nonmanifold_edges, inconsistent_edges, lonely = count_edges(corners, *table)
-    nonmanifold_vertices = count_nonmanifold_vertices(mesh.n_vertices, corners, following, *table)
     duplicates = 0
-    if nonmanifold_edges or may_coincide(pairs, corners, following):
+    if may_coincide(pairs, corners, following):
         first, _ = coincident_faces(corners, offsets)
         duplicates = int(((first >= 0) & (first != np.arange(len(sides)))).sum())
-    area, degenerate, box = inspect_faces(mesh.vertices, corners, offsets)
-    referenced = np.zeros(mesh.n_vertices, dtype=bool)
-    referenced[corners] = True
+    lonely = (pairs.edges >= 0) & (pairs.counts == 1)[pairs.edges]
+    areas, degenerate = areas_of_polygons(mesh.vertices, corners, offsets)
+    lower, upper = used_bounds(mesh.vertices, corners)
+    two = pairs.counts == 2
     return SurfaceReport(
         n_vertices=mesh.n_vertices,
         n_faces=len(sides),
         n_edges=len(pairs.counts),
         corners_per_face=(int(sides.min()), int(sides.max())),
-        components=int(count_components(mesh.n_vertices, corners, heads, lonely[:0])),
-        open_edges=int(open_edges),
-        borders=int(count_components(mesh.n_vertices, corners, heads, lonely)) if open_edges else 0,
-        nonmanifold_edges=int(nonmanifold_edges),
-        nonmanifold_vertices=int(nonmanifold_vertices),
-        inconsistent_edges=int(inconsistent_edges),
-        degenerate_faces=int(degenerate),
+        components=_n_components(mesh.n_vertices, corners, heads),
+        open_edges=int((pairs.counts == 1).sum()),
+        borders=_n_components(mesh.n_vertices, corners[lonely], heads[lonely]),
+        nonmanifold_edges=int((pairs.counts > 2).sum()),
+        nonmanifold_vertices=_n_nonmanifold(mesh.n_vertices, corners, following, pairs),
+        inconsistent_edges=int((corners[pairs.first[two]] == corners[pairs.second[two]]).sum()),
+        degenerate_faces=int(degenerate.sum()),
         duplicate_faces=duplicates,
         duplicate_vertices=_n_repeated(mesh.vertices),
-        unreferenced_vertices=int(mesh.n_vertices - referenced.sum()),
-        area=float(area),
-        lower=_tuple(box[0]),
-        upper=_tuple(box[1]),
+        unreferenced_vertices=mesh.n_vertices - _n_marked(mesh.n_vertices, corners),
+        area=float(areas.sum()),
+        lower=_tuple(lower),
+        upper=_tuple(upper),
     )
+
+
+def _n_marked(n: int, ids: NDArray[np.int64]) -> int:
+    """How many of the numbers below n are named."""
+    marked = np.zeros(n, dtype=bool)
+    marked[ids] = True
+    return int(marked.sum())
+
+
+def _n_components(n: int, tails: NDArray[np.int64], heads: NDArray[np.int64]) -> int:
+    """How many connected sets halfedges make; vertices of none do not count."""
+    return _n_marked(n, connected_components(n, tails, heads)[tails])
+
+
+def _n_nonmanifold(n: int, tails: NDArray[np.int64], following: NDArray[np.int32], pairs: HalfedgePairs) -> int:
+    """Vertices at which the faces are no single fan, or that end an edge of more than two faces."""
+    two = pairs.counts == 2
+    one, other = pairs.first[two], pairs.second[two]
+    alike = tails[one] == tails[other]
+    next_one, next_other = following[one], following[other]
+    links = np.where(alike, other, next_other), np.where(alike, next_other, other)
+    fans = connected_components(len(tails), np.concatenate([one, next_one]), np.concatenate(links))
+    fan = np.empty(n, dtype=np.int64)
+    fan[tails] = fans
+    crowded = np.flatnonzero((pairs.edges >= 0) & (pairs.counts > 2)[pairs.edges])
+    bad = [tails[fans != fan[tails]], tails[crowded], tails[following[crowded]]]
+    return _n_marked(n, np.concatenate(bad))
 
 
 def _n_repeated(points: NDArray[np.float64]) -> int:
     """How many points are at exactly the place of an earlier one."""
-    if points.shape[1] != 3:
-        return len(points) - len(np.unique(points, axis=0))
-    return len(points) - len(distinct_rows((points + 0.0).view(np.uint64))[1])  # −0 and 0 are the same place
+    return int(np.count_nonzero(same_positions(points) != np.arange(len(points))))
 
 
 def _tuple(values: NDArray[np.float64]) -> tuple[float, ...]:

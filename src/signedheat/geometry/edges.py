@@ -68,8 +68,12 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
     >>> table.face_edges.tolist()
     [[0, 1, 2], [1, 3, 4]]
     """
-    faces = np.array(faces, dtype=np.int64, order="C")  # what must not be written is a type of its own to the compiler
-    return EdgeTable(*find_edges(faces, np.bincount(faces.ravel())))
+    faces = np.asarray(faces, dtype=np.int64)
+    tails, heads = faces.flatten(), np.roll(faces, -1, axis=1).ravel()
+    every, n_vertices = np.ones(len(tails), dtype=np.bool_), int(tails.max(initial=-1)) + 1
+    edges, forward, _, first, _ = find_edges(read_only(tails), read_only(heads), every, n_vertices)
+    vertices = np.stack([tails[first], heads[first]], axis=1)
+    return EdgeTable(vertices, edges.reshape(-1, 3), forward.reshape(-1, 3))
 
 
 def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:

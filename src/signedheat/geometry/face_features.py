@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import morton_codes
-from .components import same_positions
 from .edges import EdgeTable, edge_table
 from .point_triangle import triangle_rows
+from .welding import same_positions
 
 Links: TypeAlias = tuple[
     NDArray[np.float64],

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..frozen import read_only
+from .triangle_kernels import find_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,18 +18,18 @@ class HalfedgePairs:
 
     Attributes
     ----------
-    edges : (h,) int32
+    edges : (h,) int
         Edge of each halfedge; −1 where it joins a vertex to itself or its face is left out.
-    counts : (e,) int32
+    counts : (e,) int
         Halfedges of each edge.
-    first, second : (e,) int32
+    first, second : (e,) int
         Least halfedge of each edge and the next; −1 where there is none.
     """
 
-    edges: NDArray[np.int32]
-    counts: NDArray[np.int32]
-    first: NDArray[np.int32]
-    second: NDArray[np.int32]
+    edges: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +80,11 @@ def pair_halfedges(
     --------
     >>> pairs = pair_halfedges(np.array([0, 1, 2, 2, 1, 3]), np.array([1, 2, 0, 1, 3, 2]), 4)
     >>> pairs.edges.tolist(), pairs.second.tolist()
-    ([0, 2, 1, 2, 3, 4], [-1, -1, 3, -1, -1])
+    ([0, 1, 2, 1, 3, 4], [-1, 3, -1, -1, -1])
     """
-    used = np.ones(0, dtype=bool) if used is None else used
-    return HalfedgePairs(*_pair(read_only(tails), heads, n_vertices, used))
+    chosen = tails != heads if used is None else used & (tails != heads)
+    edges, _, *table = find_edges(read_only(tails), read_only(heads), chosen, n_vertices)
+    return HalfedgePairs(edges, *table)
 
 
 def orient_faces(
@@ -130,75 +132,14 @@ def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDAr
     >>> may_coincide(pair_halfedges(tails, heads, 4), tails, np.array([1, 2, 0, 4, 5, 3]))
     False
     """
-    return bool(_may_coincide(pairs.counts, pairs.first, pairs.second, tails, following))
-
-
-@compiled
-def _may_coincide(
-    counts: NDArray[np.int32],
-    first: NDArray[np.int32],
-    second: NDArray[np.int32],
-    tails: NDArray[np.int64],
-    following: NDArray[np.int32],
-) -> bool:
-    for edge in range(len(counts)):
-        if counts[edge] > 2:
-            return True
-        if counts[edge] == 2:
-            h, k = first[edge], second[edge]
-            beyond = tails[following[following[h]]]
-            if tails[h] == tails[k]:
-                if beyond == tails[following[following[k]]]:
-                    return True
-            else:  # the other way round, the corner beyond the edge is the one before it
-                last = k
-                while following[last] != k:
-                    last = following[last]
-                if beyond == tails[last]:
-                    return True
-    return False
-
-
-@compiled
-def _pair(
-    tails: NDArray[np.int64], heads: NDArray[np.int64], n_vertices: int, used: NDArray[np.bool_]
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Bucket halfedges by their lesser vertex; in a bucket, the last edge to each greater vertex is marked there."""
-    n = len(tails)
-    starts = np.zeros(n_vertices + 1, dtype=np.int32)
-    for h in range(n):
-        if tails[h] != heads[h] and (len(used) == 0 or used[h]):
-            starts[min(tails[h], heads[h]) + 1] += 1
-    for v in range(n_vertices):
-        starts[v + 1] += starts[v]
-    bucket = np.empty(starts[n_vertices], dtype=np.int32)
-    at = starts[:-1].copy()
-    for h in range(n):
-        if tails[h] != heads[h] and (len(used) == 0 or used[h]):
-            low = min(tails[h], heads[h])
-            bucket[at[low]] = h
-            at[low] += 1
-    edges = np.full(n, -1, dtype=np.int32)
-    counts = np.zeros(len(bucket), dtype=np.int32)
-    first, second = np.empty(len(bucket), dtype=np.int32), np.full(len(bucket), -1, dtype=np.int32)
-    seen = np.full(n_vertices, -1, dtype=np.int32)  # the last edge that ends there
-    n_edges = 0
-    for low in range(n_vertices):
-        begin = n_edges
-        for place in range(starts[low], starts[low + 1]):
-            h = bucket[place]
-            high = max(tails[h], heads[h])
-            edge = seen[high]
-            if edge < begin:  # of another bucket
-                edge = n_edges
-                seen[high] = edge
-                first[edge] = h
-                n_edges += 1
-            elif counts[edge] == 1:
-                second[edge] = h
-            counts[edge] += 1
-            edges[h] = edge
-    return edges, counts[:n_edges].copy(), first[:n_edges].copy(), second[:n_edges].copy()
+    two = pairs.counts == 2
+    one, other = pairs.first[two], pairs.second[two]
+    preceding = np.empty_like(following)
+    preceding[following] = np.arange(len(following), dtype=following.dtype)
+    beyond = tails[following[following[one]]]
+    alike = tails[one] == tails[other]  # else the corner beyond the edge is the one before it
+    there = tails[np.where(alike, following[following[other]], preceding[other])]
+    return bool((pairs.counts > 2).any() or (beyond == there).any())
 
 
 @compiled
@@ -216,10 +157,10 @@ def _root(parents: NDArray[np.int64], ways: NDArray[np.bool_], face: int) -> tup
 
 @compiled
 def _orient(
-    edges: NDArray[np.int32],
-    counts: NDArray[np.int32],
-    first: NDArray[np.int32],
-    second: NDArray[np.int32],
+    edges: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
     tails: NDArray[np.int64],
     owners: NDArray[np.int32],
     weights: NDArray[np.float64],

@@ -1,4 +1,4 @@
-"""Which points are at the same place, to the last bit or to roundoff."""
+"""What is the same: points at one place, to the last bit or to roundoff, rows of numbers, faces on the same corners."""
 
 from __future__ import annotations
 
@@ -45,23 +45,79 @@ def welded(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
     return np.asarray(_weld(np.ascontiguousarray(points), max(tolerance, smallest, 1e-300)))
 
 
-def distinct_rows(rows: NDArray[np.unsignedinteger]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Number each of (n, 3) rows by the first that equals it; in order of first appearance.
-
-    Returns
-    -------
-    ids : (n,) int
-        Number of each row's kind.
-    firsts : (k,) int
-        First row of each kind.
+def same_positions(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) first point at exactly the same position as each of (n, d) points.
 
     Examples
     --------
-    >>> distinct_rows(np.array([[5, 5, 5], [1, 2, 3], [5, 5, 5]], dtype=np.uint32))
+    >>> same_positions(np.array([[0.0, 1.0], [2.0, 3.0], [-0.0, 1.0]])).tolist()
+    [0, 1, 0]
+    """
+    return same_rows((np.ascontiguousarray(points) + 0.0).view(np.uint64))  # −0 becomes 0
+
+
+def same_rows(rows: NDArray[np.integer]) -> NDArray[np.int64]:
+    """(n,) first row that equals each of (n, k) rows, in O(n) time.
+
+    Examples
+    --------
+    >>> same_rows(np.array([[5, 5, 5], [1, 2, 3], [5, 5, 5]])).tolist()
+    [0, 1, 0]
+    """
+    return np.asarray(_same_rows(np.ascontiguousarray(rows)))
+
+
+def distinct_rows(rows: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Number of each of (n, k) rows among the different ones, in order of first appearance; and the first of each kind.
+
+    Examples
+    --------
+    >>> distinct_rows(np.array([[5, 5, 5], [1, 2, 3], [5, 5, 5]]))
     (array([0, 1, 0]), array([0, 1]))
     """
-    ids, firsts = _distinct(np.ascontiguousarray(rows))
-    return ids, firsts
+    first = same_rows(rows)
+    is_first = first == np.arange(len(first))
+    return (np.cumsum(is_first) - 1)[first], np.flatnonzero(is_first)
+
+
+def coincident_faces(
+    corners: NDArray[np.int64], offsets: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """First face on the same corners as each, and whether it runs the other way round.
+
+    Parameters
+    ----------
+    corners, offsets : int arrays
+        Vertex ids of all faces, and where those of each begin; one more offset than faces.
+
+    Returns
+    -------
+    first : (p,) int
+        Least id among the faces on the same corners in the same or in the opposite order. Faces that name a vertex
+        twice stand for themselves; −1 for those on fewer than three vertices.
+    reversed : (p,) bool
+        Whether the order is opposite to that of `first`.
+
+    Examples
+    --------
+    >>> coincident_faces(np.array([0, 1, 2, 1, 2, 0, 0, 2, 1, 3, 3, 1]), np.array([0, 3, 6, 9, 12]))
+    (array([ 0,  0,  0, -1]), array([False, False,  True, False]))
+    """
+    sizes = np.diff(offsets)
+    first, reverse = np.arange(len(sizes)), np.zeros(len(sizes), dtype=bool)
+    for size in np.unique(sizes).tolist():
+        which = np.flatnonzero(sizes == size)
+        faces = corners[offsets[which, None] + np.arange(size)]
+        ordered = np.sort(faces, axis=1)
+        distinct = 1 + np.count_nonzero(ordered[:, 1:] != ordered[:, :-1], axis=1)
+        first[which[distinct < min(size, 3)]] = -1
+        which, faces = which[distinct == size], faces[distinct == size]
+        rows, least = np.arange(len(which)), faces.argmin(axis=1)
+        backwards = faces[rows, least - 1] < faces[rows, (least + 1) % size]
+        steps = np.where(backwards, -1, 1)[:, None] * np.arange(size)
+        same = same_rows(np.take_along_axis(faces, (least[:, None] + steps) % size, axis=1))
+        first[which], reverse[which] = which[same], backwards != backwards[same]
+    return first, reverse
 
 
 @compiled
@@ -108,29 +164,29 @@ def _weld(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
 
 
 @compiled
-def _distinct(rows: NDArray[np.unsignedinteger]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    n = len(rows)
-    bits = 4
-    while (1 << bits) < 2 * n:
-        bits += 1
-    mask = (1 << bits) - 1
-    table = np.full(1 << bits, -1, dtype=np.int32)  # numbers of kinds
-    ids, firsts = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    count = 0
-    for r in range(n):
-        a, b, c = rows[r, 0], rows[r, 1], rows[r, 2]
-        slot = mixed(np.int64(a), np.int64(b), np.int64(c)) & mask
+def _same_rows(rows: NDArray[np.integer]) -> NDArray[np.int64]:
+    count, width = rows.shape
+    size = 16
+    while size < 2 * count:
+        size *= 2
+    mask = np.uint64(size - 1)
+    table = np.full(size, -1, dtype=np.int32)
+    result = np.empty(count, dtype=np.int64)
+    for i in range(count):
+        key = np.uint64(1469598103934665603)
+        for d in range(width):
+            key = (key ^ np.uint64(rows[i, d])) * np.uint64(0x9E3779B97F4A7C15)
+            key ^= key >> np.uint64(29)
+        place = key & mask
         while True:
-            kind = table[slot]
-            if kind < 0:
-                table[slot] = count
-                firsts[count] = r
-                ids[r] = count
-                count += 1
+            other = table[place]
+            same = other >= 0
+            for d in range(width):
+                same = same and rows[i, d] == rows[other, d]
+            if same or other < 0:
                 break
-            first = firsts[kind]
-            if rows[first, 0] == a and rows[first, 1] == b and rows[first, 2] == c:
-                ids[r] = kind
-                break
-            slot = (slot + 1) & mask
-    return ids, firsts[:count].copy()
+            place = (place + np.uint64(1)) & mask
+        if other < 0:
+            table[place] = other = i
+        result[i] = other
+    return result

@@ -24,7 +24,8 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import CancellingNormalsError, SourceError
-from ..geometry.components import element_components, same_positions
+from ..geometry.components import element_components
+from ..geometry.welding import same_positions
 from ..operators.grid.node_sources import NodeSources
 from ..operators.grid.wavefront import padded_shape
 from .grid.binning import merge_in_cells

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.coincident_faces import coincident_faces
 from ..geometry.halfedges import (
     FaceOrientation,
     HalfedgePairs,
@@ -17,7 +16,7 @@ from ..geometry.halfedges import (
     orient_faces,
     pair_halfedges,
 )
-from ..geometry.welding import roundoff, welded
+from ..geometry.welding import coincident_faces, roundoff, welded
 
 ALMOST_ALL = 0.95
 """Share of a part's area from which a part that is there again elsewhere is a duplicate."""

@@ -10,8 +10,8 @@ import scipy
 from numpy.typing import NDArray
 
 from ..frozen import Frozen
-from ..geometry.components import same_positions
 from ..geometry.edges import edge_table
+from ..geometry.welding import same_positions
 from ..geometry.winding_tree import WindingTree
 
 INSIDE = 0.5
