@@ -24,9 +24,6 @@ INTERVAL = 0.1
 CHUNK = 1 << 13
 """Rows that a thread works on at a time."""
 
-SLAB_SIZE = 1 << 16
-"""Numbers that a thread works on at a time."""
-
 PATIENCE = 30.0
 """Seconds within which a cluster must answer."""
 GREETING = 1 << 20
@@ -69,28 +66,6 @@ def in_chunks(
         for job in [pool.submit(lambda k: fill(k, function(rows[k : k + CHUNK])), start) for start in starts]:
             job.result()
     return results
-
-
-def over_slabs(function: Callable[[slice], None], shape: tuple[int, ...], size: int = SLAB_SIZE) -> None:
-    """Call a function with slices of the first axis of arrays of a shape, on all threads.
-
-    A slice of one array is about `size` numbers, few enough for the processor's cache.
-
-    Examples
-    --------
-    >>> values = np.arange(6.0).reshape(3, 2)
-    >>> over_slabs(lambda here: np.negative(values[here], out=values[here]), values.shape, 2)
-    >>> values.tolist()
-    [[-0.0, -1.0], [-2.0, -3.0], [-4.0, -5.0]]
-    """
-    rows = max(1, size // max(1, int(np.prod(shape[1:]))))
-    slabs = [slice(start, start + rows) for start in range(0, shape[0], rows)]
-    if len(slabs) == 1:
-        function(slabs[0])
-        return
-    with ThreadPoolExecutor(n_threads()) as pool:
-        for _ in pool.map(function, slabs):
-            pass
 
 
 def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:

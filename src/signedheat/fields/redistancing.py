@@ -27,7 +27,7 @@ def redistance(
 
     Parameters
     ----------
-    values : array with one to three axes
+    values : array with one to four axes
         Positive on one side, negative on the other; zero is on the zero set. Masked nodes, and NaN, are walls, each a
         box of one cell around its node: distance is measured around them, along ways that bend at nodes.
     spacing : float, or one for each axis
@@ -45,7 +45,7 @@ def redistance(
     OutsideError
         If the array has no zero set: one sign everywhere, or walls between the two.
     GeometryError
-        If the array has no axis or more than three, or infinite values, or there are walls on a periodic grid.
+        If the array has no axis or more than four, or infinite values, or there are walls on a periodic grid.
 
     See Also
     --------
@@ -63,8 +63,8 @@ def redistance(
     """
     masked = isinstance(values, np.ma.MaskedArray)
     given = numbers(np.ma.getdata(values) if masked else values, "values")
-    if not 1 <= given.ndim <= 3 or given.size < 2:
-        raise GeometryError(f"values must have one to three axes, and two nodes, not {given.shape}", element="values")
+    if not 1 <= given.ndim <= 4 or given.size < 2:
+        raise GeometryError(f"values must have one to four axes, and two nodes, not {given.shape}", element="values")
     if np.asanyarray(values).dtype == np.bool_:
         raise GeometryError("booleans have no sign", remedy="pass numpy.where(inside, -1.0, 1.0)", element="values")
     walls = np.isnan(given) | (np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else False)
@@ -119,7 +119,7 @@ def _distances(
             remedy="subtract a level; of an image of 0 and 1, for instance, pass 0.5 - image",
             element="values",
         )
-    if signs:  # which say nothing of how the zero set bends
+    if signs and values.ndim < 4:  # which say nothing of how the zero set bends
         contour = contour._replace(smooth=np.zeros_like(contour.smooth))
     nearest = nearest_crossings(contour, shape, steps)
     distances = distances_to_contour(contour, nearest, steps)

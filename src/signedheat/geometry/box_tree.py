@@ -62,6 +62,75 @@ class BoxTree:
             level //= 2
         return cls(bounds, items)
 
+    def meeting(
+        self, triangles: NDArray[np.float64], slack: float | NDArray[np.float64] = 0.0
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Where what is near each of (n, 3, 3) triangles begins, and what it is: all in leaves that they may meet.
+
+        A triangle may meet a node if its box and its plane do, to a slack along each axis.
+
+        Examples
+        --------
+        >>> corners = np.arange(9.0).reshape(3, 3)
+        >>> tree = BoxTree.of(corners, corners)
+        >>> tree.meeting(np.array([[[2.0, 2, 2], [5, 3, 3], [5, 5, 5]], [[9, 9, 9], [9, 9, 9], [9, 9, 9]]]))
+        (array([0, 3, 3]), array([0, 1, 2]))
+        """
+        corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
+        starts, none = np.zeros(len(corners) + 1, dtype=np.int64), np.empty(0, dtype=np.int64)
+        _meeting(self.bounds, self.items, corners, slacks, starts, none)
+        np.cumsum(starts, out=starts)
+        found = np.empty(starts[-1], dtype=np.int64)
+        if len(found):
+            _meeting(self.bounds, self.items, corners, slacks, starts, found)
+        return starts, found
+
+
+@compiled
+def _meeting(
+    bounds: NDArray[np.float64],
+    items: NDArray[np.int64],
+    corners: NDArray[np.float64],
+    slacks: NDArray[np.float64],
+    starts: NDArray[np.int64],
+    out: NDArray[np.int64],
+) -> None:
+    """Count what is near each triangle, behind its start; or, where there is room, write it."""
+    leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
+    lower, upper, normal = np.empty(3), np.empty(3), np.empty(3)
+    for t in range(len(corners)):
+        level = 0.0
+        for d in range(3):
+            p, q = (d + 1) % 3, (d + 2) % 3
+            a, b, c = corners[t, d], corners[t, 3 + d], corners[t, 6 + d]
+            lower[d], upper[d] = min(a, b, c) - slacks[d], max(a, b, c) + slacks[d]
+            normal[d] = (corners[t, 3 + p] - corners[t, p]) * (corners[t, 6 + q] - corners[t, q])
+            normal[d] -= (corners[t, 3 + q] - corners[t, q]) * (corners[t, 6 + p] - corners[t, p])
+            level += normal[d] * a
+        stack[0], depth, count = 1, 1, 0
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            apart, height, reach = False, -level, 0.0
+            for d in range(3):
+                low, high = bounds[node, d], bounds[node, 3 + d]
+                apart |= low > upper[d] or high < lower[d]
+                height += normal[d] * 0.5 * (low + high)
+                reach += abs(normal[d]) * (0.5 * (high - low) + slacks[d])
+            if apart or abs(height) > reach:
+                continue
+            if node < leaves:
+                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
+                depth += 2
+                continue
+            for place in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
+                if items[place] >= 0:
+                    if len(out):
+                        out[starts[t] + count] = items[place]
+                    count += 1
+        if not len(out):
+            starts[t + 1] = count
+
 
 def order_in_space(points: NDArray[np.float64]) -> NDArray[np.int64]:
     """(n,) numbers of (n, 3) points along a space-filling curve; few points stay as they are."""

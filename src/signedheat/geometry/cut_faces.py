@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from .box_tree import LEAF, BoxTree
+from .box_tree import BoxTree
 
 TOUCHING = 1e-8
 """Depth, over the size of the shape, up to which triangles that overlap only touch: what coordinates are rounded to."""
@@ -48,7 +48,8 @@ def cut_faces(
     tree = BoxTree.of(knives.min(axis=1), knives.max(axis=1))
     size = float(np.ptp(knives.reshape(-1, 3), axis=0).max())
     corners, others = (np.ascontiguousarray(each).reshape(-1, 9) for each in (triangles, knives))
-    pieces, origins, met = _cut(corners, ids, others, knife_ids, tree.bounds, tree.items, TOUCHING * size)
+    slack = TOUCHING * size
+    pieces, origins, met = _cut(corners, ids, others, knife_ids, *tree.meeting(triangles, slack), slack)
     return pieces.reshape(-1, 3, 3), origins, met
 
 
@@ -60,6 +61,11 @@ def overlap(
 
     Along their normals they may be apart by a slack.
     """
+    for d in range(3):
+        if min(p[d], p[3 + d], p[6 + d]) > max(q[d], q[3 + d], q[6 + d]) + slack:
+            return False
+        if min(q[d], q[3 + d], q[6 + d]) > max(p[d], p[3 + d], p[6 + d]) + slack:
+            return False
     normals = np.zeros((2, 3))
     for a in range(17):
         # normals of both; products of their sides; sides turned in their planes
@@ -171,81 +177,57 @@ def _cut(
     ids: NDArray[np.int64],
     knives: NDArray[np.float64],
     knife_ids: NDArray[np.int64],
-    bounds: NDArray[np.float64],
-    items: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    near: NDArray[np.int64],
     slack: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
     met = np.zeros(len(corners), dtype=np.bool_)
-    leaves = len(bounds) // 2
-    stack, axis, box = np.empty(64, dtype=np.int64), np.empty(3), np.empty(6)
+    axis = np.empty(3)
     pieces, alive = np.empty((MOST_PIECES, 9)), np.zeros(MOST_PIECES, dtype=np.bool_)
     result, origins, total = np.empty((len(corners) + 1024, 9)), np.empty(len(corners) + 1024, dtype=np.int64), 0
     for f in range(len(corners)):
-        for k in range(3):
-            box[k] = min(corners[f, k], corners[f, 3 + k], corners[f, 6 + k]) - slack
-            box[3 + k] = max(corners[f, k], corners[f, 3 + k], corners[f, 6 + k]) + slack
         pieces[0], alive[0], count = corners[f], True, 1
-        stack[0], depth = 1, 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            apart = False
-            for k in range(3):
-                apart |= bounds[node, k] > box[3 + k] or bounds[node, 3 + k] < box[k]
-            if apart:
+        for g in near[starts[f] : starts[f + 1]]:
+            shared = 0
+            for i in range(3):
+                for j in range(3):
+                    shared += ids[f, i] == knife_ids[g, j]
+            if shared > 1 or not overlap(corners[f], knives[g], slack, slack, axis):
                 continue
-            if node < leaves:
-                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
-                depth += 2
+            met[f] = True
+            q = knives[g]
+            nx = (q[4] - q[1]) * (q[8] - q[2]) - (q[5] - q[2]) * (q[7] - q[1])
+            ny = (q[5] - q[2]) * (q[6] - q[0]) - (q[3] - q[0]) * (q[8] - q[2])
+            nz = (q[3] - q[0]) * (q[7] - q[1]) - (q[4] - q[1]) * (q[6] - q[0])
+            length = np.sqrt(nx * nx + ny * ny + nz * nz)
+            if not length > 0.0:
                 continue
-            for place in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
-                g = items[place]
-                if g < 0:
+            nx, ny, nz = nx / length, ny / length, nz / length
+            height = nx * q[0] + ny * q[1] + nz * q[2]
+            flat = True
+            for c in range(0, 9, 3):
+                flat &= abs(corners[f, c] * nx + corners[f, c + 1] * ny + corners[f, c + 2] * nz - height) <= slack
+            before = count
+            for at in range(before):
+                if not alive[at] or not overlap(pieces[at], q, slack, slack, axis):
                     continue
-                meets = True
-                for k in range(3):
-                    meets &= min(knives[g, k], knives[g, 3 + k], knives[g, 6 + k]) <= box[3 + k]
-                    meets &= max(knives[g, k], knives[g, 3 + k], knives[g, 6 + k]) >= box[k]
-                shared = 0
-                for i in range(3):
-                    for j in range(3):
-                        shared += ids[f, i] == knife_ids[g, j]
-                if not meets or shared > 1 or not overlap(corners[f], knives[g], slack, slack, axis):
+                if not flat:
+                    count = _halve(pieces, alive, count, at, nx, ny, nz, height, slack)
                     continue
-                met[f] = True
-                q = knives[g]
-                nx = (q[4] - q[1]) * (q[8] - q[2]) - (q[5] - q[2]) * (q[7] - q[1])
-                ny = (q[5] - q[2]) * (q[6] - q[0]) - (q[3] - q[0]) * (q[8] - q[2])
-                nz = (q[3] - q[0]) * (q[7] - q[1]) - (q[4] - q[1]) * (q[6] - q[0])
-                length = np.sqrt(nx * nx + ny * ny + nz * nz)
-                if not length > 0.0:
-                    continue
-                nx, ny, nz = nx / length, ny / length, nz / length
-                height = nx * q[0] + ny * q[1] + nz * q[2]
-                flat = True
-                for c in range(0, 9, 3):
-                    flat &= abs(corners[f, c] * nx + corners[f, c + 1] * ny + corners[f, c + 2] * nz - height) <= slack
-                before = count
-                for at in range(before):
-                    if not alive[at] or not overlap(pieces[at], q, slack, slack, axis):
+                for c in range(0, 9, 3):  # along each edge, whatever came of the piece before
+                    d = (c + 3) % 9
+                    ex, ey, ez = q[d] - q[c], q[d + 1] - q[c + 1], q[d + 2] - q[c + 2]
+                    ax, ay, az = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
+                    long = np.sqrt(ax * ax + ay * ay + az * az)
+                    if not long > 0.0:
                         continue
-                    if not flat:
-                        count = _halve(pieces, alive, count, at, nx, ny, nz, height, slack)
-                        continue
-                    for c in range(0, 9, 3):  # along each edge, whatever came of the piece before
-                        d = (c + 3) % 9
-                        ex, ey, ez = q[d] - q[c], q[d + 1] - q[c + 1], q[d + 2] - q[c + 2]
-                        ax, ay, az = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
-                        long = np.sqrt(ax * ax + ay * ay + az * az)
-                        if not long > 0.0:
-                            continue
-                        level = (ax * q[c] + ay * q[c + 1] + az * q[c + 2]) / long
-                        until = count
-                        if alive[at]:
-                            count = _halve(pieces, alive, count, at, ax / long, ay / long, az / long, level, slack)
-                        for new in range(before, until):
-                            if alive[new] and overlap(pieces[new], q, slack, slack, axis):
-                                count = _halve(pieces, alive, count, new, ax / long, ay / long, az / long, level, slack)
+                    level = (ax * q[c] + ay * q[c + 1] + az * q[c + 2]) / long
+                    until = count
+                    if alive[at]:
+                        count = _halve(pieces, alive, count, at, ax / long, ay / long, az / long, level, slack)
+                    for new in range(before, until):
+                        if alive[new] and overlap(pieces[new], q, slack, slack, axis):
+                            count = _halve(pieces, alive, count, new, ax / long, ay / long, az / long, level, slack)
         if total + count > len(result):
             more = np.empty((2 * len(result) + count, 9))
             more[:total] = result[:total]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import LEAF, BoxTree
-from .point_triangle import foot_on_triangle, triangle_rows
+from .point_triangle import barycentric_on_triangles, foot_on_triangle, triangle_rows
 
 
 def nearest_on_triangles(
@@ -23,13 +23,11 @@ def nearest_on_triangles(
     (array([0, 0]), array([[0.5, 0.5, 0. ],
            [0. , 0.5, 0.5]]))
     """
-    corners = np.ascontiguousarray(triangles, dtype=np.float64)
+    rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
     found, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
     no_discs = np.full((len(tree.bounds), 8), -1.0)
-    descend(
-        triangle_rows(corners.reshape(-1, 9)), tree.bounds, no_discs, tree.items, points, len(points), found, squares
-    )
-    return found.astype(np.int64), _weights(corners, found, points)
+    descend(rows, tree.bounds, no_discs, tree.items, points, len(points), found, squares)
+    return found.astype(np.int64), barycentric_on_triangles(rows, found, points)
 
 
 @compiled
@@ -109,52 +107,3 @@ def descend(
                 if gaps[depth] < best:
                     node = stack[depth]
         out_faces[p], out_squares[p] = face, best
-
-
-@compiled
-def _weights(
-    triangles: NDArray[np.float64], faces: NDArray[np.int32], points: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    weights = np.empty((len(points), 3))
-    for p in range(len(points)):
-        _, u, v, w = place_on_triangle(triangles[faces[p]], points[p, 0], points[p, 1], points[p, 2])
-        weights[p, 0], weights[p, 1], weights[p, 2] = u, v, w
-    return weights
-
-
-@compiled
-def place_on_triangle(triangle, x, y, z):
-    """Squared distance of (x, y, z) from a triangle, and barycentric coordinates of its closest point.
-
-    The foot of the perpendicular if that lies inside, otherwise the closest point of the three sides. Scalars instead
-    of arrays, because arrays would be allocated for every triangle.
-    """
-    ax, ay, az = triangle[0]
-    bx, by, bz = triangle[1, 0] - ax, triangle[1, 1] - ay, triangle[1, 2] - az
-    cx, cy, cz = triangle[2, 0] - ax, triangle[2, 1] - ay, triangle[2, 2] - az
-    px, py, pz = x - ax, y - ay, z - az
-    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    square = nx * nx + ny * ny + nz * nz
-    if square > 0.0:
-        v = (nx * (py * cz - pz * cy) + ny * (pz * cx - px * cz) + nz * (px * cy - py * cx)) / square
-        w = (nx * (by * pz - bz * py) + ny * (bz * px - bx * pz) + nz * (bx * py - by * px)) / square
-        if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
-            height = nx * px + ny * py + nz * pz
-            return height * height / square, 1.0 - v - w, v, w
-    first, s = _on_side(px, py, pz, bx, by, bz)
-    second, t = _on_side(px - bx, py - by, pz - bz, cx - bx, cy - by, cz - bz)
-    third, r = _on_side(px - cx, py - cy, pz - cz, -cx, -cy, -cz)
-    if first <= second and first <= third:
-        return first, 1.0 - s, s, 0.0
-    if second <= third:
-        return second, 0.0, 1.0 - t, t
-    return third, r, 0.0, 1.0 - r
-
-
-@compiled
-def _on_side(px, py, pz, dx, dy, dz):
-    """Squared distance of p from the segment from 0 to d, and the fraction of the segment at the closest point."""
-    length = dx * dx + dy * dy + dz * dz
-    s = min(max((px * dx + py * dy + pz * dz) / length, 0.0), 1.0) if length > 0.0 else 0.0
-    ex, ey, ez = px - s * dx, py - s * dy, pz - s * dz
-    return ex * ex + ey * ey + ez * ez, s

@@ -75,3 +75,31 @@ def foot_on_triangle(
     dy = py - s * rows[f, 4] - t * rows[f, 7]
     dz = pz - s * rows[f, 5] - t * rows[f, 8]
     return dx * dx + dy * dy + dz * dz, feature, x - dx, y - dy, z - dz
+
+
+@compiled
+def barycentric_on_triangles(
+    rows: NDArray[np.float64], faces: NDArray[np.int32], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n, 3) barycentric coordinates of the place of a triangle that is nearest to each point."""
+    weights = np.zeros((len(points), 3))
+    for p in range(len(points)):
+        f = faces[p]
+        _, feature, x, y, z = foot_on_triangle(rows, f, points[p, 0], points[p, 1], points[p, 2])
+        x, y, z = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
+        pu = x * rows[f, 3] + y * rows[f, 4] + z * rows[f, 5]
+        pv = x * rows[f, 6] + y * rows[f, 7] + z * rows[f, 8]
+        uu, uv, vv = rows[f, 9], rows[f, 10], rows[f, 11]
+        s, t = 0.0, 0.0
+        if feature == 0:
+            s, t = (vv * pu - uv * pv) * rows[f, 15], (uu * pv - uv * pu) * rows[f, 15]
+        elif feature == 1 or feature == 5:
+            s = pu * rows[f, 12] if feature == 1 else 1.0
+        elif feature == 3 or feature == 6:
+            t = pv * rows[f, 13] if feature == 3 else 1.0
+        elif feature == 2:
+            t = (pv - pu - uv + uu) * rows[f, 14]
+            s = 1.0 - t
+        s, t = min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
+        weights[p, 0], weights[p, 1], weights[p, 2] = max(1.0 - s - t, 0.0), s, t
+    return weights

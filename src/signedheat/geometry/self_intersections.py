@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..parallel import CHUNK, n_threads
-from .box_tree import LEAF, BoxTree
+from .box_tree import BoxTree
 from .cut_faces import overlap
 
 TOUCHING = 1e-10
@@ -38,12 +38,13 @@ def self_intersections(vertices: NDArray[np.float64], faces: NDArray[np.int64]) 
     tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
     slack = TOUCHING * float(np.ptp(centred, axis=0).max())
     flat = corners.reshape(-1, 9)
+
+    def part(start: int) -> NDArray[np.int64]:
+        found: NDArray[np.int64] = _pairs(flat, ids, start, *tree.meeting(corners[start : start + CHUNK], slack), slack)
+        return found
+
     with ThreadPoolExecutor(n_threads()) as pool:
-        jobs = [
-            pool.submit(_pairs, flat, ids, start, min(start + CHUNK, len(ids)), tree.bounds, tree.items, slack)
-            for start in range(0, len(ids), CHUNK)
-        ]
-        pairs = np.concatenate([job.result() for job in jobs])
+        pairs = np.concatenate(list(pool.map(part, range(0, len(ids), CHUNK))))
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 
@@ -62,48 +63,27 @@ def _folded(p: NDArray[np.float64], q: NDArray[np.float64]) -> bool:
 def _pairs(
     corners: NDArray[np.float64],
     faces: NDArray[np.int64],
-    start: int,
-    stop: int,
-    bounds: NDArray[np.float64],
-    items: NDArray[np.int64],
+    first: int,
+    starts: NDArray[np.int64],
+    near: NDArray[np.int64],
     slack: float,
 ) -> NDArray[np.int64]:
-    """(k, 2) pairs of which the first is from start to stop, and less than the second."""
-    leaves = len(bounds) // 2
-    stack, box, axis = np.empty(64, dtype=np.int64), np.empty(6), np.empty(3)
-    result, count = np.empty((64, 2), dtype=np.int64), 0
-    for f in range(start, stop):
-        for k in range(3):
-            x, y, z = corners[f, k], corners[f, 3 + k], corners[f, 6 + k]
-            box[k], box[3 + k] = min(x, y, z), max(x, y, z)
-        stack[0], depth = 1, 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            apart = False
-            for k in range(3):
-                apart |= bounds[node, k] > box[3 + k] or bounds[node, 3 + k] < box[k]
-            if apart:
+    """(k, 2) pairs of one of the faces from the first on and a later one, of those near each."""
+    axis, chosen = np.empty(3), np.zeros(len(near), dtype=np.bool_)
+    result = np.empty((len(near), 2), dtype=np.int64)
+    for b in range(len(starts) - 1):
+        f = first + b
+        for k in range(starts[b], starts[b + 1]):
+            g = near[k]
+            result[k, 0], result[k, 1] = f, g
+            if g <= f:
                 continue
-            if node < leaves:
-                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
-                depth += 2
-                continue
-            for at in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
-                g = items[at]
-                if g <= f:
-                    continue
-                shared = 0
-                for i in range(3):
-                    for j in range(3):
-                        shared += faces[f, i] == faces[g, j]
-                if (shared > 1 and _folded(corners[f], corners[g])) or (
-                    shared < 2 and overlap(corners[f], corners[g], slack, slack if shared else -slack, axis)
-                ):
-                    if count == len(result):
-                        wider = np.empty((2 * count, 2), dtype=np.int64)
-                        wider[:count] = result
-                        result = wider
-                    result[count, 0], result[count, 1] = f, g
-                    count += 1
-    return result[:count]
+            shared = 0
+            for i in range(3):
+                for j in range(3):
+                    shared += faces[f, i] == faces[g, j]
+            if shared > 1:
+                chosen[k] = _folded(corners[f], corners[g])
+            else:
+                chosen[k] = overlap(corners[f], corners[g], slack, slack if shared else -slack, axis)
+    return result[chosen]

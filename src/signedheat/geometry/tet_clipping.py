@@ -8,12 +8,13 @@ shared equally by the tets at that face.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from .box_tree import LEAF
+from ..parallel import in_chunks
 from .meshes import Tets
 
 FLAT = 1e-10
@@ -104,6 +105,11 @@ class Planes:
             center=center,
         )
 
+    @property
+    def in_kernels(self) -> tuple[NDArray[Any], ...]:
+        """What kernels need of them."""
+        return self.normals, self.offsets, self.tolerances, self.signs, self.solid
+
 
 def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -> ClippedPolygons:
     """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped.
@@ -116,24 +122,18 @@ def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -
     >>> clip_triangles(mesh, Planes.of(mesh), across).area_vectors
     array([[0.   , 0.   , 0.125]])
     """
-    tree = mesh.search_tree
-    found = _clip(
-        np.ascontiguousarray(triangles - planes.center),
-        tree.bounds,
-        tree.items,
-        planes.center,
-        mesh.faces.tet_faces,
-        planes.normals,
-        planes.offsets,
-        planes.tolerances,
-        planes.signs,
-        planes.shares,
-        planes.solid,
+    starts, near = mesh.search_tree.meeting(triangles, _slack(mesh))
+    triangles = np.ascontiguousarray(triangles - planes.center)
+    parents = np.repeat(np.arange(len(triangles)), np.diff(starts))
+    possible = _may_meet(triangles, parents, near, mesh.faces.tet_faces, *planes.in_kernels)
+    parents, tets = parents[possible], near[possible]
+    area_vectors, areas, centers, in_face = _clip(
+        triangles, parents, tets, mesh.faces.tet_faces, *planes.in_kernels, planes.shares
     )
-    tets, parents, area_vectors, areas, centers, in_face = found
-    return ClippedPolygons(
-        tets, parents, area_vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face
-    )
+    kept = areas > 0
+    parents, tets, centers = parents[kept], tets[kept], centers[kept] + planes.center
+    places = barycentric(mesh, tets, centers)
+    return ClippedPolygons(tets, parents, area_vectors[kept], areas[kept], places, in_face[kept])
 
 
 def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -146,19 +146,20 @@ def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> 
     >>> containing_tets(mesh, Planes.of(mesh), np.array([[0.1, 0.1, 0.1], [1.0, 1.0, 1.0]]))
     array([ 0, -1])
     """
-    tree = mesh.search_tree
-    return _locate(
-        np.ascontiguousarray(points - planes.center),
-        tree.bounds,
-        tree.items,
-        planes.center,
-        mesh.faces.tet_faces,
-        planes.normals,
-        planes.offsets,
-        planes.tolerances,
-        planes.signs,
-        planes.solid,
-    )
+
+    def found(some: NDArray[np.float64]) -> tuple[NDArray[np.int64]]:
+        near = mesh.search_tree.meeting(np.repeat(some[:, None], 3, axis=1), slack)
+        return (_locate(some - planes.center, *near, mesh.faces.tet_faces, *planes.in_kernels),)
+
+    slack = _slack(mesh)
+    return in_chunks(found, points)[0]
+
+
+def _slack(mesh: Tets) -> NDArray[np.float64]:
+    """(3,) how far beyond its box a tet is looked for: rounding may put a point there."""
+    lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
+    slack: NDArray[np.float64] = 1e-9 * (upper - lower)
+    return slack
 
 
 def barycentric(mesh: Tets, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -171,158 +172,75 @@ def barycentric(mesh: Tets, tets: NDArray[np.int64], points: NDArray[np.float64]
 
 
 @compiled
-def _locate(points, bounds, items, center, tet_faces, normals, offsets, tolerances, signs, solid):
+def _locate(points, starts, near, tet_faces, normals, offsets, tolerances, signs, solid):
     found = np.full(len(points), -1, dtype=np.int64)
-    stack = np.empty(128, dtype=np.int64)
-    leaves = len(bounds) // 2
     for p in range(len(points)):
-        x, y, z = points[p] + center
-        slack = 1e-9 * (bounds[1, 3] - bounds[1, 0])
-        depth = 1
-        stack[0] = 1
         deepest = -np.inf
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            box = bounds[node]
-            if (
-                x < box[0] - slack
-                or y < box[1] - slack
-                or z < box[2] - slack
-                or x > box[3] + slack
-                or y > box[4] + slack
-                or z > box[5] + slack
-            ):
+        for t in near[starts[p] : starts[p + 1]]:
+            if not solid[t]:
                 continue
-            if node < leaves:
-                stack[depth] = 2 * node + 1
-                stack[depth + 1] = 2 * node
-                depth += 2
-                continue
-            for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
-                t = items[k]
-                if t < 0 or not solid[t]:
-                    continue
-                inside = np.inf
-                for c in range(4):
-                    f = tet_faces[t, c]
-                    height = offsets[f] - (
-                        normals[f, 0] * points[p, 0] + normals[f, 1] * points[p, 1] + normals[f, 2] * points[p, 2]
-                    )
-                    inside = min(inside, signs[t, c] * height + tolerances[f])
-                if inside >= 0.0 and (inside > deepest or (inside == deepest and t < found[p])):
-                    deepest = inside
-                    found[p] = t
+            inside = np.inf
+            for c in range(4):
+                f = tet_faces[t, c]
+                x, y, z = points[p, 0], points[p, 1], points[p, 2]
+                height = offsets[f] - (normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z)
+                inside = min(inside, signs[t, c] * height + tolerances[f])
+            if inside >= 0.0 and (inside > deepest or (inside == deepest and t < found[p])):
+                deepest = inside
+                found[p] = t
     return found
 
 
 @compiled
-def _clip(triangles, bounds, items, center, tet_faces, normals, offsets, tolerances, signs, shares, solid):
-    size = 64 + 4 * len(triangles)
-    tets, parents = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
-    area_vectors, centers = np.empty((size, 3)), np.empty((size, 3))
-    areas, in_face = np.empty(size), np.empty(size, dtype=np.int64)
-    count = 0
-    polygon, other = np.empty((8, 3)), np.empty((8, 3))
-    heights, normal = np.empty(8), np.empty(3)
-    stack = np.empty(128, dtype=np.int64)
-    leaves = len(bounds) // 2
-    for p in range(len(triangles)):
-        a, b, c = triangles[p, 0], triangles[p, 1], triangles[p, 2]
-        u0, u1, u2, v0, v1, v2 = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        normal[0], normal[1], normal[2] = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
-        whole = 0.5 * np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
-        if whole == 0.0:
-            continue
-        lower = np.minimum(np.minimum(a, b), c) + center
-        upper = np.maximum(np.maximum(a, b), c) + center
-        level = (normal * (a + center)).sum()
-        depth = 1
-        stack[0] = 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            box = bounds[node]
-            apart = False
-            middle = 0.0
-            reach = 0.0
-            for i in range(3):
-                slack = 1e-9 * (bounds[1, 3 + i] - bounds[1, i])
-                apart |= box[i] > upper[i] + slack or box[3 + i] < lower[i] - slack
-                middle += normal[i] * 0.5 * (box[i] + box[3 + i])
-                reach += abs(normal[i]) * (0.5 * (box[3 + i] - box[i]) + slack)
-            if apart or abs(middle - level) > reach:
-                continue
-            if node < leaves:
-                stack[depth] = 2 * node + 1
-                stack[depth + 1] = 2 * node
-                depth += 2
-                continue
-            for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
-                t = items[k]
-                if t < 0 or not solid[t]:
-                    continue
-                if _beyond(a, b, c, tet_faces[t], normals, offsets, tolerances, signs[t]):
-                    continue
-                for i in range(3):
-                    polygon[0, i], polygon[1, i], polygon[2, i] = a[i], b[i], c[i]
-                n = 3
-                on = -1
-                for corner in range(4):
-                    f = tet_faces[t, corner]
-                    sign = signs[t, corner]
-                    n, flat = _cut(polygon, n, other, heights, normals[f], offsets[f], tolerances[f], sign)
-                    if flat:
-                        on = corner
-                    if n < 3:
-                        break
-                if n < 3:
-                    continue
-                if count == size:
-                    size *= 2
-                    tets = _longer(tets, size)
-                    parents = _longer(parents, size)
-                    areas = _longer(areas, size)
-                    in_face = _longer(in_face, size)
-                    area_vectors = _taller(area_vectors, size)
-                    centers = _taller(centers, size)
-                area = _measure(polygon, n, normal, area_vectors[count], centers[count])
-                if area <= 0.0:
-                    continue
-                if on >= 0:
-                    share = shares[tet_faces[t, on]]
-                    area *= share
-                    for axis in range(3):
-                        area_vectors[count, axis] *= share
-                tets[count] = t
-                parents[count] = p
-                areas[count] = area
-                in_face[count] = on
-                count += 1
-    return (
-        tets[:count].copy(),
-        parents[:count].copy(),
-        area_vectors[:count].copy(),
-        areas[:count].copy(),
-        centers[:count].copy(),
-        in_face[:count].copy(),
-    )
+def _may_meet(triangles, parents, tets, tet_faces, normals, offsets, tolerances, signs, solid):
+    """(k,) whether a triangle does not lie outside one of the faces of a tet altogether."""
+    result = np.zeros(len(tets), dtype=np.bool_)
+    for k in range(len(tets)):
+        t, p = tets[k], parents[k]
+        result[k] = solid[t]
+        for c in range(4):
+            f, sign = tet_faces[t, c], signs[t, c]
+            beyond = True
+            for corner in range(3):
+                x, y, z = triangles[p, corner, 0], triangles[p, corner, 1], triangles[p, corner, 2]
+                height = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z
+                beyond &= sign * height > sign * offsets[f] + tolerances[f]
+            result[k] &= not beyond
+    return result
 
 
 @compiled
-def _beyond(a, b, c, faces, normals, offsets, tolerances, signs):
-    """Whether a triangle lies entirely outside one of the faces."""
-    for k in range(4):
-        f, sign = faces[k], signs[k]
-        x, y, z = normals[f, 0], normals[f, 1], normals[f, 2]
-        level = sign * offsets[f] + tolerances[f]
-        if (
-            sign * (x * a[0] + y * a[1] + z * a[2]) > level
-            and sign * (x * b[0] + y * b[1] + z * b[2]) > level
-            and sign * (x * c[0] + y * c[1] + z * c[2]) > level
-        ):
-            return True
-    return False
+def _clip(triangles, parents, tets, tet_faces, normals, offsets, tolerances, signs, solid, shares):
+    """Area vector, area and centroid of what of a triangle lies in a tet, and the face of the tet that it lies in."""
+    area_vectors, centers = np.zeros((len(tets), 3)), np.zeros((len(tets), 3))
+    areas, in_face = np.zeros(len(tets)), np.full(len(tets), -1)
+    polygon, other, heights, normal = np.empty((8, 3)), np.empty((8, 3)), np.empty(8), np.empty(3)
+    for k in range(len(tets)):
+        a, b, c = triangles[parents[k], 0], triangles[parents[k], 1], triangles[parents[k], 2]
+        u0, u1, u2, v0, v1, v2 = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        normal[0], normal[1], normal[2] = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
+        if not (normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2 > 0.0):
+            continue
+        for i in range(3):
+            polygon[0, i], polygon[1, i], polygon[2, i] = a[i], b[i], c[i]
+        n = 3
+        for corner in range(4):
+            f = tet_faces[tets[k], corner]
+            sign = signs[tets[k], corner]
+            n, flat = _cut(polygon, n, other, heights, normals[f], offsets[f], tolerances[f], sign)
+            if flat:
+                in_face[k] = corner
+            if n < 3:
+                break
+        if n < 3:
+            continue
+        areas[k] = _measure(polygon, n, normal, area_vectors[k], centers[k])
+        if in_face[k] >= 0:
+            share = shares[tet_faces[tets[k], in_face[k]]]
+            areas[k] *= share
+            for axis in range(3):
+                area_vectors[k, axis] *= share
+    return area_vectors, areas, centers, in_face
 
 
 @compiled
@@ -380,20 +298,3 @@ def _measure(polygon, n, normal, area_vector, center):
         for axis in range(3):
             center[axis] /= total
     return total
-
-
-@compiled
-def _longer(array, size):
-    longer = np.empty(size, dtype=array.dtype)
-    for i in range(len(array)):
-        longer[i] = array[i]
-    return longer
-
-
-@compiled
-def _taller(array, size):
-    taller = np.empty((size, array.shape[1]), dtype=array.dtype)
-    for i in range(len(array)):
-        for axis in range(array.shape[1]):
-            taller[i, axis] = array[i, axis]
-    return taller

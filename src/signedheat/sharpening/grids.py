@@ -10,7 +10,6 @@ import numpy as np
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
 from ..fields.redistancing import redistance
-from ..operators.grid.closest_points import distance_to_zero_set
 from ..parallel import run_cancellable
 from ..progress import Progress
 from .sharpen import sharpen_field
@@ -30,8 +29,7 @@ def _(field: GridField, *, progress: Progress | None = None) -> GridField:
     if report is not None:
         report()
     begin = time.perf_counter()
-    measure = redistance if field.grid.dimension <= 3 else distance_to_zero_set
-    values = run_cancellable(lambda: measure(field.values, field.grid.spacing), report)
+    values = run_cancellable(lambda: redistance(field.values, field.grid.spacing), report)
     if progress is not None:
         progress(1.0, "done")
     timings = {**field.diagnostics.timings, "sharpen": time.perf_counter() - begin}

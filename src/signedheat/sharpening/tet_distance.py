@@ -11,6 +11,7 @@ from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.any_angle import FacePlanes, any_angle_distance
 from ..geometry.geodesics.heap_kernels import Queue
 from ..geometry.nearest import nearest_on_triangles
+from ..geometry.point_triangle import triangle_rows
 from ..geometry.tet_clipping import barycentric
 from ..geometry.visibility import tet_neighbors
 from ..lowering.tets.discretization import TetDiscretization
@@ -74,7 +75,7 @@ def distance_around(
         walls,
         points,
         *tets_at,
-        triangles,
+        triangle_rows(triangles.reshape(-1, 9)),
         surface.corners,
         *triangles_at,
         surface.owners,

@@ -18,7 +18,6 @@ from ..geometry.marching import closed_surface
 from ..lowering.area_elements import sample_on_grid
 from ..lowering.grid.source import GridSource
 from ..method import diffuse, integrate, normalize
-from ..operators.grid.face_values import values_at
 from ..operators.grid.fitted_points import fitted_to_points
 from ..operators.grid.winding import winding_numbers
 from .parts import FRAGMENTS
@@ -57,7 +56,7 @@ def heat_surface(
     samples = sample_on_grid([shape], grid, 1.0)
     winding = winding_numbers(samples.nodes, grid.shape, samples.positions, samples.vectors)
     areas = np.linalg.norm(samples.vectors, axis=1)
-    level = float(np.average(values_at(winding, samples.positions), weights=areas))
+    level = float(np.average(scipy.ndimage.map_coordinates(winding, samples.positions.T, order=1), weights=areas))
     if level < FRAGMENTS:
         return None
     source = GridSource(samples, grid, method.diffusion)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ..nearest import place_on_triangle
+from ..point_triangle import foot_on_triangle
 from .heap_kernels import pop, push
 
 
@@ -70,16 +70,15 @@ def _seen(planes, points, first_tet, tets_at, v, target, slack):
 
 
 @compiled
-def _foot(triangles, triangles_at, first_triangle, corners, near, x, y, z):
+def _foot(rows, triangles_at, first_triangle, corners, near, x, y, z):
     """Nearest point to (x, y, z) on the triangles that share a corner with triangle `near`: triangle and position."""
     best, found, place = np.inf, near, np.zeros(3)
     for c in range(3):
         for i in range(first_triangle[corners[near, c]], first_triangle[corners[near, c] + 1]):
-            square, a, b, g = place_on_triangle(triangles[triangles_at[i]], x, y, z)
+            square, _, u, v, w = foot_on_triangle(rows, triangles_at[i], x, y, z)
             if square < best:
                 best, found = square, triangles_at[i]
-                for d in range(3):
-                    place[d] = a * triangles[found, 0, d] + b * triangles[found, 1, d] + g * triangles[found, 2, d]
+                place[0], place[1], place[2] = u, v, w
     return found, place
 
 
@@ -90,7 +89,7 @@ def _length(point, x, y, z):
 
 @compiled
 def any_angle_distance(
-    planes, points, first_tet, tets_at, triangles, corners, first_triangle, triangles_at, owners, nearest, slack, queue
+    planes, points, first_tet, tets_at, rows, corners, first_triangle, triangles_at, owners, nearest, slack, queue
 ):
     """Distance of every vertex from triangles in the mesh.
 
@@ -104,8 +103,8 @@ def any_angle_distance(
         Where in `tets_at` the tets at each vertex begin.
     tets_at : (4 m,) int
         Tets by vertex.
-    triangles : (k, 3, 3) float
-        The surface, relative to the same centre.
+    rows : (k, 16) float
+        The triangles of the surface, as `triangle_rows` gives them, relative to the same centre.
     corners : (k, 3) int
         Vertex ids of the surface: corners that coincide have the same id.
     first_triangle, triangles_at : int arrays
@@ -137,22 +136,18 @@ def any_angle_distance(
     for v in range(n):
         if nearest[v] >= 0:
             x, y, z = points[v]
-            square, a, b, g = place_on_triangle(triangles[nearest[v]], x, y, z)
-            t = triangles[nearest[v]]
-            for d in range(3):
-                feet[v, d] = a * t[0, d] + b * t[1, d] + g * t[2, d]
+            square, _, feet[v, 0], feet[v, 1], feet[v, 2] = foot_on_triangle(rows, nearest[v], x, y, z)
             if _seen(planes, points, first_tet, tets_at, v, feet[v], slack):
                 distance[v], known[v] = np.sqrt(square), True
-    for i in range(len(triangles)):  # a triangle in a tet is visible from the tet's corners, if not the nearest to them
+    for i in range(len(rows)):  # a triangle in a tet is visible from the tet's corners, if not the nearest to them
         for k in range(4):
             v = planes.tets[owners[i], k]
             if owners[i] >= 0 and not known[v] and nearest[v] >= 0:
                 x, y, z = points[v]
-                square, a, b, g = place_on_triangle(triangles[i], x, y, z)
+                square, _, a, b, c = foot_on_triangle(rows, i, x, y, z)
                 if square < distance[v] ** 2:
                     distance[v], nearest[v] = np.sqrt(square), i
-                    for d in range(3):
-                        feet[v, d] = a * triangles[i, 0, d] + b * triangles[i, 1, d] + g * triangles[i, 2, d]
+                    feet[v, 0], feet[v, 1], feet[v, 2] = a, b, c
                     push(queue, v, distance[v])
     hidden = 0
     for v in range(n):
@@ -177,7 +172,7 @@ def any_angle_distance(
                     via, near, foot, length = bend[u], nearest[u], feet[u], distance[bend[u]]
                     target = points[via]
                 else:
-                    near, foot = _foot(triangles, triangles_at, first_triangle, corners, nearest[u], x, y, z)
+                    near, foot = _foot(rows, triangles_at, first_triangle, corners, nearest[u], x, y, z)
                     via, length, target = -1, 0.0, foot
                 length += _length(target, x, y, z)
                 if length >= distance[v]:

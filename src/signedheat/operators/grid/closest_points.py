@@ -7,99 +7,16 @@ components, of which the first ones are unused in fewer dimensions.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ...errors import OutsideError
-from ...parallel import n_threads
-from .stencil import SLAB, by_slabs
-from .wavefront import SMALL, padded_shape, sweep_lines
-
-
-def distance_to_zero_set(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(*shape) distance of each node to the zero set of values, with the sign of its value.
-
-    Crossings are moved onto the zero set of the cubic interpolant. Sweeps find the nearest of them for each node
-    (Danielsson 1980); the distance is then that to the osculating circle of the zero set there: second order, exact for
-    planes and spheres.
-
-    Raises
-    ------
-    OutsideError
-        If the values have one sign.
-    """
-    shape = padded_shape(values.shape)
-    steps = np.ones(4)
-    steps[4 - values.ndim :] = spacing
-    field = np.ascontiguousarray(values).reshape(shape)
-    edges = crossed_edges(field)
-    if not len(edges):
-        raise OutsideError(
-            "the field has one sign everywhere, so there is no zero set to measure distance to",
-            element="field",
-            remedy="use a larger grid, or add an offset to the values",
-        )
-    crossings = crossings_at(field, edges, steps)
-    nearest = np.full(shape, -1, dtype=np.int32)
-    squares = np.full(shape, np.inf, dtype=np.float32)
-    points = crossings[:, :4].astype(np.float32)
-    seed_edge_ends(nearest, squares, edges, points, steps, 0)
-    sweep_lines(nearest_tiles, shape, 1, nearest, squares, points, steps)
-    del squares
-    result = np.empty(shape)
-    reach = float(np.linalg.norm(spacing))  # no point of the zero set is farther from its nearest crossing
-    by_slabs(shape, _distances, field, nearest, crossings, steps, reach, result)
-    return result.reshape(values.shape)
 
 
 def crossed_edges(field: NDArray[np.float64]) -> NDArray[np.int32]:
     """(e, 5) node (4 indices) and axis of each edge whose two ends have different signs; zero counts as positive."""
-    axis = 0 if field.shape[0] > 1 else 1
-    n = field.shape[axis]
-    if field.size < SMALL:
-        edges: NDArray[np.int32] = _crossed_edges(field, axis, 0, n)
-        return edges
-    with ThreadPoolExecutor(n_threads()) as pool:
-        starts = range(0, n, SLAB)
-        jobs = [pool.submit(_crossed_edges, field, axis, start, min(start + SLAB, n)) for start in starts]
-    return np.concatenate([job.result() for job in jobs])
-
-
-@compiled
-def _crossed_edges(field, axis, start, stop):
-    """Those of the nodes from `start` to `stop` along an axis, to nodes behind them."""
-    n0, n1, n2, n3 = field.shape
-    capacity, count = 1024, 0
-    edges = np.empty((capacity, 5), dtype=np.int32)
-    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
-        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
-            for k in range(n2):
-                line = field[i, j, k]
-                next0 = field[min(i + 1, n0 - 1), j, k]
-                next1 = field[i, min(j + 1, n1 - 1), k]
-                next2 = field[i, j, min(k + 1, n2 - 1)]
-                for m in range(n3):
-                    sign = line[m] >= 0
-                    same0, same1, same2 = (next0[m] >= 0) == sign, (next1[m] >= 0) == sign, (next2[m] >= 0) == sign
-                    same3 = (line[min(m + 1, n3 - 1)] >= 0) == sign
-                    if same0 and same1 and same2 and same3:
-                        continue
-                    if count + 4 > capacity:
-                        grown = np.empty((2 * capacity, 5), dtype=np.int32)
-                        for e in range(count):
-                            for d in range(5):
-                                grown[e, d] = edges[e, d]
-                        edges = grown
-                        capacity *= 2
-                    for across, same in enumerate((same0, same1, same2, same3)):
-                        if not same:
-                            edges[count, 0], edges[count, 1], edges[count, 2], edges[count, 3] = i, j, k, m
-                            edges[count, 4] = across
-                            count += 1
-    return edges[:count]
+    found = [np.argwhere(np.diff(field < 0, axis=axis)) for axis in range(4)]
+    return np.concatenate([np.insert(nodes, 4, axis, axis=1) for axis, nodes in enumerate(found)]).astype(np.int32)
 
 
 @compiled
@@ -309,19 +226,3 @@ def circle_distance(
             circle = abs(2.0 * s + bend * square) / (1.0 + root)
             distance = min(distance, max(circle, distance - reach))
     return float(distance)
-
-
-@compiled
-def _distances(field, nearest, crossings, steps, reach, out, axis, start, stop):
-    """Distance of nodes to the circle that touches at their nearest crossing, with the sign of their values."""
-    n0, n1, n2, n = nearest.shape
-    away, across = np.empty(4), np.empty(4)
-    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
-        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
-            for k in range(n2):
-                for m in range(n):
-                    crossing = crossings[nearest[i, j, k, m]]
-                    away[0], away[1] = i * steps[0] - crossing[0], j * steps[1] - crossing[1]
-                    away[2], away[3] = k * steps[2] - crossing[2], m * steps[3] - crossing[3]
-                    distance = circle_distance(crossing, away, across, reach)
-                    out[i, j, k, m] = distance if field[i, j, k, m] >= 0 else -distance

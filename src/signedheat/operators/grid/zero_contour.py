@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...compiled import compiled
 from ...geometry.point_triangle import foot_on_triangle, triangle_rows
 from ...packages import lazy_module
-from .closest_points import circle_distance, crossings_at, nearest_tiles, seed_edge_ends
+from .closest_points import circle_distance, crossed_edges, crossings_at, nearest_tiles, seed_edge_ends
 from .stencil import by_slabs
 from .wavefront import padded_shape, sweep_lines
 
@@ -93,7 +93,7 @@ def smoothed_signs(signs: NDArray[np.float64]) -> NDArray[np.float64]:
 def zero_contour(
     values: NDArray[np.float64], steps: NDArray[np.float64], solid: NDArray[np.bool_] | None = None
 ) -> Contour:
-    """The zero set of an array with one to three axes; zero counts as positive.
+    """The zero set of an array with one to four axes; zero counts as positive. On four it is smooth, without triangles.
 
     Parameters
     ----------
@@ -106,6 +106,8 @@ def zero_contour(
     """
     unused = 4 - values.ndim
     field = np.ascontiguousarray(values).reshape(padded_shape(values.shape))
+    if values.ndim == 4:
+        return _of_crossings(field, steps, solid)
     vertices, faces, edges, numbers = _marched(values, solid)
     zeros = np.pad(_lone_zeros(values, solid), ((0, 0), (unused, 0)))
     crossings = vertices[numbers >= 0]
@@ -139,6 +141,19 @@ def zero_contour(
         least,
         float(np.linalg.norm(steps[unused:])),
     )
+
+
+def _of_crossings(field: NDArray[np.float64], steps: NDArray[np.float64], solid: NDArray[np.bool_] | None) -> Contour:
+    """The zero set of an array with four axes."""
+    edges = crossed_edges(field)
+    if solid is not None:
+        ends = edges[:, :4] + np.eye(4, dtype=np.int32)[edges[:, 4]]
+        edges = edges[~solid[tuple(edges[:, :4].T)] & ~solid[tuple(ends.T)]]
+    curved, reach = crossings_at(field, edges, steps), float(np.linalg.norm(steps))
+    smooth, starts = np.ones(len(edges), dtype=np.bool_), np.zeros(len(edges) + 1, dtype=np.int64)
+    none, rows = np.empty((0, 4), dtype=np.int64), np.empty((0, 16))
+    points = curved[:, :4].copy()
+    return Contour(edges, none, points, curved, smooth, rows, none[:, :3].copy(), starts, none[:, 0].copy(), 0.0, reach)
 
 
 def _marched(
@@ -332,5 +347,5 @@ def distance_around(
         for d in range(4):
             away[d] = place[d] - contour.curved[crossing, d]
         curved = circle_distance(contour.curved[crossing], away, room, contour.reach)
-        distance = min(max(curved, distance - contour.uneven), distance + contour.uneven)
+        distance = curved if nearest < 0 else min(max(curved, distance - contour.uneven), distance + contour.uneven)
     return float(distance)
