@@ -13,6 +13,7 @@ from scipy import sparse
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.geodesics.sources import PlacedSegments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.lists import members_of
 from ..geometry.minimum_cut import CutGraph
 from ..linear import factorize
 from ..lowering.surface.discretization import SurfaceDiscretization
@@ -233,9 +234,7 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, widths: NDArray[n
     stroke, vertex, side = found.row[beside].astype(np.int64), found.col[beside], found.data[beside] - 2
     far, chosen, ring = np.zeros(len(stroke)), [(stroke, vertex, side)], 1
     while len(stroke):
-        count = np.diff(neighbors.indptr)[vertex]
-        which = np.repeat(np.arange(len(vertex)), count)
-        at = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + neighbors.indptr[vertex][which]
+        which, at = members_of(neighbors.indptr, np.arange(neighbors.nnz), vertex)
         stroke, vertex, side = stroke[which], neighbors.indices[at].astype(np.int64), side[which]
         far = far[which] + neighbors.data[at]
         ring += 1

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, UnsupportedTypeError
+from ..geometry.lists import members_of
 from ..packages import lazy_module
 from .digital_surface import DigitalSurface
 from .exchange import shape_from, shape_to
@@ -299,7 +300,7 @@ def _from_cells(kind: type | None, thing: Any) -> Any:
             remedy="call its extract_surface() or triangulate() first",
         )
     counts = np.diff(offsets)[faces]
-    taken = np.repeat(offsets[faces] - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+    _, taken = members_of(offsets, np.arange(len(corners)), faces)
     return _build(kind, np.asarray(thing.points), corners[taken], counts, normals)
 
 

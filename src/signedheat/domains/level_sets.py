@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import SourceError
 from ..geometry.meshes import Triangles
 from ..geometry.polylines import assemble_polylines, leaving
-from ..geometry.surface_points import SNAP
+from ..geometry.surface_points import SNAP, barycentric_on_sides
 from .curves import Curve
 
 SAME = 1e-6
@@ -108,13 +108,9 @@ def on_sides(
     mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64], along: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(k, 3) barycentric coordinates of points on sides of faces, given by fractions along their edges."""
-    row = np.arange(len(faces))
     fraction = along[mesh.edges.face_edges[faces, sides]]
     fraction = np.where(mesh.edges.forward[faces, sides], fraction, 1 - fraction)
-    weights = np.zeros((len(faces), 3))
-    weights[row, sides] = 1 - fraction
-    weights[row, (sides + 1) % 3] = fraction
-    return weights
+    return barycentric_on_sides(sides, fraction)
 
 
 def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from .box_tree import morton_codes
 from .edges import EdgeTable, edge_table
+from .lists import grouped
 from .point_triangle import triangle_rows
 from .welding import same_positions
 
@@ -146,12 +147,10 @@ class FaceFeatures:
             faces, trusted, ids = faces[~copies], trusted[~copies], ids[~copies]
             table = edge_table(faces)
         corners = np.ascontiguousarray(vertices[faces].reshape(-1, 9))
-        starts = np.zeros(len(vertices) + 1, dtype=np.int64)
-        np.cumsum(np.bincount(faces.ravel(), minlength=len(vertices)), out=starts[1:])
+        starts, around = grouped(faces.ravel(), len(vertices))
         n_edges = len(table.vertices)
         normals = _normals(corners, faces, table.face_edges, table.forward, n_edges, len(vertices))
         face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular, across = normals
-        around = _corners_around(faces, starts)
         vertex_regular &= _one_fan(faces, across, starts, around)
         return cls(
             corners,
@@ -167,7 +166,7 @@ class FaceFeatures:
             across,
             np.where(across < 0, -1, faces[across].sum(axis=2) - faces - np.roll(faces, -1, axis=1)).astype(np.int32),
             starts,
-            around,
+            around.astype(np.int32),
             trusted,
             ids,
         )
@@ -205,20 +204,8 @@ def _by_first_use(faces: NDArray[np.int64], n_vertices: int) -> tuple[NDArray[np
 
 
 @compiled
-def _corners_around(faces: NDArray[np.int64], starts: NDArray[np.int64]) -> NDArray[np.int32]:
-    fill = starts.copy()
-    corners = np.empty(3 * len(faces), dtype=np.int32)
-    for f in range(len(faces)):
-        for c in range(3):
-            v = faces[f, c]
-            corners[fill[v]] = 3 * f + c
-            fill[v] += 1
-    return corners
-
-
-@compiled
 def _one_fan(
-    faces: NDArray[np.int64], across: NDArray[np.int32], starts: NDArray[np.int64], around: NDArray[np.int32]
+    faces: NDArray[np.int64], across: NDArray[np.int32], starts: NDArray[np.int64], around: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """(n,) whether a walk around each vertex, over edges, comes to all of its faces: cones that touch are several."""
     result = np.ones(len(starts) - 1, dtype=np.bool_)

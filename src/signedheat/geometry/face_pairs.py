@@ -60,11 +60,10 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
     ([[0, 1]], [[1, 0]], [1])
     """
     edge = triangles.edges.face_edges.ravel()
-    order = np.argsort(edge, kind="stable")
-    count = np.bincount(edge, minlength=triangles.n_edges)
-    last = np.cumsum(count)
+    starts, order = triangles.halfedges_of_edges
+    count = np.diff(starts)
     following = np.arange(1, len(order) + 1)
-    following[last[count > 0] - 1] = (last - count)[count > 0]
+    following[starts[1:][count > 0] - 1] = starts[:-1][count > 0]
     halfedges = np.stack([order, order[following]], axis=1)
     around = count[edge[order]]
     halfedges = halfedges[(around > 2) | ((around == 2) & (halfedges[:, 0] < halfedges[:, 1]))]

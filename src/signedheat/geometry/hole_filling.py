@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from .components import connected_components
 from .edges import edge_table
+from .lists import grouped, members_of
 
 MOST_SIDES = 12
 
@@ -56,12 +57,7 @@ def next_around_gap(
 
     Where several leave its head, it is the first one counter-clockwise from the reversed edge: faces lie to the left.
     """
-    leaving = np.argsort(tails, kind="stable")
-    begin = np.searchsorted(tails[leaving], heads)
-    count = np.searchsorted(tails[leaving], heads, side="right") - begin
-    arriving = np.repeat(np.arange(len(heads)), count)
-    inside = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    onward = leaving[np.repeat(begin, count) + inside]
+    arriving, onward = members_of(*grouped(tails, len(points)), heads)
     at = heads[arriving]
     back, forth = points[tails[arriving]] - points[at], points[heads[onward]] - points[at]
     sine = (np.cross(back, forth) * normals[at]).sum(axis=1)

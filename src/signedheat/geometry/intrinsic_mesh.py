@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..frozen import Frozen
 from .components import element_components
 from .edges import EdgeTable, edge_table
+from .lists import grouped
 from .triangle_kernels import gather
 
 Index = NDArray[np.int64] | slice
@@ -156,6 +157,11 @@ class IntrinsicMesh(Frozen):
         flat = self.edges.face_edges.ravel()
         first[flat[::-1]] = np.arange(len(flat))[::-1]
         return first[first >= 0]
+
+    @cached_property
+    def halfedges_of_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(e + 1,) where the halfedges 3 f + j of each edge begin, and the halfedges: see `grouped`."""
+        return grouped(self.edges.face_edges.ravel(), self.n_edges)
 
     @cached_property
     def is_consistently_oriented(self) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cut_kernels import source_side
+from .lists import grouped
 
 UNITS = 2.0**40
 """What all pulls to one side count together, as integers, so that a flow that ends ends exactly."""
@@ -38,10 +39,9 @@ class CutGraph:
     def of(cls, edges: NDArray[np.int64], n: int) -> CutGraph:
         """The graph of n nodes and these (e, 2) edges."""
         tails, heads = np.concatenate([edges, edges[:, ::-1]]).T
-        order = np.argsort(tails, kind="stable")
+        starts, order = grouped(tails, n)
         place = np.empty(len(order), dtype=np.int64)
         place[order] = np.arange(len(order))
-        starts = np.concatenate([[0], np.cumsum(np.bincount(tails, minlength=n))])
         return cls(starts, np.ascontiguousarray(heads[order]), place[(order + len(edges)) % len(order)], order)
 
     def cut(

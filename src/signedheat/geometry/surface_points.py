@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import SourceError
 from .intrinsic_mesh import IntrinsicMesh
+from .lists import grouped, members_of
 
 VERTEX, EDGE, FACE = 0, 1, 2
 
@@ -156,8 +157,21 @@ def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: 
     rows, face = moved[on_edge], other[on_edge]
     side = (triangles.edges.face_edges[face] == elements[on_edge, None]).argmax(axis=1)
     head = np.where(triangles.edges.forward[face, side], along[on_edge], 1 - along[on_edge])
-    weights[rows, side] = 1 - head
-    weights[rows, (side + 1) % 3] = head
+    weights[rows] = barycentric_on_sides(side, head)
+    return weights
+
+
+def barycentric_on_sides(sides: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) barycentric coordinates of points at a share of the way along sides of faces.
+
+    Examples
+    --------
+    >>> barycentric_on_sides(np.array([1, 2]), np.array([0.25, 1.0])).tolist()
+    [[0.0, 0.75, 0.25], [1.0, 0.0, 0.0]]
+    """
+    weights, row = np.zeros((len(sides), 3)), np.arange(len(sides))
+    weights[row, sides] = 1 - shares
+    weights[row, (sides + 1) % 3] = shares
     return weights
 
 
@@ -186,15 +200,11 @@ def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[ND
         members = np.flatnonzero(located.kinds == kind)
         if not len(members):
             continue
-        members = members[np.argsort(located.elements[members], kind="stable")]
-        number = np.bincount(located.elements[members], minlength=count)
-        begin = np.cumsum(number) - number
-        face, corner = np.nonzero((number > 0)[table])
-        element = table[face, corner]
-        repeats = number[element]
-        offset = np.arange(repeats.sum()) - np.repeat(np.cumsum(repeats) - repeats, repeats)
-        which.append(members[np.repeat(begin[element], repeats) + offset])
-        faces.append(np.repeat(face, repeats))
+        starts, at = grouped(located.elements[members], count)
+        face, corner = np.nonzero((np.diff(starts) > 0)[table])
+        row, point = members_of(starts, at, table[face, corner])
+        which.append(members[point])
+        faces.append(face[row])
     return np.concatenate(which), np.concatenate(faces)
 
 

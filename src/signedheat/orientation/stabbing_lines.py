@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..frozen import read_only
+from ..geometry.lists import grouped
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +121,7 @@ def aimed_lines(
         at = (points - center) @ frame.T
         cells = np.clip(((at[:, :2] / size + 0.5) * n_cells).astype(np.int64), 0, n_cells - 1)
         cell = cells[:, 1] * n_cells + cells[:, 0]
-        starts = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=n_cells**2))])
-        order = np.argsort(cell, kind="stable")
+        starts, order = grouped(cell, n_cells**2)
         found.append(
             _aim(vertices, triangles, frame, center, at, order, starts, n_cells / size, n_cells, k * len(points))
         )

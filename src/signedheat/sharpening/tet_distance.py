@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.any_angle import FacePlanes, any_angle_distance
 from ..geometry.geodesics.heap_kernels import Queue
+from ..geometry.lists import grouped
 from ..geometry.nearest import nearest_on_triangles
 from ..geometry.point_triangle import triangle_rows
 from ..geometry.tet_clipping import barycentric
@@ -97,5 +98,5 @@ def distance_around(
 
 def by_element(ids: NDArray[np.int64], n: int, width: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Inverse index: where the rows that contain each of n ids begin, and these rows, `width` ids to a row."""
-    starts = np.concatenate([[0], np.cumsum(np.bincount(ids.ravel(), minlength=n))])
-    return starts, np.argsort(ids.ravel(), kind="stable") // width
+    starts, places = grouped(ids.ravel(), n)
+    return starts, places // width

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ...compiled import compiled
 from ...memory import refuse_beyond_memory
 from ..intrinsic_mesh import IntrinsicMesh
+from ..lists import grouped
 from .heap_kernels import Queue, push
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun, put
 
@@ -31,10 +32,8 @@ class Faces(NamedTuple):
     @classmethod
     def of(cls, triangles: IntrinsicMesh) -> Faces:
         """The arrays of an intrinsic mesh."""
-        table = triangles.edges
-        at_edge, at_vertex = table.face_edges.ravel(), triangles.corner_vertices.ravel()
-        edge_counts = np.bincount(at_edge, minlength=triangles.n_edges)
-        vertex_counts = np.bincount(at_vertex, minlength=triangles.n_vertices)
+        table, (first_halfedge, halfedges) = triangles.edges, triangles.halfedges_of_edges
+        first_corner, corners = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
         return cls(
             triangles.corner_vertices,
             triangles.corner_positions,
@@ -42,10 +41,10 @@ class Faces(NamedTuple):
             table.forward,
             table.vertices,
             triangles.lengths_of_edges,
-            np.argsort(at_edge, kind="stable"),
-            np.concatenate([[0], np.cumsum(edge_counts)]),
-            np.argsort(at_vertex, kind="stable"),
-            np.concatenate([[0], np.cumsum(vertex_counts)]),
+            halfedges,
+            first_halfedge,
+            corners,
+            first_corner,
         )
 
 

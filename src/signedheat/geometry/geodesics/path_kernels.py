@@ -18,22 +18,6 @@ whose lengths differ by 1e-16, the same one is always found. Any number from 1e-
 
 
 @compiled
-def group(members: NDArray[np.int64], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Inverse index of `members` (values 0 … n−1): where the entries of each value begin, and the positions."""
-    begin = np.zeros(n + 1, np.int64)
-    for m in members:
-        begin[m + 1] += 1
-    for k in range(n):
-        begin[k + 1] += begin[k]
-    cursor = begin[:-1].copy()
-    positions = np.empty(len(members), np.int64)
-    for position, m in enumerate(members):
-        positions[cursor[m]] = position
-        cursor[m] += 1
-    return begin, positions
-
-
-@compiled
 def middle(corners, h):
     """Midpoint of a halfedge, in the layout of its face."""
     return 0.5 * (corners[h // 3, h % 3] + corners[h // 3, (h % 3 + 1) % 3])
@@ -316,14 +300,16 @@ def locate_end(corners, entered, placed, over, ends, end_points):
 
 
 @compiled
-def shortest_lines(corners, edge_of, forward, queue, starts, start_points, start_at, ends, end_points, end_at):
+def shortest_lines(
+    corners, edge_of, forward, begin, around, queue, starts, start_points, start_at, ends, end_points, end_at
+):
     """Shortest paths for many pairs of points: halfedges crossed, fractions along them, their number for each pair.
 
     The faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` has its position in
-    the layout of each; likewise for ends; `queue` is an empty one of edges. The number is −1 where there is no path.
+    the layout of each; likewise for ends; `begin` and `around` are the halfedges of each edge, `queue` is an empty one
+    of edges. The number is −1 where there is no path.
     """
     n_edges = len(queue.places)
-    begin, around = group(edge_of, n_edges)
     cost = np.full(n_edges, np.inf)
     leave, enter = np.empty(n_edges, np.int64), np.empty(n_edges, np.int64)
     counts = np.empty(len(start_at) - 1, np.int64)

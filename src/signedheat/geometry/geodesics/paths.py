@@ -12,6 +12,7 @@ from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import (
     LocatedPoints,
     barycentric_in,
+    barycentric_on_sides,
     concatenated,
     incident_faces,
     locate_points,
@@ -99,14 +100,10 @@ def geodesic_paths(
     starts, ends = faces_at(triangles, start), faces_at(triangles, end)
     edges = triangles.edges
     sides, fractions, counts = shortest_lines(
-        triangles.corner_positions, edges.face_edges.ravel(), edges.forward.ravel(), Queue.empty(triangles.n_edges),
-        *starts, *ends,
+        triangles.corner_positions, edges.face_edges.ravel(), edges.forward.ravel(), *triangles.halfedges_of_edges,
+        Queue.empty(triangles.n_edges), *starts, *ends,
     )  # fmt: skip
-    weights = np.zeros((len(sides), 3))
-    row = np.arange(len(sides))
-    weights[row, sides % 3] = 1 - fractions
-    weights[row, (sides % 3 + 1) % 3] = fractions
-    located = locate_points(triangles, sides // 3, weights, name)
+    located = locate_points(triangles, sides // 3, barycentric_on_sides(sides % 3, fractions), name)
     blocked = np.flatnonzero(counts < 0)
     if not len(blocked):
         return located, counts

@@ -16,7 +16,17 @@ from numpy.typing import NDArray
 
 from ..curve_segments import CurveSegments
 from ..intrinsic_mesh import IntrinsicMesh
-from ..surface_points import EDGE, FACE, VERTEX, LocatedPoints, barycentric_in, concatenated, unique_points
+from ..lists import members_of
+from ..surface_points import (
+    EDGE,
+    FACE,
+    VERTEX,
+    LocatedPoints,
+    barycentric_in,
+    barycentric_on_sides,
+    concatenated,
+    unique_points,
+)
 
 Mask = NDArray[np.bool_]
 Ids = NDArray[np.int64]
@@ -234,9 +244,7 @@ def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask
     along = tail / (tail - head)
     at_face, at_side = faces[first // 2], sides.ravel()[first]
     share = np.where(triangles.edges.forward[at_face, at_side], along, 1 - along)
-    weights = np.zeros((len(used), 3))
-    weights[np.arange(len(used)), at_side] = 1 - share
-    weights[np.arange(len(used)), (at_side + 1) % 3] = share
+    weights = barycentric_on_sides(at_side, share)
     ends = ends.reshape(-1, 2)
     flat = on_sides(triangles, np.repeat(faces, 2), sides.ravel(), along[ends].reshape(-1, 1))
     keep = np.flatnonzero(np.abs(np.diff(flat.reshape(-1, 2), axis=1)[:, 0]) > 0)
@@ -253,12 +261,7 @@ def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask
 
 def halfedges_of(triangles: IntrinsicMesh, edges: Ids) -> tuple[Ids, Ids]:
     """All halfedges ``3 face + side`` of each of some edges, as pairs: index into `edges`, and halfedge."""
-    flat = triangles.edges.face_edges.ravel()
-    order = np.argsort(flat, kind="stable")
-    begin = np.searchsorted(flat[order], edges)
-    count = np.searchsorted(flat[order], edges, side="right") - begin
-    which = np.repeat(np.arange(len(edges)), count)
-    return which, order[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
+    return members_of(*triangles.halfedges_of_edges, edges)
 
 
 def on_sides(triangles: IntrinsicMesh, faces: Ids, sides: Ids, along: NDArray[np.float64]) -> Points:

@@ -15,7 +15,16 @@ from ..constrained_triangulation import arrange, paths_along, triangulate
 from ..curve_segments import CurveSegments
 from ..edges import EdgeTable
 from ..intrinsic_mesh import IntrinsicMesh
-from ..surface_points import EDGE, FACE, VERTEX, LocatedPoints, concatenated, points_at_vertices, unique_points
+from ..surface_points import (
+    EDGE,
+    FACE,
+    VERTEX,
+    LocatedPoints,
+    barycentric_on_sides,
+    concatenated,
+    points_at_vertices,
+    unique_points,
+)
 from .delaunay import flip_all, glue, lay_out
 
 
@@ -309,7 +318,7 @@ class FaceCutter:
         on_edge = edges >= 0
         edges[on_edge] = new_edge[edges[on_edge]]
         faces[~on_edge] = new_face[faces[~on_edge]]
-        faces[on_edge] = first_halfedges(finer)[edges[on_edge]] // 3
+        faces[on_edge] = finer.first_halfedges[edges[on_edge]] // 3
         vectors = np.array([p.vector for p in self.pieces], dtype=np.complex128)
         owners = np.array([p.owner for p in self.pieces], dtype=np.int64)
         return finer, MergedSources(nodes, ends, faces, edges, vectors, owners, merged.samples), is_new
@@ -336,11 +345,6 @@ class NewSegment(NamedTuple):
     owner: int
 
 
-def first_halfedges(triangles: IntrinsicMesh) -> NDArray[np.int64]:
-    """(e,) the first halfedge ``3 face + k`` of each edge."""
-    return np.unique(triangles.edges.face_edges, return_index=True)[1]
-
-
 def points_on_elements(
     triangles: IntrinsicMesh,
     kinds: NDArray[np.int64],
@@ -353,10 +357,8 @@ def points_on_elements(
     at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
     vertices = points_at_vertices(triangles, elements[at_vertex])
     faces[at_vertex], weights[at_vertex] = vertices.faces, vertices.barycentric
-    side = first_halfedges(triangles)[elements[on_edge]]
-    faces[on_edge], weights[on_edge] = side // 3, 0.0
-    weights[on_edge, side % 3] = 1 - along[on_edge]
-    weights[on_edge, (side % 3 + 1) % 3] = along[on_edge]
+    side = triangles.first_halfedges[elements[on_edge]]
+    faces[on_edge], weights[on_edge] = side // 3, barycentric_on_sides(side % 3, along[on_edge])
     return LocatedPoints(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
 
 
@@ -379,7 +381,7 @@ def flip_new_faces(
     gluing = flip_all(glue(triangles, fixed))
     better = lay_out(gluing)
 
-    side = first_halfedges(better)
+    side = better.first_halfedges
     ahead, same = gluing.forward[side], gluing.front[side]  # the frame of an edge, in what is its first face by now
     carrier = merged.edges[on_edge]
     vectors, faces = merged.vectors.copy(), merged.faces.copy()

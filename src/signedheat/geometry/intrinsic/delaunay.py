@@ -48,9 +48,8 @@ def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None)
     """Start an intrinsic triangulation, with an empty history."""
     edges = triangles.edges
     edge, n_edges = edges.face_edges.ravel(), triangles.n_edges
-    order = np.argsort(edge, kind="stable")
-    first = np.searchsorted(edge[order], np.arange(n_edges))
-    last = np.searchsorted(edge[order], np.arange(n_edges), side="right") - 1
+    starts, order = triangles.halfedges_of_edges
+    first, last = starts[:-1], starts[1:] - 1
     sibling = np.empty_like(edge)
     sibling[order] = np.roll(order, -1)
     used = first <= last

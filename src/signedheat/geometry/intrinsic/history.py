@@ -114,7 +114,7 @@ def copied(
 
 def edge_middles(triangles: IntrinsicMesh) -> tuple[NDArray, NDArray, NDArray]:
     """Faces and barycentric coordinates of the edges' middle points, and (e, 1, 3) vectors from tail to head."""
-    side = np.unique(triangles.edges.face_edges, return_index=True)[1]
+    side = triangles.first_halfedges
     faces, k, rows = side // 3, side % 3, np.arange(len(side))
     middle, along = np.zeros((len(side), 3)), np.zeros((len(side), 1, 3))
     middle[rows, k] = middle[rows, (k + 1) % 3] = 0.5

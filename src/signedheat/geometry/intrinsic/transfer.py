@@ -12,6 +12,7 @@ from ...errors import SourceError
 from ...frozen import Frozen
 from ..curve_segments import CurveSegments
 from ..intrinsic_mesh import FLATTEST, IntrinsicMesh
+from ..lists import grouped, members_of
 from ..surface_points import (
     SNAP,
     LocatedPoints,
@@ -72,14 +73,10 @@ class ConformingRefinement(Frozen):
         self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Points, and vectors (p, k, 3) at them, of the faces before the cuts, in the faces after."""
-        order = np.argsort(self.parents, kind="stable")
-        begin = np.searchsorted(self.parents[order], faces)
-        count = np.searchsorted(self.parents[order], faces, side="right") - begin
-        which = np.repeat(np.arange(len(faces)), count)
-        child = order[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
+        which, child = members_of(*grouped(self.parents, int(self.parents.max()) + 1), faces)
         to_child = np.linalg.inv(self.corners[child])
         weights = np.einsum("pk,pkl->pl", barycentric[which], to_child)
-        best = np.lexsort([-weights.min(axis=1), which])[np.cumsum(count) - count]
+        best = np.lexsort([-weights.min(axis=1), which])[np.searchsorted(which, np.arange(len(faces)))]
         return child[best], weights[best], np.einsum("pvk,pkl->pvl", vectors, to_child[best])
 
     def pull_back(
