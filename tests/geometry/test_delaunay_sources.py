@@ -10,9 +10,8 @@ import pytest
 import signedheat as sh
 from signedheat.discretization import discretize
 from signedheat.geometry.geodesics import exact
-from signedheat.geometry.geodesics.delaunay_sources import in_delaunay_triangles, share_to_flip
-from signedheat.geometry.geodesics.sources import PlacedSegments, zero_line
-from signedheat.geometry.geodesics.through_vertices import as_curve
+from signedheat.geometry.geodesics.exact import in_delaunay_triangles, share_to_flip
+from signedheat.geometry.geodesics.sources import PlacedSegments, as_curve, zero_line
 from signedheat.samples import sphere, torus
 
 

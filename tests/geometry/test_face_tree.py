@@ -5,7 +5,7 @@ import signedheat as sh
 from shapes.grid_cases import sphere, torus
 from signedheat.geometry.face_features import FaceFeatures
 from signedheat.geometry.face_tree import FaceTree
-from signedheat.geometry.point_triangle import foot_on_triangle
+from signedheat.geometry.nearest import foot_on_triangle
 
 
 def soup(n, seed=0):

@@ -8,9 +8,8 @@ import pytest
 from signedheat import samples
 from signedheat.geometry.box_tree import BoxTree
 from signedheat.geometry.face_features import FaceFeatures
-from signedheat.geometry.nearest import nearest_on_triangles
-from signedheat.geometry.nearest_faces import search_from
-from signedheat.geometry.point_triangle import foot_on_triangle, triangle_rows
+from signedheat.geometry.face_tree import search_from
+from signedheat.geometry.nearest import foot_on_triangle, nearest_on_triangles, triangle_rows
 
 UNIT = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
 

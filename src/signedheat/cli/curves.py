@@ -16,7 +16,7 @@ from ..errors import SourceError
 from ..fields.vertex_field import VertexField
 from ..io import read, read_curves
 from ..io.globe import read_globe_curves
-from ..lowering.surface.memory import refuse_too_many
+from ..lowering.surface.discretization import refuse_too_many
 from ..solver import SignedHeatSolver
 from .computing import constraint_of, prefix_errors
 from .progress import ProgressBar

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..geometry.components import members_of
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.geodesics.sources import PlacedSegments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.lists import members_of
 from ..geometry.minimum_cut import CutGraph
 from ..linear import factorize
 from ..lowering.surface.discretization import SurfaceDiscretization

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, UnsupportedTypeError
-from ..geometry.lists import members_of
+from ..geometry.components import members_of
 from ..packages import lazy_module
 from .digital_surface import DigitalSurface
 from .exchange import shape_from, shape_to

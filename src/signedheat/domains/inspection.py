@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.components import connected_components
-from ..geometry.halfedges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
+from ..geometry.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
 from ..geometry.triangle_kernels import areas_of_polygons
 from ..geometry.welding import coincident_faces, same_positions
 from ..operators.tetrahedral import FLAT

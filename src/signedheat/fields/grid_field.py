@@ -22,9 +22,8 @@ from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeEr
 from ..frozen import Frozen
 from ..geometry.edge_flips import flipped_along_creases
 from ..geometry.marching import closed_surface, level_lines
-from ..operators.grid.block_contours import Refine, block_contour
+from ..operators.grid.block_contours import Refine, block_contour, contour_parts
 from ..operators.grid.blocks import SIDE, Blocks
-from ..operators.grid.streamed_contours import contour_parts
 from ..parallel import in_chunks
 from .booleans import Combinable, Rule
 from .files import save_field, save_parts

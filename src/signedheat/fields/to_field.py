@@ -14,8 +14,7 @@ from ..domains.point_cloud import PointCloud
 from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..geometry.neighbor_paths import spread
 from ..lowering.grid.discretization import GridDiscretization
-from ..lowering.grid.masked import MaskedGridDiscretization
-from ..lowering.grid.masked_source import MaskedSource
+from ..lowering.grid.masked import MaskedGridDiscretization, MaskedSource
 from ..lowering.grid.source import GridSource
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..lowering.surface.small_loops import small_loops

@@ -1,4 +1,4 @@
-"""Edges of a set of triangles."""
+"""Edges of triangles and polygons: which halfedges run along each, and how the faces they belong to hang together."""
 
 from __future__ import annotations
 
@@ -9,8 +9,205 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import compiled
 from ..frozen import Frozen, read_only
 from .triangle_kernels import find_edges
+
+
+@dataclass(frozen=True, eq=False)
+class HalfedgePairs:
+    """Edges of polygons, and the halfedges that run along them; halfedge c begins at the face's corner c.
+
+    Attributes
+    ----------
+    edges : (h,) int
+        Edge of each halfedge; −1 where it joins a vertex to itself or its face is left out.
+    counts : (e,) int
+        Halfedges of each edge.
+    first, second : (e,) int
+        Least halfedge of each edge and the next; −1 where there is none.
+    """
+
+    edges: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class FaceOrientation:
+    """Parts of faces that hang together across edges of two faces, and how the faces of each agree.
+
+    Attributes
+    ----------
+    parts : (n_faces,) int
+        Part of each face; parts are numbered by first appearance.
+    turned : (n_faces,) bool
+        Which faces must turn; of parts that cannot be oriented, none.
+    orientable, closed : (n_parts,) bool
+        Whether all neighbours of the part can agree; whether each of its edges has two faces.
+    disagreeing : int
+        Edges whose two faces run along them the same way.
+    """
+
+    parts: NDArray[np.int64]
+    turned: NDArray[np.bool_]
+    orientable: NDArray[np.bool_]
+    closed: NDArray[np.bool_]
+    disagreeing: int
+
+
+def following_corners(offsets: NDArray[np.int64]) -> NDArray[np.int32]:
+    """(c,) place of the corner that follows each around its face."""
+    following = np.arange(1, offsets[-1] + 1, dtype=np.int32)
+    following[offsets[1:] - 1] = offsets[:-1]
+    return following
+
+
+def pair_halfedges(
+    tails: NDArray[np.int64], heads: NDArray[np.int64], n_vertices: int, used: NDArray[np.bool_] | None = None
+) -> HalfedgePairs:
+    """Find the edges of polygons and the first two halfedges of each. Takes O(n) time, hubs included.
+
+    Parameters
+    ----------
+    tails, heads : (h,) int
+        Vertices at the ends of each halfedge.
+    n_vertices : int
+        One more than the largest vertex id.
+    used : (h,) bool, optional
+        Which halfedges count; all by default.
+
+    Examples
+    --------
+    >>> pairs = pair_halfedges(np.array([0, 1, 2, 2, 1, 3]), np.array([1, 2, 0, 1, 3, 2]), 4)
+    >>> pairs.edges.tolist(), pairs.second.tolist()
+    ([0, 1, 2, 1, 3, 4], [-1, 3, -1, -1, -1])
+    """
+    chosen = tails != heads if used is None else used & (tails != heads)
+    edges, _, *table = find_edges(read_only(tails), read_only(heads), chosen, n_vertices)
+    return HalfedgePairs(edges, *table)
+
+
+def orient_faces(
+    pairs: HalfedgePairs,
+    tails: NDArray[np.int64],
+    owners: NDArray[np.integer],
+    weights: NDArray[np.float64],
+) -> FaceOrientation:
+    """Make faces agree with their neighbours across edges of two faces, in each part with the majority by area.
+
+    Parameters
+    ----------
+    pairs : HalfedgePairs
+        Which halfedges meet.
+    tails, owners : (h,) int
+        Vertex at which each halfedge begins, and its face.
+    weights : (n_faces,) float
+        How much each face is to stay as it is: its area; negative where it is rather to turn.
+
+    Examples
+    --------
+    >>> tails, heads, owners = np.array([0, 1, 2, 2, 3, 1]), np.array([1, 2, 0, 3, 1, 2]), np.array([0, 0, 0, 1, 1, 1])
+    >>> found = orient_faces(pair_halfedges(tails, heads, 4), tails, owners, np.array([1.0, 2.0]))
+    >>> found.turned, found.orientable, found.disagreeing
+    (array([ True, False]), array([ True]), 1)
+    """
+    return FaceOrientation(
+        *_orient(pairs.edges, pairs.counts, pairs.first, pairs.second, read_only(tails), owners, weights)
+    )
+
+
+def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDArray[np.integer]) -> bool:
+    """Whether any two faces may be on the same corners: they would share an edge, and a corner next to it.
+
+    Parameters
+    ----------
+    pairs : HalfedgePairs
+        Which halfedges meet.
+    tails, following : (h,) int
+        Vertex at which each halfedge begins, and the halfedge that follows it around the face.
+
+    Examples
+    --------
+    >>> tails, heads = np.array([0, 1, 2, 2, 1, 3]), np.array([1, 2, 0, 1, 3, 2])
+    >>> may_coincide(pair_halfedges(tails, heads, 4), tails, np.array([1, 2, 0, 4, 5, 3]))
+    False
+    """
+    two = pairs.counts == 2
+    one, other = pairs.first[two], pairs.second[two]
+    preceding = np.empty_like(following)
+    preceding[following] = np.arange(len(following), dtype=following.dtype)
+    beyond = tails[following[following[one]]]
+    alike = tails[one] == tails[other]  # else the corner beyond the edge is the one before it
+    there = tails[np.where(alike, following[following[other]], preceding[other])]
+    return bool((pairs.counts > 2).any() or (beyond == there).any())
+
+
+@compiled
+def _root(parents: NDArray[np.int64], ways: NDArray[np.bool_], face: int) -> tuple[int, bool]:
+    """Root of a face's tree, and whether the face is turned against it; paths are halved on the way."""
+    way = False
+    while parents[face] != face:
+        above = parents[face]
+        ways[face] = ways[face] != ways[above]
+        parents[face] = parents[above]
+        way = way != ways[face]
+        face = parents[face]
+    return face, way
+
+
+@compiled
+def _orient(
+    edges: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    first: NDArray[np.int64],
+    second: NDArray[np.int64],
+    tails: NDArray[np.int64],
+    owners: NDArray[np.int32],
+    weights: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], int]:
+    n_faces, disagreeing = len(weights), 0
+    parents = np.arange(n_faces)
+    ways = np.zeros(n_faces, dtype=np.bool_)  # whether a face is turned against its parent; never at roots
+    bad = np.zeros(n_faces, dtype=np.bool_)
+    for edge in range(len(counts)):
+        if counts[edge] != 2:
+            continue
+        h, k = first[edge], second[edge]
+        turned = tails[h] == tails[k]
+        disagreeing += turned
+        a, way_a = _root(parents, ways, owners[h])
+        b, way_b = _root(parents, ways, owners[k])
+        turned = turned != (way_a != way_b)
+        if a == b:
+            bad[a] = bad[a] or turned
+        else:
+            low, high = min(a, b), max(a, b)
+            parents[high], ways[high] = low, turned
+            bad[low] = bad[low] or bad[high]
+    parts, turned_faces = np.empty(n_faces, dtype=np.int64), np.empty(n_faces, dtype=np.bool_)
+    against, total, orientable = np.zeros(n_faces), np.zeros(n_faces), np.empty(n_faces, dtype=np.bool_)
+    n_parts = 0
+    for face in range(n_faces):  # roots are the least of their part, and come first
+        root, turned_faces[face] = _root(parents, ways, face)
+        if root == face:
+            parts[face] = n_parts
+            orientable[n_parts] = not bad[face]
+            n_parts += 1
+        part = parts[root]
+        parts[face] = part
+        total[part] += weights[face]
+        if turned_faces[face]:
+            against[part] += weights[face]
+    for face in range(n_faces):
+        part = parts[face]
+        turned_faces[face] = orientable[part] and turned_faces[face] != (2.0 * against[part] > total[part])
+    closed = np.ones(n_parts, dtype=np.bool_)
+    for h in range(len(edges)):
+        if edges[h] >= 0 and counts[edges[h]] != 2:
+            closed[parts[owners[h]]] = False
+    return parts, turned_faces, orientable[:n_parts].copy(), closed, disagreeing
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import morton_codes
+from .components import grouped
 from .edges import EdgeTable, edge_table
-from .lists import grouped
-from .point_triangle import triangle_rows
+from .nearest import triangle_rows
 from .welding import same_positions
 
 Links: TypeAlias = tuple[

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .components import connected_components
+from .components import connected_components, grouped, members_of
 from .edges import edge_table
-from .lists import grouped, members_of
 
 MOST_SIDES = 12
 

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frozen import Frozen
-from .components import element_components
+from .components import element_components, grouped
 from .edges import EdgeTable, edge_table
-from .lists import grouped
 from .triangle_kernels import gather
 
 Index = NDArray[np.int64] | slice

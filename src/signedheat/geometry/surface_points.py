@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SourceError
+from .components import grouped, members_of
 from .intrinsic_mesh import IntrinsicMesh
-from .lists import grouped, members_of
 
 VERTEX, EDGE, FACE = 0, 1, 2
 

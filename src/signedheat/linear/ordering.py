@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .dissection_kernels import dissect
+from ..compiled import compiled
 from .matrices import whole
 
 _LEAF = 3  # regions of so many unknowns are not dissected further
@@ -29,3 +29,123 @@ def elimination_order(upper: Any) -> NDArray[np.int64]:
     """
     graph = whole(upper)
     return dissect(graph.indptr, graph.indices, _LEAF)
+
+
+@compiled
+def dissect(starts, neighbors, leaf):
+    """Elimination order: both sides of a small separator, each ordered in the same way, then the separator.
+
+    A separator is the smallest level near the middle of a breadth-first search from the end of a long path, without the
+    unknowns that have no neighbour in the level after it (George 1973). `order` is partitioned in place; a region is a
+    range of it.
+    """
+    n = len(starts) - 1
+    order = np.arange(n)
+    region = np.zeros(n, dtype=np.int64)  # the unfinished region that each unknown lies in
+    level = np.empty(n, dtype=np.int64)
+    queue = np.empty(n, dtype=np.int64)
+    stack = [(0, n)]
+    regions = 1
+    while len(stack) > 0:
+        begin, end = stack.pop()
+        if end - begin <= leaf:
+            continue
+        here = region[order[begin]]
+        seed = order[begin]
+        depth, reached = -1, 0
+        while True:
+            for p in range(begin, end):
+                level[order[p]] = -1
+            reached = _levels(starts, neighbors, region, here, seed, level, queue, 0)
+            last = level[queue[reached - 1]]
+            if last <= depth or reached < end - begin:
+                break
+            depth, seed = last, queue[reached - 1]
+        if reached < end - begin:  # several connected components
+            first = 0
+            for p in range(begin, end + 1):
+                if first < reached:  # a component is complete
+                    for q in range(first, reached):
+                        region[queue[q]] = regions
+                    regions += 1
+                    stack.append((begin + first, begin + reached))
+                    first = reached
+                if p < end and level[order[p]] < 0:
+                    reached = _levels(starts, neighbors, region, here, order[p], level, queue, first)
+            for p in range(begin, end):
+                order[p] = queue[p - begin]
+            continue
+        last = level[queue[reached - 1]]
+        if last < 2:
+            continue
+        cut = _thinnest(level, queue, reached, last)
+        for p in range(reached):
+            i = queue[p]
+            if level[i] == cut:
+                touches = False
+                for q in range(starts[i], starts[i + 1]):
+                    j = neighbors[q]
+                    if region[j] == here and level[j] == cut + 1:
+                        touches = True
+                        break
+                if not touches:
+                    level[i] = cut - 1
+        low, high = begin, end  # levels below the separator to the front, the separator to the back, the rest between
+        for p in range(reached):
+            if level[queue[p]] < cut:
+                order[low] = queue[p]
+                low += 1
+        middle = low
+        for p in range(reached):
+            if level[queue[p]] > cut:
+                order[middle] = queue[p]
+                middle += 1
+        for p in range(reached):
+            if level[queue[p]] == cut:
+                high -= 1
+                order[high] = queue[p]
+        for p in range(begin, low):
+            region[order[p]] = regions
+        for p in range(low, middle):
+            region[order[p]] = regions + 1
+        for p in range(middle, end):
+            region[order[p]] = -1
+        regions += 2
+        stack.append((begin, low))
+        stack.append((low, middle))
+    return order
+
+
+@compiled
+def _levels(starts, neighbors, region, here, seed, level, queue, begin):
+    """Breadth-first search within a region, into the queue from `begin` on; returns the end of the queue."""
+    level[seed] = 0
+    queue[begin] = seed
+    head, tail = begin, begin + 1
+    while head < tail:
+        i = queue[head]
+        head += 1
+        for q in range(starts[i], starts[i + 1]):
+            j = neighbors[q]
+            if region[j] == here and level[j] < 0:
+                level[j] = level[i] + 1
+                queue[tail] = j
+                tail += 1
+    return tail
+
+
+@compiled
+def _thinnest(level, queue, reached, last):
+    """The smallest level that leaves at least 40 % of the unknowns on either side, or the median level."""
+    best, size, median = -1, reached, level[queue[reached // 2]]
+    p = 0
+    while p < reached:
+        current, first = level[queue[p]], p
+        while p < reached and level[queue[p]] == current:
+            p += 1
+        balanced = first >= 0.4 * reached and reached - p >= 0.4 * reached
+        if balanced and 0 < current < last and p - first < size:
+            best, size = current, p - first
+    if best < 0:
+        best = min(max(median, 1), last - 1)
+    return best

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from .assembly import assemble
+from .cotan import assemble
 
 
 def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matrix:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..frozen import read_only
-from ..geometry.lists import grouped
+from ..geometry.components import grouped
 
 
 @dataclass(frozen=True, eq=False)

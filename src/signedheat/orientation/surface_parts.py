@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.halfedges import (
+from ..geometry.edges import (
     FaceOrientation,
     HalfedgePairs,
     following_corners,

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry.box_tree import BoxTree
+from ..geometry.components import grouped
 from ..geometry.geodesics.any_angle import FacePlanes, any_angle_distance
 from ..geometry.geodesics.heap_kernels import Queue
-from ..geometry.lists import grouped
-from ..geometry.nearest import nearest_on_triangles
-from ..geometry.point_triangle import triangle_rows
+from ..geometry.nearest import nearest_on_triangles, triangle_rows
 from ..geometry.tet_clipping import barycentric
 from ..geometry.visibility import tet_neighbors
 from ..lowering.tets.discretization import TetDiscretization

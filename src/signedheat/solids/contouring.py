@@ -16,8 +16,7 @@ from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import OutsideError
 from ..fields.levels import on_level
-from ..geometry.dual_cells import DualCells, cells_around, dual_cells, open_cells
-from ..geometry.dual_polygons import dual_triangles
+from ..geometry.dual_cells import DualCells, cells_around, dual_cells, dual_triangles, open_cells
 from ..geometry.edge_flips import flipped_along_creases
 from ..geometry.marching import CLEARANCE
 from ..geometry.self_intersections import self_intersections

@@ -17,7 +17,7 @@ from ..compiled import compiled
 from ..domains.grid import Grid
 from ..geometry.box_tree import LEAF, morton_codes
 from ..geometry.face_tree import FaceTree
-from ..geometry.point_triangle import foot_on_triangle
+from ..geometry.nearest import foot_on_triangle
 from ..operators.grid.blocks import SIDE
 from .winding import Windings
 

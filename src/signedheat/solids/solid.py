@@ -20,8 +20,7 @@ from ..fields.known_solid import Closest
 from ..frozen import Frozen
 from ..geometry.box_tree import order_in_space
 from ..geometry.face_features import FaceFeatures
-from ..geometry.face_tree import FaceTree
-from ..geometry.nearest_faces import NearestFaces
+from ..geometry.face_tree import FaceTree, NearestFaces
 from ..parallel import in_chunks
 from ..progress import Progress
 from ..reprs import ShortRepr

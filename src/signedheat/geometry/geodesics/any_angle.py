@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ..point_triangle import foot_on_triangle
+from ..nearest import foot_on_triangle
 from .heap_kernels import pop, push
 
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 from ...memory import refuse_beyond_memory
+from ..components import grouped
 from ..intrinsic_mesh import IntrinsicMesh
-from ..lists import grouped
 from .heap_kernels import Queue, push
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun, put
 

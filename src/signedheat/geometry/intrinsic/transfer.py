@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ...errors import SourceError
 from ...frozen import Frozen
+from ..components import grouped, members_of
 from ..curve_segments import CurveSegments
 from ..intrinsic_mesh import FLATTEST, IntrinsicMesh
-from ..lists import grouped, members_of
 from ..surface_points import (
     SNAP,
     LocatedPoints,

@@ -10,8 +10,7 @@ from ...errors import GeometryError
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from ...geometry.surfels import count_surfels, separated_edges
-from .discretization import SurfaceDiscretization
-from .memory import refuse_too_many
+from .discretization import SurfaceDiscretization, refuse_too_many
 
 BYTES_PER_VOXEL = 20
 """Blurred copies of the volume, from which normals are estimated."""

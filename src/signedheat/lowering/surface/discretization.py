@@ -14,18 +14,20 @@ from scipy import sparse
 
 from ...cache import LastUsed, fingerprint
 from ...diagnostics import EdgesLengthened, LargeAngles, Note, VerticesAdded
-from ...discretization import discretize
+from ...discretization import Levels, SourceTerm, discretize
 from ...domains.intrinsic_triangulation import IntrinsicTriangulation
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
+from ...errors import ConstraintError
 from ...geometry.curve_segments import CurveSegments
 from ...geometry.intrinsic.conforming_refinement import refine_to_conform
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import laid_out
-from ...linear import Factor, elimination_order, factorize
+from ...linear import Factor, chosen_backend, elimination_order, factorize
+from ...memory import refuse_beyond_memory
 from ...operators.cotan import cotan_matrix, divergence
-from .integration import STRENGTH, SurfaceIntegration
-from .memory import refuse_too_many
+from ..direct_integration import DirectIntegration
+from ..spring_integration import SpringIntegration
 from .nonmanifold_frames import nonmanifold_frames
 from .source import surface_source
 from .vector_heat import TIMES, VectorHeat
@@ -196,3 +198,89 @@ def large_angles(triangles: IntrinsicMesh) -> float:
     """Fraction of angles above 120°, or 0 if below 1 %. Many of them make directions far from the source inaccurate."""
     share = float((triangles.corner_cotangents < -(3**-0.5)).mean())
     return share if share >= 0.01 else 0.0
+
+
+BYTES = {"pardiso": (2050, 60), "cholmod": (1150, 150), "superlu": (0, 565)}
+"""Peak for each triangle, and what every doubling of their number adds, since the fill of factors grows; by back end.
+Measured, with factors for three diffusion times; SuperLU keeps both triangles of a matrix, and fills them more."""
+
+
+def memory_estimate(n_triangles: int) -> float:
+    """Bytes that a first distance on so many triangles takes at the most.
+
+    Examples
+    --------
+    >>> memory_estimate(640_000) > 2 * memory_estimate(320_000)
+    True
+    """
+    each, per_doubling = BYTES[chosen_backend()]
+    return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
+
+
+def refuse_too_many(triangles: int, count: int, elements: str, beside: float = 0.0) -> None:
+    """Raise `MemoryLimitError` if distance on so many triangles does not fit into memory.
+
+    Parameters
+    ----------
+    triangles : int
+        Their number.
+    count : int
+        The number of elements of the domain that they stand for: triangles, polygons, points, faces of voxels.
+    elements : str
+        What these are called.
+    beside : float
+        Bytes that are needed besides.
+    """
+    each = triangles / max(count, 1)
+    refuse_beyond_memory(
+        f"distance on {count:,} {elements}",
+        count,
+        lambda number: memory_estimate(math.ceil(each * number)) + beside * number / count,
+        lambda number: f"use at most {number:,} {elements}, coarsened or in parts",
+    )
+
+
+STRENGTH = 100.0
+"""Strength of the springs along curves that cross faces, in 1/h: measured on twenty meshes, good and bad."""
+
+SOFT = 10.0
+"""λ of `Soft` where none is given, in 1/h."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceIntegration(SpringIntegration):
+    """Step 3 on the vertices of a surface: `fit` is exact for sources at vertices only, and uses springs for others."""
+
+    @property
+    def soft_weight(self) -> float:
+        """λ of `Soft` where none is given, in 1/length."""
+        return SOFT / STRENGTH * self.strength
+
+    def anchored(self, source: SourceTerm) -> Factor:
+        """Factor of C with φ held at zero along the source, as stiffly at every sample."""
+        return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
+
+    def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
+        """Impose levels: exactly along edges, to some hundredths of h across faces (Eq. 14)."""
+        if (np.diff(source.interpolation.indptr) == 1).all():
+            return self.fit_exactly(divergence, source, levels)
+        fitted = super().fit(divergence, source, levels)
+        if levels.groups is None:
+            refuse_far_levels(source, levels.values, fitted)
+        return fitted
+
+
+def refuse_far_levels(source: SourceTerm, levels: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    """Refuse levels that contradict each other: some sample is then missed by half their difference."""
+    different = np.unique(levels)
+    if len(different) < 2:
+        return
+    rows = source.interpolation
+    gap = np.abs(levels - rows @ values)
+    worst = int(gap.argmax())
+    if gap[worst] > 0.25 * np.diff(different).min():
+        raise ConstraintError(
+            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: "
+            "sources that meet or cross need the same level",
+            element=f"vertex {rows.indices[rows.indptr[worst]]}",
+        )

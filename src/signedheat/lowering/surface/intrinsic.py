@@ -17,8 +17,7 @@ from ...geometry.intrinsic_mesh import IntrinsicMesh
 from ...geometry.mollification import mollify
 from ...progress import Progress
 from .curve_groups import CurveGroups
-from .discretization import SurfaceDiscretization
-from .memory import refuse_too_many
+from .discretization import SurfaceDiscretization, refuse_too_many
 
 SPOILED = 0.0015
 """Fraction of the area in triangles with an angle above `LARGE`, from which a mesh is refined."""

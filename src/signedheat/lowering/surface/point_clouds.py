@@ -9,8 +9,7 @@ import numpy as np
 from ...diagnostics import PointsLeftOut
 from ...discretization import discretize
 from ...domains.point_cloud import PointCloud
-from .discretization import SurfaceDiscretization
-from .memory import refuse_too_many
+from .discretization import SurfaceDiscretization, refuse_too_many
 
 NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
 """Bytes of the libraries that find neighbours, and of neighbours, beside those of triangles. Measured."""

@@ -8,8 +8,7 @@ import numpy as np
 
 from ...discretization import discretize
 from ...domains.polygon_mesh import PolygonMesh
-from .discretization import SurfaceDiscretization, lowered_mesh
-from .memory import refuse_too_many
+from .discretization import SurfaceDiscretization, lowered_mesh, refuse_too_many
 
 LIGHTER = 0.87
 """Memory of a triangle of a polygon, over that of others: few edges meet in virtual vertices. Measured on quads."""

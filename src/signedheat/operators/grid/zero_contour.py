@@ -16,7 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ...geometry.point_triangle import foot_on_triangle, triangle_rows
+from ...geometry.nearest import foot_on_triangle, triangle_rows
 from ...packages import lazy_module
 from .closest_points import circle_distance, crossed_edges, crossings_at, nearest_tiles, seed_edge_ends
 from .stencil import by_slabs
