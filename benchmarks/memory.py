@@ -22,11 +22,9 @@ from signedheat.extensions.piecewise import memory_estimate as piecewise_estimat
 from signedheat.geometry.surfels import count_surfels
 from signedheat.lowering.grid.discretization import bytes_of_area
 from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate
-from signedheat.lowering.surface.digital_surfaces import BYTES_PER_VOXEL
+from signedheat.lowering.surface.discretization import BYTES_PER_POINT, BYTES_PER_VOXEL, LIGHTER, NEIGHBORS
 from signedheat.lowering.surface.discretization import memory_estimate as surface_estimate
 from signedheat.lowering.surface.intrinsic import BYTES_REFINED
-from signedheat.lowering.surface.point_clouds import BYTES_PER_POINT, NEIGHBORS
-from signedheat.lowering.surface.polygons import LIGHTER
 from signedheat.lowering.tets.discretization import memory_estimate as tet_estimate
 from signedheat.memory import libraries
 from signedheat.operators.grid.blocks import NODES

@@ -22,11 +22,9 @@ from ..frozen import Frozen
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
-from ..geometry.intrinsic.level_lines import level_lines
 from ..geometry.intrinsic.refinement import refine_all
-from ..geometry.intrinsic.transfer import ConformingRefinement, transfer_segments
-from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.mollification import MARGIN, laid_out
+from ..geometry.intrinsic.transfer import ConformingRefinement, level_lines, transfer_segments
+from ..geometry.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
 from ..progress import Progress, Stopwatch
 from .curves import Curve, CurveOrPoints, CurvesAndPoints
 from .display import Displayed

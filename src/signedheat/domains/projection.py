@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import SourceError
 from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.paths import join
+from ..geometry.intrinsic_mesh import MARGIN, laid_out
 from ..geometry.meshes import Triangles
-from ..geometry.mollification import MARGIN, laid_out
 from ..geometry.nearest import nearest_on_triangles
 from ..geometry.surface_points import locate_points
 from .curves import Curve

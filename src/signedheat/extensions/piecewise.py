@@ -31,9 +31,8 @@ from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import VERTEX, barycentric_in
 from ..linear import chosen_backend
-from ..lowering.surface.discretization import SurfaceDiscretization, lowered_mesh
+from ..lowering.surface.discretization import SurfaceDiscretization, lowered_mesh, lowered_polygons
 from ..lowering.surface.intrinsic import ANGLE, COARSEST, is_spoiled, lowered
-from ..lowering.surface.polygons import lowered_polygons
 from ..memory import refuse_beyond_memory
 from ..method import diffuse, normalize
 from ..progress import Progress, Stopwatch

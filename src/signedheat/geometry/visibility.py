@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .tet_faces import FaceTable
+
+GRAZING = 1e-6
+"""Distance, relative to the size of the tets, by which a line may lie outside the mesh."""
 
 
 def tet_neighbors(faces: FaceTable) -> NDArray[np.int64]:
@@ -27,55 +32,54 @@ def tet_neighbors(faces: FaceTable) -> NDArray[np.int64]:
     return beyond.reshape(-1, 4)
 
 
-def visible(
-    starts: NDArray[np.float64],
-    targets: NDArray[np.float64],
-    neighbors: NDArray[np.int64],
-    tet_faces: NDArray[np.int64],
-    normals: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    signs: NDArray[np.float64],
-) -> NDArray[np.bool_]:
-    """(m,) whether the straight line from a point in each tet to its target stays in the mesh.
+class FacePlanes(NamedTuple):
+    """Tets, their neighbours and the planes of their faces, to walk along lines; see `tet_clipping.Planes`."""
 
-    Parameters
-    ----------
-    starts, targets : (m, 3) float
-        Start points, one in each tet, and end points of the lines.
-    neighbors : (m, 4) int
-        From `tet_neighbors`.
-    tet_faces, normals, offsets, signs
-        The planes of the faces: see `tet_clipping.Planes`.
-    """
-    return _visible(starts, targets, neighbors, tet_faces, normals, offsets, signs)
+    tets: NDArray[np.int64]
+    neighbors: NDArray[np.int64]
+    tet_faces: NDArray[np.int64]
+    normals: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    signs: NDArray[np.float64]
 
 
 @compiled
-def _visible(starts, targets, neighbors, tet_faces, normals, offsets, signs):
-    seen = np.ones(len(starts), dtype=np.bool_)
-    for t in range(len(starts)):
-        x, y, z = starts[t]
-        u, v, w = targets[t] - starts[t]
-        tet, entered = t, -1
-        for _ in range(len(starts)):
-            leave, at = -1, np.inf
-            for k in range(4):
-                f = tet_faces[tet, k]
-                if f == entered:
-                    continue
-                slope = signs[tet, k] * (normals[f, 0] * u + normals[f, 1] * v + normals[f, 2] * w)
-                if slope > 0.0:
-                    height = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z - offsets[f]
-                    part = -signs[tet, k] * height / slope
-                    if part < at:
-                        leave, at = k, part
-            if leave < 0 or at >= 1.0 - 1e-6:
-                break
-            entered = tet_faces[tet, leave]
-            tet = neighbors[tet, leave]
-            if tet < 0:
-                seen[t] = False
-                break
+def beyond(planes, tet, k, x, y, z):
+    """Signed distance by which a point lies outside the face opposite corner k of a tet."""
+    f = planes.tet_faces[tet, k]
+    height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
+    return planes.signs[tet, k] * height
+
+
+@compiled
+def stays_inside(planes, tet, x, y, z, u, w, t, slack):
+    """Whether the segment from (x, y, z), in a tet, to (u, w, t), in the mesh, lies in the mesh."""
+    for _ in range(len(planes.tets)):
+        leave, at = -1, np.inf
+        for k in range(4):
+            there = beyond(planes, tet, k, u, w, t)
+            if there > slack:
+                here = beyond(planes, tet, k, x, y, z)
+                if there > here and -here / (there - here) < at:
+                    leave, at = k, -here / (there - here)
+        if leave < 0:
+            return True
+        tet = planes.neighbors[tet, leave]
+        if tet < 0:
+            return False
+    return False
+
+
+@compiled
+def visible(
+    planes: FacePlanes, starts: NDArray[np.float64], targets: NDArray[np.float64], slack: float
+) -> NDArray[np.bool_]:
+    """(m,) whether the straight line from a point in each tet to its target stays in the mesh, up to a length."""
+    seen = np.empty(len(starts), dtype=np.bool_)
+    for tet in range(len(starts)):
+        x, y, z = starts[tet]
+        u, w, t = targets[tet]
+        seen[tet] = stays_inside(planes, tet, x, y, z, u, w, t, slack)
     return seen
 
 

@@ -21,6 +21,7 @@ from ..domains.foreign import what_to_pass
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
+from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import CancellingNormalsError, SourceError
@@ -253,3 +254,10 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         )
     outside = max(0.0, 1.0 - inside / total)
     return AreaSamples(*joined, spacing=spacing, outside=outside, cancelled=max(0.0, 1.0 - left), nodes=nodes)
+
+
+@area_elements.register
+def _(shape: Polyline) -> AreaElements:
+    tangents = shape.segments[:, 1] - shape.segments[:, 0]
+    normals = np.stack([-tangents[:, 1], tangents[:, 0]], axis=1)
+    return AreaElements(shape.segments, normals, shape.segment_lengths, np.zeros(len(tangents), dtype=np.int64))

@@ -9,15 +9,12 @@ from numpy.typing import NDArray
 
 from ..geometry.box_tree import BoxTree
 from ..geometry.components import grouped
-from ..geometry.geodesics.any_angle import FacePlanes, any_angle_distance
+from ..geometry.geodesics.any_angle import any_angle_distance
 from ..geometry.geodesics.heap_kernels import Queue
 from ..geometry.nearest import nearest_on_triangles, triangle_rows
 from ..geometry.tet_clipping import barycentric
-from ..geometry.visibility import tet_neighbors
+from ..geometry.visibility import GRAZING, FacePlanes, tet_neighbors
 from ..lowering.tets.discretization import TetDiscretization
-
-GRAZING = 1e-6
-"""Distance, relative to the size of the tets, by which a line may lie outside the mesh."""
 
 LARGEST_BEND = 1.0
 """Limit on the quadratic correction of the zero set, relative to h; at creases of φ the correction has no meaning."""

@@ -9,33 +9,12 @@ anywhere on an edge, costs a length of second order.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ...compiled import compiled
 from ..nearest import foot_on_triangle
+from ..visibility import beyond, stays_inside
 from .heap_kernels import pop, push
-
-
-class FacePlanes(NamedTuple):
-    """Tets, their neighbours and the planes of their faces, to walk along lines; see `tet_clipping.Planes`."""
-
-    tets: NDArray[np.int64]
-    neighbors: NDArray[np.int64]
-    tet_faces: NDArray[np.int64]
-    normals: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-    signs: NDArray[np.float64]
-
-
-@compiled
-def _beyond(planes, tet, k, x, y, z):
-    """Signed distance by which a point lies outside the face opposite corner k of a tet."""
-    f = planes.tet_faces[tet, k]
-    height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
-    return planes.signs[tet, k] * height
 
 
 @compiled
@@ -48,25 +27,12 @@ def _seen(planes, points, first_tet, tets_at, v, target, slack):
         worst = -np.inf
         for k in range(4):
             if planes.tets[tets_at[i], k] != v:
-                worst = max(worst, _beyond(planes, tets_at[i], k, u, w, t))
+                worst = max(worst, beyond(planes, tets_at[i], k, u, w, t))
         if worst < least:
             tet, least = tets_at[i], worst
     if least > slack:
         return False
-    for _ in range(len(planes.tets)):
-        leave, at = -1, np.inf
-        for k in range(4):
-            there = _beyond(planes, tet, k, u, w, t)
-            if there > slack:
-                here = _beyond(planes, tet, k, x, y, z)
-                if there > here and -here / (there - here) < at:
-                    leave, at = k, -here / (there - here)
-        if leave < 0:
-            return True
-        tet = planes.neighbors[tet, leave]
-        if tet < 0:
-            return False
-    return False
+    return stays_inside(planes, tet, x, y, z, u, w, t, slack)
 
 
 @compiled

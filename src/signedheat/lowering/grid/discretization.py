@@ -14,8 +14,7 @@ from ...discretization import DiffusesEach, discretize
 from ...domains.grid import Grid
 from ...errors import MemoryLimitError, SourceError
 from ...memory import available_memory, libraries
-from ...operators.grid.multilevel import Level, collapse, diffuse_multilevel
-from ...operators.grid.readout import unit_vectors
+from ...operators.grid.multilevel import Level, collapse, diffuse_multilevel, unit_vectors
 from ...operators.grid.stencil import divergence
 from ...operators.grid.wavefront import padded_shape
 from ..area_elements import sample_on_grid

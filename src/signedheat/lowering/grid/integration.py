@@ -12,9 +12,8 @@ from ...discretization import Levels, SolvesEach
 from ...domains.grid import Grid
 from ...linear.conjugate_gradients import conjugate_gradients
 from ...memory import refuse_beyond_memory
-from ...operators.grid.multilevel import collapse, diffuse_multilevel, skip_finest
+from ...operators.grid.multilevel import collapse, diffuse_multilevel, quotients, skip_finest
 from ...operators.grid.node_sources import NodeSources
-from ...operators.grid.readout import quotients
 from ...operators.grid.stencil import interpolation_stencil, laplacian, solve_poisson
 from .source import GridSource
 

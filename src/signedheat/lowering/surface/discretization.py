@@ -13,16 +13,19 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...cache import LastUsed, fingerprint
-from ...diagnostics import EdgesLengthened, LargeAngles, Note, VerticesAdded
+from ...diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded
 from ...discretization import Levels, SourceTerm, discretize
+from ...domains.digital_surface import DigitalSurface
 from ...domains.intrinsic_triangulation import IntrinsicTriangulation
+from ...domains.point_cloud import PointCloud
+from ...domains.polygon_mesh import PolygonMesh
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
-from ...errors import ConstraintError
+from ...errors import ConstraintError, GeometryError
 from ...geometry.curve_segments import CurveSegments
 from ...geometry.intrinsic.conforming_refinement import refine_to_conform
-from ...geometry.intrinsic_mesh import IntrinsicMesh
-from ...geometry.mollification import laid_out
+from ...geometry.intrinsic_mesh import IntrinsicMesh, laid_out, mollify
+from ...geometry.surfels import count_surfels, separated_edges
 from ...linear import Factor, chosen_backend, elimination_order, factorize
 from ...memory import refuse_beyond_memory
 from ...operators.cotan import cotan_matrix, divergence
@@ -284,3 +287,82 @@ def refuse_far_levels(source: SourceTerm, levels: NDArray[np.float64], values: N
             "sources that meet or cross need the same level",
             element=f"vertex {rows.indices[rows.indptr[worst]]}",
         )
+
+
+LIGHTER = 0.87
+"""Memory of a triangle of a polygon, over that of others: few edges meet in virtual vertices. Measured on quads."""
+
+
+@discretize.register
+def _(domain: PolygonMesh) -> SurfaceDiscretization:
+    refuse_too_many(round(LIGHTER * len(domain.corners)), domain.n_polygons, "polygons")
+    return lowered_polygons(domain)
+
+
+def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
+    """The discretisation of polygons, of whose memory the caller has made sure.
+
+    φ is solved for on all vertices of the triangles, virtual ones included, and reported at those of the polygons.
+
+    With virtual vertices eliminated in step 3 (``PᵀCP``), a curve across polygons could not be a level set of φ: it
+    crosses more edges of triangles than its polygons have corners, and φ would be constant on whole polygons. h is half
+    the mean length of the polygons' own edges, so that virtual vertices do not change t.
+    """
+    lowered = lowered_mesh(domain.triangulation)
+    own = (domain.triangulation.edges.vertices < domain.n_vertices).all(axis=1)
+    spacing = 0.5 * float(domain.triangulation.edge_lengths[own].mean())
+    return replace(lowered, domain=domain, restriction=np.arange(domain.n_vertices), spacing=spacing)
+
+
+NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
+"""Bytes of the libraries that find neighbours, and of neighbours, beside those of triangles. Measured."""
+
+
+@discretize.register
+def _(domain: PointCloud) -> SurfaceDiscretization:
+    """The values of φ are at the points; points that coincide share one unknown.
+
+    h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
+    """
+    refuse_too_many(
+        2 * domain.n_points, domain.n_points, "points", beside=NEIGHBORS + BYTES_PER_POINT * domain.n_points
+    )
+    mesh = domain.triangulation
+    used = np.zeros(domain.n_points, dtype=bool)
+    used[mesh.faces] = True
+    duplicates = int((domain.representatives != np.arange(domain.n_points)).sum())
+    notes = (PointsLeftOut(duplicates, np.flatnonzero(~used[domain.representatives])),)
+    spacing = float(mesh.edge_lengths.mean())
+    return replace(discretize(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)
+
+
+BYTES_PER_VOXEL = 20
+"""Blurred copies of the volume, from which normals are estimated."""
+
+
+@discretize.register
+def _(domain: DigitalSurface) -> SurfaceDiscretization:
+    """Each square becomes four triangles between its corners, moved, and their mean.
+
+    h is the standard deviation of the Gaussian with which normals are estimated, and at least the voxel size. At a
+    smaller scale the shape of the surface is unknown, and diffusion would follow the directions of the lattice.
+    """
+    faces = count_surfels(domain.volume)
+    refuse_too_many(4 * faces, faces, "faces of voxels", beside=BYTES_PER_VOXEL * domain.volume.size)
+    mesh, corners = domain.triangulation, domain.smooth_vertices
+    positions = np.concatenate([corners, corners[domain.surfels.corners].mean(axis=1)])
+    placed = positions[mesh.faces]
+    sides = np.linalg.norm(np.roll(placed, -1, axis=1) - placed, axis=2)
+    if not sides.any():
+        raise GeometryError(
+            "the faces of the voxels are so small that their corners fall together",
+            remedy="scale spacing, or move origin to zero",
+            element="spacing",
+        )
+    lengths, _ = mollify(sides, 1e-6)
+    edges = separated_edges(mesh.edges, domain.surfels)
+    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, edges)
+    extent = float((domain.bounds[1] - domain.bounds[0]).max())
+    spacing = max(min(0.5 * domain.radius, extent), float(domain.spacing.mean()))
+    own = np.arange(domain.n_vertices)
+    return SurfaceDiscretization(domain, triangles, restriction=own, positions=positions, spacing=spacing)

@@ -13,8 +13,7 @@ from ...discretization import discretize
 from ...domains.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
 from ...domains.triangle_mesh import TriangleMesh
 from ...errors import GeometryError
-from ...geometry.intrinsic_mesh import IntrinsicMesh
-from ...geometry.mollification import mollify
+from ...geometry.intrinsic_mesh import IntrinsicMesh, mollify
 from ...progress import Progress
 from .curve_groups import CurveGroups
 from .discretization import SurfaceDiscretization, refuse_too_many

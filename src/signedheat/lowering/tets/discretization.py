@@ -16,7 +16,7 @@ from ...cache import LastUsed
 from ...discretization import DiffusesEach, discretize
 from ...domains.tet_mesh import TetMesh
 from ...geometry.tet_clipping import Planes
-from ...geometry.visibility import tet_neighbors, visible
+from ...geometry.visibility import GRAZING, FacePlanes, tet_neighbors, visible
 from ...linear import upper_triangle
 from ...linear.incomplete_cholesky import from_first
 from ...linear.restarts import Stage
@@ -158,7 +158,9 @@ class TetDiscretization(DiffusesEach):
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
         ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
-        return visible(*ends, neighbors, self.mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs)
+        mesh, slack = self.mesh, GRAZING * self.spacing
+        walls = FacePlanes(mesh.tets, neighbors, mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs)
+        return np.asarray(visible(walls, *ends, slack))
 
     @cached_property
     def _laplacian(self) -> sparse.csr_matrix:
