@@ -42,10 +42,24 @@ def element_components(elements: NDArray[np.int64]) -> NDArray[np.int64]:
     """
     links = np.repeat(elements[:, 0], elements.shape[1] - 1), elements[:, 1:].ravel()
     labels = connected_components(int(elements.max()) + 1, *links)[elements[:, 0]]
-    first = np.empty(int(labels.max()) + 1, dtype=np.int64)
-    first[labels[::-1]] = np.arange(len(labels))[::-1]
-    is_first = first[labels] == np.arange(len(labels))
-    return (np.cumsum(is_first) - 1)[first[labels]]
+    return by_first_use(labels, int(labels.max()) + 1)[0]
+
+
+def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """New numbers for ids below n, in order of first appearance; and the old id of each number.
+
+    Examples
+    --------
+    >>> by_first_use(np.array([4, 1, 4, 2]), 5)
+    (array([0, 1, 0, 2]), array([4, 1, 2]))
+    """
+    first = np.full(n, -1)
+    first[ids[::-1]] = np.arange(len(ids))[::-1]
+    used = np.flatnonzero(first >= 0)
+    order = used[np.argsort(first[used])]
+    number = np.empty(n, dtype=np.int64)
+    number[order] = np.arange(len(order))
+    return number[ids], order
 
 
 @compiled

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
 from ..frozen import Frozen, read_only
+from .components import connected_components
 from .triangle_kernels import find_edges
 
 
@@ -113,8 +113,22 @@ def orient_faces(
     >>> found.turned, found.orientable, found.disagreeing
     (array([ True, False]), array([ True]), 1)
     """
+    two = pairs.counts == 2
+    one, other = pairs.first[two], pairs.second[two]
+    (f, g), n, disagree = (owners[one], owners[other]), len(weights), tails[one] == tails[other]
+    parts = connected_components(n, f, g)
+    # every face as it is and, n numbers farther on, turned over: what agrees hangs together
+    ways = np.concatenate([f, f + n]), np.concatenate([np.where(disagree, g + n, g), np.where(disagree, g, g + n)])
+    cover = connected_components(2 * n, *ways)
+    orientable, closed = np.ones((2, int(parts.max(initial=-1)) + 1), dtype=bool)
+    orientable[parts[cover[:n] == cover[n:]]] = False
+    closed[parts[owners[(pairs.edges >= 0) & (pairs.counts != 2)[pairs.edges]]]] = False
+    leader = np.empty(len(orientable), dtype=np.int64)
+    leader[parts[::-1]] = np.arange(n)[::-1]
+    turned = cover[:n] != cover[leader[parts]]
+    balance = np.bincount(parts, np.where(turned, -weights, weights), len(orientable))
     return FaceOrientation(
-        *_orient(pairs.edges, pairs.counts, pairs.first, pairs.second, read_only(tails), owners, weights)
+        parts, orientable[parts] & (turned != (balance < 0)[parts]), orientable, closed, int(disagree.sum())
     )
 
 
@@ -142,72 +156,6 @@ def may_coincide(pairs: HalfedgePairs, tails: NDArray[np.int64], following: NDAr
     alike = tails[one] == tails[other]  # else the corner beyond the edge is the one before it
     there = tails[np.where(alike, following[following[other]], preceding[other])]
     return bool((pairs.counts > 2).any() or (beyond == there).any())
-
-
-@compiled
-def _root(parents: NDArray[np.int64], ways: NDArray[np.bool_], face: int) -> tuple[int, bool]:
-    """Root of a face's tree, and whether the face is turned against it; paths are halved on the way."""
-    way = False
-    while parents[face] != face:
-        above = parents[face]
-        ways[face] = ways[face] != ways[above]
-        parents[face] = parents[above]
-        way = way != ways[face]
-        face = parents[face]
-    return face, way
-
-
-@compiled
-def _orient(
-    edges: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    first: NDArray[np.int64],
-    second: NDArray[np.int64],
-    tails: NDArray[np.int64],
-    owners: NDArray[np.int32],
-    weights: NDArray[np.float64],
-) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], int]:
-    n_faces, disagreeing = len(weights), 0
-    parents = np.arange(n_faces)
-    ways = np.zeros(n_faces, dtype=np.bool_)  # whether a face is turned against its parent; never at roots
-    bad = np.zeros(n_faces, dtype=np.bool_)
-    for edge in range(len(counts)):
-        if counts[edge] != 2:
-            continue
-        h, k = first[edge], second[edge]
-        turned = tails[h] == tails[k]
-        disagreeing += turned
-        a, way_a = _root(parents, ways, owners[h])
-        b, way_b = _root(parents, ways, owners[k])
-        turned = turned != (way_a != way_b)
-        if a == b:
-            bad[a] = bad[a] or turned
-        else:
-            low, high = min(a, b), max(a, b)
-            parents[high], ways[high] = low, turned
-            bad[low] = bad[low] or bad[high]
-    parts, turned_faces = np.empty(n_faces, dtype=np.int64), np.empty(n_faces, dtype=np.bool_)
-    against, total, orientable = np.zeros(n_faces), np.zeros(n_faces), np.empty(n_faces, dtype=np.bool_)
-    n_parts = 0
-    for face in range(n_faces):  # roots are the least of their part, and come first
-        root, turned_faces[face] = _root(parents, ways, face)
-        if root == face:
-            parts[face] = n_parts
-            orientable[n_parts] = not bad[face]
-            n_parts += 1
-        part = parts[root]
-        parts[face] = part
-        total[part] += weights[face]
-        if turned_faces[face]:
-            against[part] += weights[face]
-    for face in range(n_faces):
-        part = parts[face]
-        turned_faces[face] = orientable[part] and turned_faces[face] != (2.0 * against[part] > total[part])
-    closed = np.ones(n_parts, dtype=np.bool_)
-    for h in range(len(edges)):
-        if edges[h] >= 0 and counts[edges[h]] != 2:
-            closed[parts[owners[h]]] = False
-    return parts, turned_faces, orientable[:n_parts].copy(), closed, disagreeing
 
 
 @dataclass(frozen=True, eq=False)

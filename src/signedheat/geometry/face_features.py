@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import morton_codes
-from .components import grouped
+from .components import by_first_use, grouped
 from .edges import EdgeTable, edge_table
 from .nearest import triangle_rows
 from .welding import same_positions
@@ -139,8 +139,8 @@ class FaceFeatures:
         if len(faces):  # what is near in space had better be near in memory
             order = np.argsort(morton_codes(vertices[faces].mean(axis=1)), kind="stable")
             trusted, ids = trusted[order], ids[order]
-            order, faces = _by_first_use(faces[order], len(vertices))
-            vertices = vertices[order]
+            numbers, used = by_first_use(faces[order].ravel(), len(vertices))
+            faces, vertices = numbers.reshape(-1, 3), vertices[used]
         table = edge_table(faces)
         copies = _copies(faces, table)
         if copies.any():
@@ -183,24 +183,6 @@ def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
         copies[crowded] = True
         copies[crowded[first]] = False
     return copies
-
-
-@compiled
-def _by_first_use(faces: NDArray[np.int64], n_vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Used vertices in the order in which faces name them first, and the faces with their numbers in that order."""
-    number = np.full(n_vertices, -1, dtype=np.int64)
-    order = np.empty(n_vertices, dtype=np.int64)
-    result = np.empty_like(faces)
-    count = 0
-    for f in range(len(faces)):
-        for c in range(3):
-            v = faces[f, c]
-            if number[v] < 0:
-                number[v] = count
-                order[count] = v
-                count += 1
-            result[f, c] = number[v]
-    return order[:count], result
 
 
 @compiled

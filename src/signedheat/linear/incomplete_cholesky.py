@@ -30,23 +30,20 @@ class IncompleteCholesky:
     ----------
     order : (k,) int
         Unknowns to solve for, in this order; the others stay zero.
-    indptr, indices : int arrays
-        Sparsity pattern (CSR) of the strictly lower triangle, rows and columns in that order.
-    diagonal, lower : float arrays
-        Diagonal and strictly lower triangle of the matrix.
-    pivots, factor : float arrays
-        Inverse diagonal and strictly lower triangle of the factor.
+    matrix : (k, k) sparse
+        Rows and columns in that order.
+    factor : (k, k) sparse
+        Strictly lower triangle of the factor.
+    pivots : (k,) float
+        Its inverse diagonal.
     n : int
         Number of unknowns, solved for or not.
     """
 
     order: NDArray[np.int64]
-    indptr: NDArray[np.int64]
-    indices: NDArray[np.int32]
-    diagonal: NDArray[np.float64]
-    lower: NDArray[np.float64]
+    matrix: sparse.csr_matrix
+    factor: sparse.csr_matrix
     pivots: NDArray[np.float64]
-    factor: NDArray[np.float64]
     n: int
 
     @classmethod
@@ -59,14 +56,15 @@ class IncompleteCholesky:
         >>> IncompleteCholesky.of(A, np.arange(2)).solve(np.array([3.0, 3.0]))
         array([1., 1.])
         """
-        indptr, indices, lower, diagonal = _lower_triangle(
-            matrix.indptr, matrix.indices, matrix.data, order, matrix.shape[0]
-        )
-        shift = 0.0
+        chosen = sparse.csr_matrix(matrix[order][:, order])
+        factor = sparse.csr_matrix(sparse.tril(chosen, -1))
+        factor.sort_indices()
+        lower, shift = factor.data.copy(), 0.0
         while True:
-            factor, pivots = lower.copy(), (1 + shift) * diagonal
-            if _factorize(indptr, indices, factor, pivots):
-                return cls(order, indptr, indices, diagonal, lower, pivots, factor, matrix.shape[0])
+            pivots = (1 + shift) * chosen.diagonal()
+            if _factorize(factor.indptr, factor.indices, factor.data, pivots):
+                return cls(order, chosen, factor, pivots, matrix.shape[0])
+            factor.data[:] = lower
             shift = max(1e-3, 2 * shift)
 
     def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> NDArray[np.float64]:
@@ -87,22 +85,21 @@ class IncompleteCholesky:
 
     def _iterate(self, load: NDArray[np.float64], relative: float, componentwise: float) -> NDArray[np.float64]:
         shape, goal = load.shape, relative**2 * float(np.einsum("ij,ij->", load, load))
+        diagonal, factor = self.matrix.diagonal(), self.factor
 
         def multiply(p: NDArray[np.float64]) -> NDArray[np.float64]:
-            product: NDArray[np.float64] = _multiply(
-                self.indptr, self.indices, self.diagonal, self.lower, p.reshape(shape)
-            )
-            return product.ravel()
+            product: NDArray[np.float64] = (self.matrix @ p.reshape(shape)).ravel()
+            return product
 
         def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
             solution: NDArray[np.float64] = _precondition(
-                self.indptr, self.indices, self.factor, self.pivots, r.reshape(shape)
+                factor.indptr, factor.indices, factor.data, self.pivots, r.reshape(shape)
             )
             return solution.ravel()
 
         def converged(x: NDArray[np.float64], r: NDArray[np.float64]) -> bool:
             small = np.einsum("i,i->", r, r) <= goal
-            return bool(small or _settled(self.diagonal, x.reshape(shape), r.reshape(shape), componentwise))
+            return bool(small or _settled(diagonal, x.reshape(shape), r.reshape(shape), componentwise))
 
         with threadpool_limits(1, "blas"):  # threads only wait between the inner products
             solution = conjugate_gradients(
@@ -120,10 +117,12 @@ def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArra
     >>> outward_order(chain, np.array([1]))
     array([1, 0, 2])
     """
-    order: NDArray[np.int64] = _breadth_first(
-        matrix.indptr, matrix.indices, matrix.data, np.asarray(seeds, dtype=np.int64)
-    )
-    return order
+    n = matrix.shape[0]
+    links = sparse.csr_matrix((np.ones(len(seeds)), (np.full(len(seeds), n), seeds)), shape=(n + 1, n + 1))
+    graph = sparse.csr_matrix((matrix.data != 0, matrix.indices, matrix.indptr), shape=matrix.shape)
+    graph.resize(n + 1, n + 1)
+    order = sparse.csgraph.breadth_first_order(links + graph, n, return_predecessors=False)
+    return order[1:].astype(np.int64)
 
 
 def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
@@ -131,65 +130,6 @@ def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
     full = whole(upper)
     _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
     return IncompleteCholesky.of(full, outward_order(full, first))
-
-
-@compiled
-def _breadth_first(indptr, indices, data, seeds):
-    n = len(indptr) - 1
-    seen = np.zeros(n, dtype=np.bool_)
-    queue = np.empty(n, dtype=np.int64)
-    end = 0
-    for s in seeds:
-        if not seen[s]:
-            seen[s] = True
-            queue[end] = s
-            end += 1
-    begin = 0
-    while begin < end:
-        i = queue[begin]
-        begin += 1
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            if not seen[j] and data[k] != 0.0:
-                seen[j] = True
-                queue[end] = j
-                end += 1
-    return queue[:end].copy()
-
-
-@compiled
-def _lower_triangle(indptr, indices, data, order, n):
-    """Diagonal and strictly lower triangle (CSR), rows and columns in `order`, columns sorted."""
-    place = np.full(n, -1, dtype=np.int64)
-    for i in range(len(order)):
-        place[order[i]] = i
-    starts = np.zeros(len(order) + 1, dtype=np.int64)
-    for i in range(len(order)):
-        count = 0
-        for k in range(indptr[order[i]], indptr[order[i] + 1]):
-            j = place[indices[k]]
-            if 0 <= j < i:
-                count += 1
-        starts[i + 1] = starts[i] + count
-    columns = np.empty(starts[-1], dtype=np.int32)
-    lower = np.empty(starts[-1])
-    diagonal = np.zeros(len(order))
-    for i in range(len(order)):
-        end = starts[i]
-        for k in range(indptr[order[i]], indptr[order[i] + 1]):
-            j = place[indices[k]]
-            if j == i:
-                diagonal[i] = data[k]
-            elif 0 <= j < i:
-                m = end
-                while m > starts[i] and columns[m - 1] > j:
-                    columns[m] = columns[m - 1]
-                    lower[m] = lower[m - 1]
-                    m -= 1
-                columns[m] = j
-                lower[m] = data[k]
-                end += 1
-    return starts, columns, lower, diagonal
 
 
 @compiled
@@ -240,22 +180,6 @@ def _precondition(indptr, indices, factor, pivots, r):
             for c in range(width):
                 z[indices[k], c] -= factor[k] * z[i, c]
     return z
-
-
-@compiled
-def _multiply(indptr, indices, diagonal, lower, p):
-    """A p, from the lower triangle."""
-    n, width = p.shape
-    q = np.empty((n, width))
-    for i in range(n):
-        for c in range(width):
-            q[i, c] = diagonal[i] * p[i, c]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            for c in range(width):
-                q[i, c] += lower[k] * p[j, c]
-                q[j, c] += lower[k] * p[i, c]
-    return q
 
 
 @compiled

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ...compiled import compiled
@@ -186,21 +187,11 @@ def _mean_step(steps: NDArray[np.float64]) -> float:
 
 def _dilated(mask: NDArray[np.bool_], width: NDArray[np.int64]) -> NDArray[np.bool_]:
     """The mask dilated by a box of this half width, in nodes."""
-    grown = mask
-    for axis, n in enumerate(mask.shape):
-        wanted = min(n - 1, int(width[axis]) if axis < 3 else -(-int(width[3]) // STRETCH))
-        reach = 0
-        while reach < wanted:  # a mask dilated by r on either side can be shifted by up to r + 1 without leaving a gap
-            shift = min(reach + 1, wanted - reach)
-            ahead, behind = (
-                (slice(None),) * axis + (slice(shift, None),),
-                (slice(None),) * axis + (slice(None, -shift),),
-            )
-            before, grown = grown, grown.copy()
-            grown[ahead] |= before[behind]
-            grown[behind] |= before[ahead]
-            reach += shift
-    return grown
+    grown = mask.astype(np.uint8)
+    for axis, reach in enumerate((*width[:3], -(-int(width[3]) // STRETCH))):
+        size = 2 * min(int(reach), mask.shape[axis]) + 1
+        grown = scipy.ndimage.maximum_filter1d(grown, size, axis, mode="constant")
+    return grown.astype(np.bool_)
 
 
 def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[int, ...], NDArray[np.float64]]:
