@@ -24,11 +24,11 @@ def box(points, half):
     return np.linalg.norm(np.maximum(off, 0), axis=0) + np.minimum(off.max(axis=0), 0)
 
 
-@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("dimension", [1, 2, 3, 4])
 @pytest.mark.parametrize("slope", [1e-300, 0.3, 1e300])
 def test_distance_to_planes_is_exact(dimension, slope):
-    steps = np.array([0.5, 2.0, 1.0])[:dimension]
-    points, normal = nodes(12, dimension, steps), np.array([1.0, -0.3, 0.7])[:dimension]
+    steps = np.array([0.5, 2.0, 1.0, 0.7])[:dimension]
+    points, normal = nodes(12, dimension, steps), np.array([1.0, -0.3, 0.7, 0.4])[:dimension]
     normal /= np.linalg.norm(normal)
     plane = np.tensordot(normal, points, 1) - 0.137
     feet = points - plane * normal.reshape((-1,) + (1,) * dimension)
@@ -150,7 +150,7 @@ def test_walls_without_a_way_around_part_what_is_known():
 
 
 @pytest.mark.parametrize(("values", "options"), [
-    ([1.0, 2.0], {}), ([[True, False]], {}), (np.ones((2, 2, 2, 2)), {}), (3.0, {}), ([-1.0], {}), ([], {}),
+    ([1.0, 2.0], {}), ([[True, False]], {}), (np.ones((2,) * 5), {}), (3.0, {}), ([-1.0], {}), ([], {}),
     ([-1.0, np.inf], {}), ([-1.0, 1j], {}), (["a", "b"], {}), ([np.nan, np.nan], {}), ([-1.0, 1.0], {"spacing": 0.0}),
     ([-1.0, 1.0], {"spacing": [1.0, 1.0]}), ([-1.0, 1.0], {"periodic": [True, True]}),
     ([-1.0, 1.0], {"periodic": "yes"}), ([-1.0, np.nan, 1.0, 1.0], {"periodic": True}),
