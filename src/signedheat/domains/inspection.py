@@ -193,7 +193,7 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
     if may_coincide(pairs, corners, following):
         first, _ = coincident_faces(corners, offsets)
         duplicates = int(((first >= 0) & (first != np.arange(len(sides)))).sum())
-    lonely = (pairs.edges >= 0) & (pairs.counts == 1)[pairs.edges]
+    lonely = pairs.around == 1
     areas, degenerate = areas_of_polygons(mesh.vertices, corners, offsets)
     lower, upper = used_bounds(mesh.vertices, corners)
     two = pairs.counts == 2
@@ -240,7 +240,7 @@ def _n_nonmanifold(n: int, tails: NDArray[np.int64], following: NDArray[np.int32
     fans = connected_components(len(tails), np.concatenate([one, next_one]), np.concatenate(links))
     fan = np.empty(n, dtype=np.int64)
     fan[tails] = fans
-    crowded = np.flatnonzero((pairs.edges >= 0) & (pairs.counts > 2)[pairs.edges])
+    crowded = np.flatnonzero(pairs.around > 2)
     bad = [tails[fans != fan[tails]], tails[crowded], tails[following[crowded]]]
     return _n_marked(n, np.concatenate(bad))
 

@@ -33,6 +33,12 @@ class HalfedgePairs:
     first: NDArray[np.int64]
     second: NDArray[np.int64]
 
+    @property
+    def around(self) -> NDArray[np.int64]:
+        """(h,) halfedges along the edge of each; 0 for those that have none."""
+        result: NDArray[np.int64] = np.append(self.counts, 0)[self.edges]
+        return result
+
 
 @dataclass(frozen=True, eq=False)
 class FaceOrientation:
@@ -122,7 +128,7 @@ def orient_faces(
     cover = connected_components(2 * n, *ways)
     orientable, closed = np.ones((2, int(parts.max(initial=-1)) + 1), dtype=bool)
     orientable[parts[cover[:n] == cover[n:]]] = False
-    closed[parts[owners[(pairs.edges >= 0) & (pairs.counts != 2)[pairs.edges]]]] = False
+    closed[parts[owners[(pairs.edges >= 0) & (pairs.around != 2)]]] = False
     leader = np.empty(len(orientable), dtype=np.int64)
     leader[parts[::-1]] = np.arange(n)[::-1]
     turned = cover[:n] != cover[leader[parts]]
