@@ -8,8 +8,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..geometry.components import connected_components
 from . import bending, lids
-from .rims import loops, open_edges
+from .rims import loops, meeting_edges, open_edges
 
 SIDES = 100
 """Most sides of a rim that is closed by a few flat triangles."""
@@ -41,10 +42,53 @@ def lids_of(
         diagonal = float(np.linalg.norm(np.ptp(own.reshape(-1, 3), axis=0)))
         patches = bending.smooth_patches(own, ids[here])
         ends = _Ends.of(ids[here], patches, len(vertices))
-        for loop in loops(edges[np.searchsorted(owners, part) : np.searchsorted(owners, part, side="right")]):
+        rims = loops(edges[np.searchsorted(owners, part) : np.searchsorted(owners, part, side="right")])
+        for loop in _openings(rims, vertices):
             lid = _lid(vertices[loop], own, patches, ends.at(loop), diagonal)
             made.append(lid.vertices[lid.faces])
     return made
+
+
+def _openings(rims: list[NDArray[np.int64]], vertices: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """Loops around openings: rims but for where others run beside them, each end joined to the nearest start."""
+    if len(rims) < 2:
+        return rims
+    owners = np.repeat(np.arange(len(rims)), [len(rim) for rim in rims])
+    edges = np.concatenate([np.stack([rim, np.roll(rim, -1)], axis=1) for rim in rims])
+    one, other = meeting_edges(vertices[edges])
+    apart = owners[one] != owners[other]
+    met = np.zeros(len(edges), dtype=bool)
+    met[one[apart]] = met[other[apart]] = True
+    beside = np.split(met, np.cumsum([len(rim) for rim in rims])[:-1])
+    whole = [rim for rim, some in zip(rims, beside, strict=True) if not some.any()]
+    partly = [(rim, some) for rim, some in zip(rims, beside, strict=True) if some.any() and not some.all()]
+    chains = [chain for rim, some in partly for chain in _chains(rim, some)]
+    if not chains:
+        return whole
+    following = scipy.spatial.cKDTree(vertices[[chain[0] for chain in chains]]).query(
+        vertices[[chain[-1] for chain in chains]]
+    )[1]
+    if len(np.unique(following)) < len(chains):  # it is not clear how they go on
+        return whole + [rim for rim, _ in partly]
+    cycles = connected_components(len(chains), np.arange(len(chains)), following)
+    for first in np.unique(cycles, return_index=True)[1]:
+        loop, at = [chains[first]], following[first]
+        while at != first:
+            loop.append(chains[at])
+            at = following[at]
+        joined = np.concatenate(loop)
+        joined = joined[joined != np.roll(joined, 1)]
+        if len(joined) > 2:
+            whole.append(joined)
+    return whole
+
+
+def _chains(rim: NDArray[np.int64], met: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Stretches of a rim, as vertices, none of whose edges is met."""
+    turn = int(np.argmax(met)) + 1
+    rim, free = np.roll(rim, -turn), np.flatnonzero(~np.roll(met, -turn))
+    runs = np.split(free, np.flatnonzero(np.diff(free) > 1) + 1)
+    return [rim[np.append(run, run[-1] + 1) % len(rim)] for run in runs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +106,12 @@ class _Ends:
         return cls(keys[order], np.repeat(patches, 3)[order], size)
 
     def at(self, loop: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(n,) the patch beside each edge of a loop."""
-        return self.patches[np.searchsorted(self.keys, loop * self.size + np.roll(loop, -1))]
+        """(n,) the patch beside each edge of a loop; where there is no such edge, beside the last before it."""
+        keys = loop * self.size + np.roll(loop, -1)
+        found = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        there = self.keys[found] == keys
+        last = np.maximum.accumulate(np.where(there, np.arange(len(loop)), int(np.argmax(there))))
+        return self.patches[found[last]]
 
 
 def _lid(

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..geometry.components import element_components
+from ..geometry.components import connected_components, element_components
 from ..geometry.edges import edge_table
 from ..geometry.winding_tree import WindingTree
-from .rims import open_edges
+from .rims import meeting_edges, open_edges
 
 SHEET = 0.15
 """Level up to which a part is a sheet. Flat and wavy sheets have 0, one folded at a right angle .11, a seventh of a
@@ -45,7 +45,7 @@ def bodies(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> tuple[NDAr
 
     A part is a body if it is closed, if its own winding number at its faces is high enough, or its rims are upright.
     """
-    labels = parts_of(ids)
+    labels = _joined_along_rims(triangles, ids, parts_of(ids))
     n = int(labels.max(initial=-1)) + 1
     is_body = np.ones(n, dtype=bool)
     is_body[open_edges(ids, labels)[1]] = False
@@ -56,6 +56,22 @@ def bodies(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> tuple[NDAr
         is_body[names] = np.abs(own_levels(some[0], inverse)) >= SHEET
         is_body[names] |= np.abs(uprightness(*some, len(names))) >= UPRIGHT
     return labels, is_body
+
+
+def _joined_along_rims(
+    triangles: NDArray[np.float64], ids: NDArray[np.int64], labels: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """The parts that faces are of, where those count as one whose rims run beside each other; single faces do not."""
+    edges, owners = open_edges(ids, labels)
+    counts = np.bincount(labels)
+    kept = counts[owners] > 1
+    edges, owners = edges[kept], owners[kept]
+    if len(np.unique(owners)) < 2:
+        return labels
+    positions = np.empty((int(ids.max()) + 1, 3))
+    positions[ids] = triangles
+    one, other = meeting_edges(positions[edges])
+    return connected_components(len(counts), owners[one], owners[other])[labels]
 
 
 def own_levels(triangles: NDArray[np.float64], parts: NDArray[np.int64]) -> NDArray[np.float64]:

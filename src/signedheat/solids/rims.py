@@ -3,9 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from ..geometry.edges import edge_table
+
+PLACES = 8
+"""Places on an edge from which one that runs beside it is looked for: nearer to each other than `BESIDE`."""
+BESIDE = 0.1
+"""Distance over the length of the longer edge up to which one runs beside another: chords of the same arc are less than
+.05 apart where it has 16 or more."""
+OPPOSITE = -0.7
+"""Cosine of their directions up to which they run in opposite directions."""
 
 
 def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -40,6 +49,35 @@ def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDAr
     edges = table.vertices[sides % n]
     missing = np.where(excess[:, None] > 0, edges[:, ::-1], edges)
     return np.repeat(missing, np.abs(excess), axis=0), np.repeat(sides // n, np.abs(excess))
+
+
+def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of edges that run beside each other in opposite directions, as where patches meet whose vertices differ.
+
+    Parameters
+    ----------
+    ends : (n, 2, 3) float
+        Tails and heads.
+
+    Examples
+    --------
+    >>> one, other = [[0, 0, 0], [1, 0, 0]], [[0.8, 0.01, 0], [0.3, 0.02, 0]]
+    >>> [edges.tolist() for edges in meeting_edges(np.array([one, other]))]
+    [[0], [1]]
+    """
+    along = ends[:, 1] - ends[:, 0]
+    lengths = np.linalg.norm(along, axis=1)
+    ways = along / np.maximum(lengths, 1e-300)[:, None]
+    at = (np.arange(PLACES) + 0.5) / PLACES
+    places = (ends[:, :1] + at[:, None] * along[:, None]).reshape(-1, 3)
+    owners = np.repeat(np.arange(len(ends)), PLACES)
+    tree = scipy.spatial.cKDTree(places)
+    found = tree.query_ball_point(places, BESIDE * lengths[owners], workers=-1)
+    one = np.repeat(owners, [len(each) for each in found])
+    other = owners[np.concatenate([np.asarray(each, dtype=np.int64) for each in found])] if len(one) else one
+    pairs = np.unique(np.sort(np.stack([one, other], axis=1)), axis=0)
+    one, other = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
+    return one, other
 
 
 def loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
