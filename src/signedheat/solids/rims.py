@@ -54,6 +54,8 @@ def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDAr
 def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of edges that run beside each other in opposite directions, as where patches meet whose vertices differ.
 
+    Edges between the same places are none: where three or more faces meet it is not known which of them belong together.
+
     Parameters
     ----------
     ends : (n, 2, 3) float
@@ -77,7 +79,8 @@ def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray
     other = owners[np.concatenate([np.asarray(each, dtype=np.int64) for each in found])] if len(one) else one
     pairs = np.unique(np.sort(np.stack([one, other], axis=1)), axis=0)
     one, other = pairs[(ways[pairs[:, 0]] * ways[pairs[:, 1]]).sum(axis=1) < OPPOSITE].T
-    return one, other
+    same = (ends[one] == ends[other, ::-1]).all(axis=(1, 2))
+    return one[~same], other[~same]
 
 
 def loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
