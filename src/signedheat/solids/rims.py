@@ -54,7 +54,7 @@ def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDAr
 def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pairs of edges that run beside each other in opposite directions, as where patches meet whose vertices differ.
 
-    Edges between the same places are none: where three or more faces meet it is not known which of them belong together.
+    Edges between the same places are none: of three or more faces there it is not known which belong together.
 
     Parameters
     ----------
