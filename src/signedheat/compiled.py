@@ -110,7 +110,7 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def cache_folder() -> Path:
-    """Where compiled code is kept; if it cannot be written, Numba keeps it beside the source, or in its own folder."""
+    """Where compiled code is kept; if it cannot be written, Numba keeps it next to the source, or in its own folder."""
     wanted = os.environ.get("NUMBA_CACHE_DIR")
     if wanted:
         return Path(wanted) / "signedheat"
@@ -160,7 +160,7 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 
 @cache
 def _prepare() -> None:
-    """Tell Numba what kernels are, so that compiled code can call them, and be told of what it compiles.
+    """Make kernels types of Numba, so that compiled code can call them, and listen to what it compiles.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def _prepare() -> None:
 
 
 class _Listener:
-    """Hears from Numba when it compiles: tells so, and searches for no garbage meanwhile, an eighth of the time.
+    """Listens to Numba: announces what it compiles, and searches for no garbage meanwhile, an eighth of the time.
 
     What was compiled is written between the end of that and the end of Numba's own lock on threads. Processes wait for
     one another there: of two that write one kernel for two kinds of arguments, each could take the other's file for its

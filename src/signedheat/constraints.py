@@ -52,7 +52,7 @@ class ZeroSet:
     hard : bool
         Impose φ = 0 at every point at which the source is sampled. By default φ is zero, up to rounding, on surfaces
         along curves that follow edges; where a curve crosses faces, a linear function could follow it only by being
-        constant beside it, so that springs hold φ to within some hundredths of h. On grids and tets φ is corrected to
+        constant next to it, so that springs hold φ to within some hundredths of h. On grids and tets φ is corrected to
         zero along the source by a smooth function or by springs, which is cheaper and, on broken input, more accurate.
 
     Examples

@@ -113,7 +113,7 @@ class DiffusesEach:
     """For discretisations that have nothing to gain by diffusing several sources at once."""
 
     def diffuse_many(self: Discretization, sources: Sequence[Any]) -> Iterable[Any]:
-        """One after the other, each when it is asked for."""
+        """One after the other, each when it is needed."""
         return (self.diffuse(source) for source in sources)
 
 
@@ -123,7 +123,7 @@ class SolvesEach:
     def solve_many(
         self: Integration, divergences: Iterable[Any], sources: Sequence[Any]
     ) -> Iterable[NDArray[np.float64]]:
-        """One after the other, each when it is asked for."""
+        """One after the other, each when it is needed."""
         return (self.solve(divergence, source) for divergence, source in zip(divergences, sources, strict=True))
 
 

@@ -16,7 +16,7 @@ from .compiled import made
 from .errors import MemoryLimitError
 
 GROUPS = Path("/proc/self/cgroup")
-"""Where the system tells to which groups this process belongs, a line ``id:controllers:path`` for each."""
+"""Where the system lists to which groups this process belongs, a line ``id:controllers:path`` for each."""
 ROOT = Path("/sys/fs/cgroup")
 """Where the groups of version 2 are, and below ``memory`` those of version 1."""
 FILES = {"": ("memory.max", "memory.current"), "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes")}
@@ -34,7 +34,7 @@ MAPPED = {"VmSize": 685_000_000, "VmData": 165_000_000}
 
 
 ROOM = 1.1
-"""By how much what is told to fit is smaller than it must be: what is free changes from one call to the next."""
+"""By how much the size that a remedy names is smaller than must be: what is free changes between two calls."""
 
 
 def libraries() -> int:
@@ -101,7 +101,7 @@ def fitting_count(count: int, estimate: Callable[[int], float], available: float
 
 
 def available_memory() -> int | None:
-    """Bytes that this process can still allocate; None if the system does not tell.
+    """Bytes that this process can still allocate; None if the system does not say.
 
     The least of what is free in the machine, what the container or job leaves (cgroups, those around them too), and
     what the process's own limits leave on address space (``ulimit -v``) and data (``ulimit -d``).

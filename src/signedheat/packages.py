@@ -24,14 +24,14 @@ REMEDIES = {
 
 
 class LazyModule:
-    """A module that is imported when something in it is first asked for: see `lazy_module`."""
+    """A module that is imported at the first use of something in it: see `lazy_module`."""
 
     def __init__(self, name: str, purpose: str) -> None:
         self._name = name
         self._purpose = purpose
 
     def __getattr__(self, attribute: str) -> Any:
-        if attribute.startswith("__"):  # asked for by doctest, copy and their like, which do not use the module
+        if attribute.startswith("__"):  # doctest, copy and their like look these up, and do not use the module
             raise AttributeError(attribute)
         return getattr(require(self._name, self._purpose), attribute)
 
@@ -40,14 +40,14 @@ class LazyModule:
 
 
 def lazy_module(name: str, purpose: str) -> Any:
-    """A handle that is used like a module, which is imported when something in it is first asked for.
+    """A handle that is used like a module, which is imported at the first use of something in it.
 
     Parameters
     ----------
     name : str
         As in ``import name``.
     purpose : str
-        What needs the module, in the plural: "NRRD files". Asked for anything, the handle raises
+        What needs the module, in the plural: "NRRD files". At its first use the handle raises
         `MissingPackageError` with these words where the package is not installed.
 
     Examples

@@ -152,7 +152,7 @@ def connected(address: str) -> Any:
         ...
     signedheat.errors.SignedHeatError: no Dask scheduler answers at 'nobody' (missing port number in address 'nobody'): start one with `dask scheduler`, and name its address
     """  # noqa: E501
-    comm = distributed.comm  # a package that is missing is told as it is
+    comm = distributed.comm  # a missing package raises its own error
     try:
         if comm.parse_address(address)[0] == "tcp":
             _hear_greeting(*comm.get_address_host_port(address))

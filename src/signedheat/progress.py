@@ -15,10 +15,10 @@ Progress = Callable[[float, str], None]
 
 
 class Announcement:
-    """Tells something on a terminal, once in a process; each time in the log, with what it is about."""
+    """Prints something on a terminal, once in a process; each time in the log, with what it is about."""
 
     are_wanted = True
-    """Whether any are; not where nothing but results are to be told."""
+    """Whether any are; not where nothing but results are to be printed."""
 
     def __init__(self, text: str, logged: str) -> None:
         self._text, self._logged, self._was_told = text, logged, False
@@ -58,9 +58,9 @@ def within(progress: Progress | None, start: float, stop: float) -> Progress | N
 
     Examples
     --------
-    >>> told = []
-    >>> within(lambda fraction, step: told.append(fraction), 0.5, 1.0)(0.5, "halfway")
-    >>> told
+    >>> seen = []
+    >>> within(lambda fraction, step: seen.append(fraction), 0.5, 1.0)(0.5, "halfway")
+    >>> seen
     [0.75]
     """
     if progress is None:

@@ -1,4 +1,4 @@
-"""The public names, all of which importing this module imports; `signedheat` does when one is first asked for."""
+"""The public names, all of which importing this module imports; `signedheat` imports it at the first use of one."""
 
 from . import batches, errors, io, morphology, results, torch, view  # noqa: F401  makes them sh.batches and so on
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet

@@ -33,8 +33,8 @@ class OutsideMesh(Note):
     area_left_out: NDArray[np.float64]
 
     def __str__(self) -> str:
-        told = zip(self.sources_outside, self.area_left_out, strict=True)
-        return "; ".join(f"source {k} outside the mesh: {100 * part:.3g} % of its area, left out" for k, part in told)
+        shares = zip(self.sources_outside, self.area_left_out, strict=True)
+        return "; ".join(f"source {k} outside the mesh: {100 * part:.3g} % of its area, left out" for k, part in shares)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,7 +52,7 @@ class ShapeOriented(Note):
     cavities: int
 
     def __str__(self) -> str:
-        told = [
+        texts = [
             (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.1%} of the area"),
             (self.merged_faces, f"duplicate faces merged: {self.merged_faces}"),
             (self.nonorientable_parts, f"parts that cannot be oriented: {self.nonorientable_parts}"),
@@ -61,7 +61,7 @@ class ShapeOriented(Note):
             (self.cavities, f"cavities: {self.cavities}"),
             (self.undecided_area, f"sheets without an inside: {self.undecided_area:.1%} of the area"),
         ]
-        return "; ".join(text for value, text in told if value) or "faces are oriented as they were given"
+        return "; ".join(text for value, text in texts if value) or "faces are oriented as they were given"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,29 +119,26 @@ class FacesRestored(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SharpenedToShape(Note):
-    """Fraction of the faces left out because they lie in layers, and of the zero set that stands in for faces."""
+    """Fraction of the zero set's triangles that distance is measured to, where the shape has no faces."""
 
-    layered_faces: float
     completed_zero_set: float
 
     def __str__(self) -> str:
-        return (
-            f"{self.completed_zero_set:.1%} of the zero set completed, {self.layered_faces:.1%} of the faces in layers"
-        )
+        return f"{self.completed_zero_set:.1%} of the zero set completes the shape"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompletedArea(Note):
-    """How much of the zero set stands in for missing surface.
+    """How much of the surface of a solid is its completion, not a face that was given.
 
     Attributes
     ----------
     completed_area : float
-        Area of the zero set farther than 1.5 cells from any face, in squared units of length.
+        Area of the completion, in squared units of length.
     completed_share : float
-        The same, over the area of the whole zero set.
+        The same, over the area of the whole surface.
     where : (k, 2, d) float
-        Lower and upper corners of boxes around its largest connected parts, largest first; at most five.
+        Lower and upper corners of boxes around it.
     """
 
     completed_area: float
@@ -149,21 +146,11 @@ class CompletedArea(Note):
     where: NDArray[np.float64]
 
     def __str__(self) -> str:
-        told = f"{self.completed_share:.1%} of the surface is completed"
+        text = f"{self.completed_share:.1%} of the surface is completed"
         if not len(self.where):
-            return told
+            return text
         lower, upper = ("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in self.where[0])
-        return f"{told}, most of it between {lower} and {upper}"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ReachesBox(Note):
-    """The zero set leaves the grid, where it is cut off: fraction of the nodes on the walls that are inside."""
-
-    inside_on_walls: float
-
-    def __str__(self) -> str:
-        return f"the surface reaches the walls of the grid, of which {self.inside_on_walls:.1%} are inside"
+        return f"{text}, most of it between {lower} and {upper}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -115,7 +115,7 @@ class SlopeErrors(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SharpenedToCurves(Note):
-    """What a field sharpened to curves was measured to, and how its sides were told.
+    """What distance of a field sharpened to curves is measured to, and what decided its sign.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class SharpenedToCurves(Note):
     free_ends : int
         Ends of oriented curves, but for those at the boundary of the surface, and points where curves run head to head.
     sides_by_curves : float
-        Fraction of the vertices whose side the curves tell by themselves; φ tells that of the others.
+        Fraction of the vertices whose sign the curves decide by themselves; φ decides that of the others.
     """
 
     completed_length: float
@@ -134,7 +134,7 @@ class SharpenedToCurves(Note):
     def __str__(self) -> str:
         return (
             f"{self.completed_length:.1%} of the curve completed between {self.free_ends} free ends; "
-            f"curves tell the side of {self.sides_by_curves:.1%} of the vertices"
+            f"curves decide the sign of {self.sides_by_curves:.1%} of the vertices"
         )
 
 

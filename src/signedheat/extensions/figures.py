@@ -14,7 +14,6 @@ from ..diagnostics import (
     FacesRestored,
     LeftOut,
     OrientedPoints,
-    ReachesBox,
     SampledSource,
     ShapeOriented,
 )
@@ -47,8 +46,6 @@ def told(field: GridField | TetField) -> list[str]:
         elif isinstance(note, CompletedArea) and note.completed_share > TOLD:
             lines.append(str(note))
         elif isinstance(note, BoundsNothing) and note.open_area > TOLD:
-            lines.append(str(note))
-        elif isinstance(note, ReachesBox):
             lines.append(str(note))
     return lines
 
@@ -83,8 +80,8 @@ def snake(name: str) -> str:
 
     Examples
     --------
-    >>> snake("ReachesBox")
-    'reaches_box'
+    >>> snake("BoundsNothing")
+    'bounds_nothing'
     """
     return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 

@@ -150,17 +150,6 @@ def _(shape: PointCloud) -> AreaElements:
     return AreaElements(shape.points[:, None], areas[:, None] * shape.normals, areas, components, spacing)
 
 
-def grid_around(shapes: Sequence[Any], resolution: int, padding: float | None = None) -> Grid:
-    """A grid of cubic cells around shapes, with `resolution` nodes along its longest side.
-
-    Examples
-    --------
-    >>> grid_around([PointCloud([[0, 0, 0], [1, 2, 4]])], 7, padding=1.0)
-    Grid(origin=[-1, -1, -1], spacing=1, shape=(4, 5, 7))
-    """
-    return Grid.around(bounds_around(shapes), resolution, padding)
-
-
 def bounds_around(shapes: Sequence[Any]) -> NDArray[np.float64]:
     """(2, d) lower and upper corner of the box around shapes that have area elements."""
     for shape in shapes:
@@ -249,7 +238,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
     left = float(np.linalg.norm(joined[1], axis=1).sum() / joined[2].sum())
     if left < ROUNDING:
         raise CancellingNormalsError(
-            "the normals of the source cancel each other everywhere, so that nothing tells inside from outside",
+            "the normals of the source cancel each other everywhere, so that nothing separates inside from outside",
             remedy="remove or turn one of its coinciding sides",
         )
     outside = max(0.0, 1.0 - inside / total)

@@ -23,7 +23,7 @@ from ..solids.joining import Shape, joined_triangles
 from .tet_distance import Surface, distance_around
 
 NEAR = 2.0
-"""Mean edges from a face within which it tells the side."""
+"""Mean edges from a face within which its side decides the sign."""
 FAR = 1.5
 """Mean edges: the zero set farther than that from any face stands for missing surface."""
 
@@ -32,7 +32,7 @@ FAR = 1.5
 class ToShapes:
     """Distance to shapes, and to the zero set farther than `FAR` mean edges from all their faces.
 
-    Within `NEAR` mean edges of a face the face tells the side, where the shape is closed and consistent around the
+    Within `NEAR` mean edges of a face its side decides the sign, where the shape is closed and consistent around the
     nearest place; elsewhere the field does.
     """
 
@@ -74,9 +74,9 @@ class ToShapes:
         distance, behind = found.distances, values < 0
         if n_faces:
             nearest = tree.search(points)
-            told = nearest.regular & (nearest.distances < NEAR * discretization.spacing)
-            told &= (found.nearest < n_faces) & (found.distances <= nearest.distances * (1 + 1e-9))
-            behind = np.where(told, nearest.cosines < 0, behind)
+            decided = nearest.regular & (nearest.distances < NEAR * discretization.spacing)
+            decided &= (found.nearest < n_faces) & (found.distances <= nearest.distances * (1 + 1e-9))
+            behind = np.where(decided, nearest.cosines < 0, behind)
         share = float(missing.mean()) if len(missing) else 0.0
         signed = np.where(np.isnan(values), np.nan, np.where(behind, -distance, distance))
-        return signed, (RoundCorners(found.hidden), SharpenedToShape(0.0, share))
+        return signed, (RoundCorners(found.hidden), SharpenedToShape(share))
