@@ -15,7 +15,7 @@ from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..geometry.components import connected_components
 from ..geometry.curve_segments import CurveSegments, interpolation_at
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.synchronization import best_signs, nested_groups
+from ..geometry.signed_graph import Links, best_signs, nested_groups
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..parallel import n_threads
 from .strokes import REWARD, Inside, Strokes
@@ -253,7 +253,7 @@ def groups_among(strokes: Strokes, rows: NDArray[np.int64]) -> list[NDArray[np.i
     if len(rows) < 2:
         return []
     tails, heads = np.triu_indices(len(rows), 1)
-    levels = nested_groups(tails, heads, strokes.agreed[rows[tails], rows[heads]], len(rows))
+    levels = nested_groups(Links(tails, heads, strokes.agreed[rows[tails], rows[heads]]), len(rows))
     groups = [rows[level == g] for level in levels for g in range(int(level.max()) + 1)]
     several = {tuple(group.tolist()): group for group in groups if 1 < len(group)}
     return sorted(several.values(), key=lambda group: -strokes.lengths[group].sum())[:GROUPS]

@@ -13,8 +13,8 @@ from ..errors import SourceError
 from .directions import unit
 from .face_pairs import face_pairs
 from .intrinsic_mesh import IntrinsicMesh
+from .signed_graph import Links, signs_of
 from .surface_points import EDGE, VERTEX, LocatedPoints, incident_faces
-from .synchronization import synchronize_signs
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +134,8 @@ def carried_left(
     forward = triangles.edges.forward
     agree = np.where(forward[one, sides[:, 0]] != forward[other, sides[:, 1]], 1.0, -1.0)
     near = around[one] & around[other]
-    votes = agree[near] * pairs.shares[near]
-    signs = synchronize_signs(number[one[near]], number[other[near]], votes, int(around.sum()))[number[telling]]
+    links = Links(number[one[near]], number[other[near]], agree[near] * pairs.shares[near])
+    signs = signs_of(links, int(around.sum()))[number[telling]]
     most = float(np.sign(signs @ lengths)) or signs[0]
     relative: NDArray[np.float64] = signs * most
     return relative

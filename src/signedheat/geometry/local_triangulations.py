@@ -20,7 +20,7 @@ from ..parallel import n_threads
 from .components import connected_components
 from .edges import edge_table
 from .hole_filling import hole_fillings
-from .synchronization import synchronize_signs
+from .signed_graph import Links, signs_of
 
 GIVEN = 1.0
 """Weight of a given normal, beside that of a neighbour in the same plane, of which there are six."""
@@ -183,12 +183,11 @@ def aligned(
     tail, head = edge_table(faces).vertices.T
     parts = connected_components(n, tail, head)
     across = (normals[tail] * normals[head]).sum(axis=1)
-    tails, heads, weights = tail, head, across * np.abs(across)  # planes at a crease tell little
+    links = Links(tail, head, across * np.abs(across))  # planes at a crease say little
     if given is not None:
         own = GIVEN * (normals * given).sum(axis=1)
-        tails, heads = np.concatenate([tail, np.arange(n)]), np.concatenate([head, np.full(n, n)])
-        weights = np.concatenate([weights, own])
-    found = synchronize_signs(tails, heads, weights, n + 1)
+        links = Links.joined(links, Links(np.arange(n), np.full(n, n), own))
+    found = signs_of(links, n + 1)
     signs = (found[:n] * found[n]).astype(np.int64)
     if given is not None:
         preference = np.bincount(parts, signs * (normals * given).sum(axis=1))

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..geometry.synchronization import synchronize_signs
+from ..geometry.signed_graph import Links, signs_of
 from .empty_balls import sign_links
 from .plane_fits import PlaneFits, fit_planes, noisy_sizes
 from .thinning import spread_out
@@ -83,23 +83,22 @@ def outward_signs(
         chosen = np.sort(np.random.default_rng(0).choice(chosen, MOST, replace=False))
     places = fits.places[chosen]
     links, sided = sign_links(places, axes[chosen], fits.reaches[chosen], fits.noisy)
-    tails, heads, weights = links.tails, links.heads, links.weights
     m = len(chosen)
     if given:
-        told = np.bincount(tails, np.abs(weights), m + 1) + np.bincount(heads, np.abs(weights), m + 1)
-        tails, heads = np.concatenate([tails, np.arange(m)]), np.concatenate([heads, np.full(m, m + 1)])
-        weights = np.concatenate([weights, np.full(m, GIVEN_WEIGHT * 0.5 * float(np.median(told[:m])))])
+        typical = 0.5 * float(np.median(links.strength(m + 1)[:m]))
+        as_given = Links(np.arange(m), np.full(m, m + 1), np.full(m, GIVEN_WEIGHT * typical))
+        links = Links.joined(links, as_given)
     nodes = np.arange(m + 2)
     if groups is not None:
         outside = int(groups.max()) + 1
         nodes = np.unique(np.append(groups[chosen], [outside, outside + 1]), return_inverse=True)[1].ravel()
-    found = synchronize_signs(nodes[tails], nodes[heads], weights, int(nodes.max()) + 1)[nodes]
+    found = signs_of(links.renamed(nodes), int(nodes.max()) + 1)[nodes]
     signs = np.zeros(n)
     signs[chosen] = found[:m] * (found[m] if sided else found[m + 1] if given else 1.0)
     rest = np.flatnonzero(signs == 0)
     if len(rest):
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
-    agreed = float((weights * found[tails] * found[heads]).sum()) / max(float(np.abs(weights).sum()), 1e-300)
+    agreed = links.coherence(found)
     signs = signs if groups is None else _shared(signs, groups)
     if given and min((signs < 0).mean(), (signs > 0).mean()) <= DOUBTFUL * (1 - agreed):
         signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)

@@ -9,11 +9,11 @@ Shewchuk & O'Brien 2004.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
+from ..geometry.signed_graph import Links
 
 JOGGLE = 1e-4
 """Part of the distance to neighbours by which points are moved: flat faces and lattices are slow to triangulate."""
@@ -25,29 +25,13 @@ DIRECT_WEIGHT = 0.1
 """Weight of a direct comparison beside that of a ball; that of a ball where the points are noisy."""
 
 
-@dataclass(frozen=True, eq=False)
-class SignLinks:
-    """Pairs of points whose signs are likely equal, where the weight is positive, or opposite, where it is negative.
-
-    Attributes
-    ----------
-    tails, heads : (m,) int
-        Points; one past the last is the outside, whose sign is +1.
-    weights : (m,) float
-        How surely, and which.
-    """
-
-    tails: NDArray[np.int64]
-    heads: NDArray[np.int64]
-    weights: NDArray[np.float64]
-
-
 def sign_links(
     places: NDArray[np.float64], axes: NDArray[np.float64], reaches: NDArray[np.float64], noisy: bool = False
-) -> tuple[SignLinks, bool]:
-    """What balls and neighbours tell about the signs of axes; whether there were balls.
+) -> tuple[Links, bool]:
+    """What balls and neighbours say about the signs of axes; whether there were balls.
 
-    Points in a plane have no tets: then neighbours alone tell, and nothing says which side is out.
+    One node past the points is the outside, whose sign is 1. Points in a plane have no tets: then there are links
+    between neighbours alone, and none with the outside.
 
     Parameters
     ----------
@@ -79,12 +63,8 @@ def sign_links(
     flat = np.ptp(places @ np.linalg.eigh(np.cov(places.T))[1][:, 0]) <= 10 * JOGGLE * float(reaches.max())
     if flat:
         return near, False
-    parts = [near, _ball_links(places, axes, tets.simplices.astype(np.int64)), _hull_links(places, axes, tets)]
-    return SignLinks(
-        np.concatenate([part.tails for part in parts]),
-        np.concatenate([part.heads for part in parts]),
-        np.concatenate([part.weights for part in parts]),
-    ), True
+    balls = _ball_links(places, axes, tets.simplices.astype(np.int64))
+    return Links.joined(near, balls, _hull_links(places, axes, tets)), True
 
 
 def _confidence(cosines: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -92,7 +72,7 @@ def _confidence(cosines: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.abs(cosines) > STEEPEST, np.sign(cosines) * cosines**4, 0.0)
 
 
-def _ball_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: NDArray[np.int64]) -> SignLinks:
+def _ball_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: NDArray[np.int64]) -> Links:
     corners = places[tets]
     u, v, w = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
     uu, vv, ww = ((side * side).sum(axis=1, keepdims=True) for side in (u, v, w))
@@ -109,10 +89,10 @@ def _ball_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: ND
     weights = np.concatenate([sides[:, a] * sides[:, b] for a, b in pairs])
     told = weights != 0
     tails, heads = (np.concatenate([tets[:, pair[k]] for pair in pairs])[told] for k in (0, 1))
-    return SignLinks(tails, heads, weights[told])
+    return Links(tails, heads, weights[told])
 
 
-def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: scipy.spatial.Delaunay) -> SignLinks:
+def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: scipy.spatial.Delaunay) -> Links:
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
     a, b, c = places[faces].transpose(1, 0, 2)
@@ -121,10 +101,10 @@ def _hull_links(places: NDArray[np.float64], axes: NDArray[np.float64], tets: sc
     length = np.linalg.norm(outward, axis=1) * -np.sign((outward * inner).sum(axis=1))
     outward /= np.where(length != 0, length, np.inf)[:, None]
     weights = _confidence(np.einsum("fj,fkj->fk", outward, axes[faces]))
-    return SignLinks(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())
+    return Links(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())
 
 
-def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64], weight: float) -> SignLinks:
+def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64], weight: float) -> Links:
     """Neighbours compared as if on a circle: one axis reflected in the plane midway is the other."""
     n, k = len(places), min(NEARBY, len(places) - 1)
     neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
@@ -134,4 +114,4 @@ def _neighbor_links(places: NDArray[np.float64], axes: NDArray[np.float64], weig
     step /= np.where(length > 0, length, 1.0)[:, None]
     here, there = axes[tails], axes[heads]
     cosines = (here * there).sum(axis=1) - 2 * (here * step).sum(axis=1) * (there * step).sum(axis=1)
-    return SignLinks(tails, heads, weight * _confidence(cosines))
+    return Links(tails, heads, weight * _confidence(cosines))

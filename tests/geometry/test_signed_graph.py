@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from signedheat.geometry.synchronization import best_signs, synchronize_signs
+from signedheat.geometry.signed_graph import Links, best_signs, signs_of
 from signedheat.orientation.plane_fit_kernels import least_eigenvector
 from signedheat.orientation.plane_fits import CLEAN_NEIGHBORS, fit_planes, noise_scale
 from signedheat.orientation.thinning import spread_out
@@ -26,7 +26,7 @@ def test_pairs_that_agree_are_all_satisfied(seed):
     rng = np.random.default_rng(seed)
     tails, heads, weights = random_pairs(rng, 300, 2000)
     truth = rng.choice([-1.0, 1.0], 300)
-    signs = synchronize_signs(tails, heads, weights * truth[tails] * truth[heads], 300)
+    signs = signs_of(Links(tails, heads, weights * truth[tails] * truth[heads]), 300)
     apart = tails != heads
     assert ((signs[tails] * signs[heads]) == (truth[tails] * truth[heads]))[apart].all()
 
@@ -38,7 +38,7 @@ def test_pairs_that_contradict_come_near_the_best(seed):
     n = 10
     tails, heads, weights = random_pairs(rng, n, 40)
     weights *= rng.choice([-1.0, 1.0], 40)
-    signs = synchronize_signs(tails, heads, weights, n)
+    signs = signs_of(Links(tails, heads, weights), n)
     found = agreement(tails, heads, weights, signs)
     best = max(agreement(tails, heads, weights, np.array(s)) for s in itertools.product([-1.0, 1.0], repeat=n))
     assert found >= 0.75 * best  # pairs at random contradict each other as much as pairs can
@@ -50,7 +50,7 @@ def test_pairs_that_contradict_come_near_the_best(seed):
 
 def test_without_pairs_all_signs_are_positive():
     nothing = np.zeros(0, dtype=np.int64)
-    np.testing.assert_array_equal(synchronize_signs(nothing, nothing, np.zeros(0), 3), np.ones(3))
+    np.testing.assert_array_equal(signs_of(Links(nothing, nothing, np.zeros(0)), 3), np.ones(3))
 
 
 def test_least_eigenvector_is_that_of_lapack():

@@ -1,4 +1,4 @@
-"""Signs from what pairs of them say about each other: synchronisation over ±1, by merging and then turning groups."""
+"""Signed graphs: signs ±1 of nodes from links between them, by merging and then turning groups of nodes."""
 
 from __future__ import annotations
 
@@ -14,6 +14,48 @@ _ROUNDS = 50
 
 
 @dataclass(frozen=True, eq=False)
+class Links:
+    """Evidence about pairs of nodes: that their signs are equal, where a weight is positive, or opposite.
+
+    Attributes
+    ----------
+    tails, heads : (m,) int
+        Nodes.
+    weights : (m,) float
+        How sure that is; weights of the same pair add up.
+    """
+
+    tails: NDArray[np.int64]
+    heads: NDArray[np.int64]
+    weights: NDArray[np.float64]
+
+    @classmethod
+    def joined(cls, *parts: Links) -> Links:
+        """All links of several kinds of evidence."""
+        columns = zip(*((part.tails, part.heads, part.weights) for part in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
+
+    def renamed(self, nodes: NDArray[np.int64]) -> Links:
+        """The same links between other nodes: those of which the ones here are part."""
+        return Links(nodes[self.tails], nodes[self.heads], self.weights)
+
+    def scaled(self, factor: float) -> Links:
+        """Links with weights that many times as large."""
+        return Links(self.tails, self.heads, factor * self.weights)
+
+    def strength(self, n_nodes: int) -> NDArray[np.float64]:
+        """(n,) sum of the sizes of the weights at each node."""
+        sizes = np.abs(self.weights)
+        ends = np.bincount(self.tails, sizes, n_nodes), np.bincount(self.heads, sizes, n_nodes)
+        return (ends[0] + ends[1]).astype(np.float64)
+
+    def coherence(self, found: NDArray[np.float64]) -> float:
+        """Share of the weights that signs agree with, less the share that they contradict: 1 if they agree with all."""
+        total = float((self.weights * found[self.tails] * found[self.heads]).sum())
+        return total / max(float(np.abs(self.weights).sum()), np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, eq=False)
 class _Graph:
     """Symmetric weights in rows: neighbours and weights of node i are those from starts[i] to starts[i + 1]."""
 
@@ -26,9 +68,7 @@ class _Graph:
         return len(self.starts) - 1
 
 
-def synchronize_signs(
-    tails: NDArray[np.int64], heads: NDArray[np.int64], weights: NDArray[np.float64], n_nodes: int
-) -> NDArray[np.float64]:
+def signs_of(links: Links, n_nodes: int) -> NDArray[np.float64]:
     """(n,) signs s that make Σ w s_tail s_head large: no sign gains by turning alone, and hardly any group of them.
 
     Groups that tell most about each other merge first, and what they tell about third ones adds up (greedy additive
@@ -37,37 +77,35 @@ def synchronize_signs(
 
     Examples
     --------
-    >>> synchronize_signs(np.array([0, 1, 0]), np.array([1, 2, 2]), np.array([-3.0, 2.0, 1.0]), 3)
+    >>> signs_of(Links(np.array([0, 1, 0]), np.array([1, 2, 2]), np.array([-3.0, 2.0, 1.0])), 3)
     array([ 1., -1., -1.])
     """
-    levels = _contractions(_merged(tails, heads, weights, n_nodes))
+    levels = _contractions(_merged(links, n_nodes))
     result = np.ones(int(levels[-1][1].max()) + 1 if levels else n_nodes)
-    for graph, groups, signs in reversed(levels):
-        result = result[groups] * signs
+    for graph, groups, within in reversed(levels):
+        result = result[groups] * within
         turn_where_better(graph.starts, graph.neighbors, graph.weights, result, _ROUNDS)
     return result
 
 
-def nested_groups(
-    tails: NDArray[np.int64], heads: NDArray[np.int64], weights: NDArray[np.float64], n_nodes: int
-) -> list[NDArray[np.int64]]:
-    """The groups that `synchronize_signs` merges, each (n,) group of every node: the few large ones first.
+def nested_groups(links: Links, n_nodes: int) -> list[NDArray[np.int64]]:
+    """The groups that `signs_of` merges, each (n,) group of every node: the few large ones first.
 
     Examples
     --------
-    >>> levels = nested_groups(np.array([0, 2, 1]), np.array([1, 3, 2]), np.array([5.0, -4.0, 0.1]), 4)
+    >>> levels = nested_groups(Links(np.array([0, 2, 1]), np.array([1, 3, 2]), np.array([5.0, -4.0, 0.1])), 4)
     >>> [level.tolist() for level in levels]
     [[0, 0, 0, 0], [0, 0, 1, 1]]
     """
     levels, found = [], np.arange(n_nodes)
-    for _, groups, _ in _contractions(_merged(tails, heads, weights, n_nodes)):
+    for _, groups, _ in _contractions(_merged(links, n_nodes)):
         found = groups[found]
         levels.append(found)
     return levels[::-1]
 
 
 def best_signs(weights: NDArray[np.float64], first: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) signs s that make ``sᵀ W s`` large, of a dense symmetric matrix: more thorough than `synchronize_signs`.
+    """(n,) signs s that make ``sᵀ W s`` large, of a dense symmetric matrix: more thorough than `signs_of`.
 
     From several starts, the groups in which signs synchronise, on all levels, are turned as long as that gains; the
     best is taken.
@@ -77,7 +115,7 @@ def best_signs(weights: NDArray[np.float64], first: NDArray[np.float64]) -> NDAr
     weights : (n, n) float
         W; its diagonal does not matter.
     first : (n,) float
-        Signs ±1 to start from, beside those that `synchronize_signs` finds and those of the first two eigenvectors.
+        Signs ±1 to start from, beside those that `signs_of` finds and those of the first two eigenvectors.
 
     Examples
     --------
@@ -87,51 +125,51 @@ def best_signs(weights: NDArray[np.float64], first: NDArray[np.float64]) -> NDAr
     n = len(weights)
     weights = np.where(np.eye(n, dtype=bool), 0.0, weights)
     tails, heads = np.triu_indices(n, 1)
-    pairs = weights[tails, heads]
-    synchronized = synchronize_signs(tails, heads, pairs, n)
+    links = Links(tails, heads, weights[tails, heads])
     vectors = eigh(weights, subset_by_index=[max(n - 2, 0), n - 1])[1].T
-    starts = [first, synchronized, *np.where(vectors < 0, -1.0, 1.0)]
-    levels = [np.arange(n), *reversed(nested_groups(tails, heads, pairs, n))]
+    starts = [first, signs_of(links, n), *np.where(vectors < 0, -1.0, 1.0)]
+    levels = [np.arange(n), *reversed(nested_groups(links, n))]
     groups = [np.flatnonzero(level == group) for level in levels for group in range(int(level.max()) + 1)]
     found = [_turned_in_groups(weights, groups, start.copy()) for start in starts]
-    return max(found, key=lambda signs: float(signs @ weights @ signs))
+    return max(found, key=lambda one: float(one @ weights @ one))
 
 
 def _turned_in_groups(
-    weights: NDArray[np.float64], groups: list[NDArray[np.int64]], signs: NDArray[np.float64]
+    weights: NDArray[np.float64], groups: list[NDArray[np.int64]], found: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Signs, with groups turned, one after the other, that agree more with the others then, until none does."""
-    told, least = weights @ signs, 1e-12 * float(np.abs(weights).sum())
+    told, least = weights @ found, 1e-12 * float(np.abs(weights).sum())
     for _ in range(_ROUNDS):
         turned = False
         for group in groups:
-            own = signs[group]
+            own = found[group]
             outside = float(own @ told[group] - own @ weights[np.ix_(group, group)] @ own)
             if outside < -least:
-                signs[group] = -own
+                found[group] = -own
                 told -= 2 * weights[:, group] @ own
                 turned = True
         if not turned:
             break
-    return signs
+    return found
 
 
 def _contractions(graph: _Graph) -> list[tuple[_Graph, NDArray[np.int64], NDArray[np.float64]]]:
     """Each graph, the group of each of its nodes and the sign in it, until nothing is left to tell."""
     levels = []
     while len(graph.neighbors):
-        groups, signs = _contraction(graph)
-        levels.append((graph, groups, signs))
+        groups, within = _contraction(graph)
+        levels.append((graph, groups, within))
         rows = np.repeat(np.arange(graph.n_nodes), np.diff(graph.starts))
         once = rows < graph.neighbors
         tails, heads = rows[once], graph.neighbors[once]
-        weights = graph.weights[once] * signs[tails] * signs[heads]
-        graph = _merged(groups[tails], groups[heads], weights, int(groups.max()) + 1)
+        weights = graph.weights[once] * within[tails] * within[heads]
+        graph = _merged(Links(groups[tails], groups[heads], weights), int(groups.max()) + 1)
     return levels
 
 
-def _merged(tails: NDArray[np.int64], heads: NDArray[np.int64], weights: NDArray[np.float64], n_nodes: int) -> _Graph:
+def _merged(links: Links, n_nodes: int) -> _Graph:
     """Rows of the sums of weights between different nodes, those that cancel left out."""
+    tails, heads, weights = links.tails, links.heads, links.weights
     apart = tails != heads
     low, high = np.minimum(tails, heads)[apart], np.maximum(tails, heads)[apart]
     pairs, which = np.unique(low * n_nodes + high, return_inverse=True)
