@@ -54,6 +54,23 @@ def test_sides_of_a_box_close_flat(without):
     np.testing.assert_allclose(solid.distance([[0.5, 1.0, 0.25], [0.5, 1.0, 1.5]]), [-0.25, 1.0], atol=1e-12)
 
 
+@pytest.mark.parametrize("without", [(1, 5), (1, 3, 5), (0, 1, 5)])
+@pytest.mark.parametrize("slant", [0.0, 0.3])
+def test_sides_of_a_box_that_touch_come_back_with_their_edges_and_corner(without, slant):
+    vertices, faces = box((1.0, 1.2, 0.9), without=without)
+    vertices[:, 0] += slant * vertices[:, 2]
+    solid = sh.complete((vertices, faces))
+    assert volume(solid) == pytest.approx(1.08, rel=1e-9)
+
+
+@pytest.mark.parametrize("center", [(1.0, 1.0, 0.5), (1.0, 1.0, 1.0)])
+def test_holes_over_an_edge_and_a_corner_of_a_box_close_to_the_box(center):
+    vertices, faces = box(n=12)
+    kept = np.linalg.norm(vertices[faces].mean(axis=1) - center, axis=1) > 0.35
+    solid = sh.complete((vertices, faces[kept]))
+    assert volume(solid) == pytest.approx(1.0, rel=1e-9)
+
+
 @pytest.mark.parametrize("height", [0.3, 0.03, 0.003])
 def test_a_tray_is_a_solid_however_low_its_walls_are(height):
     solid = sh.complete(box((1.0, 1.0, height), without=(5,)))

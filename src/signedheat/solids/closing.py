@@ -9,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..geometry.components import connected_components
-from . import bending, lids
+from . import bending, creases, lids
 from .rims import loops, meeting_edges, open_edges
 
 SIDES = 100
@@ -133,7 +133,7 @@ def _lid(
     near = bending.samples_near(own, patches, scipy.spatial.cKDTree(rim), bending.REACH * width)
     normals, curvatures, held = bending.continuation(flat, near, ends[_edges_at(rim, corners)], width)
     if held.max() <= bending.FREE:
-        return flat
+        return creases.creased(rim, normals) or flat
     return lids.plate(flat, normals, curvatures, held)
 
 
