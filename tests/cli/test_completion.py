@@ -6,8 +6,8 @@ import subprocess
 import pytest
 
 from signedheat.cli import main
-from signedheat.cli.completion import commands_of
-from signedheat.cli.parser import parser
+from signedheat.cli.options import parser_of
+from signedheat.cli.shell import COMMANDS, commands_of
 
 BASH = shutil.which("bash")
 
@@ -31,7 +31,7 @@ def complete(tmp_path_factory):
 @pytest.mark.skipif(BASH is None, reason="there is no bash")
 def test_bash_completes_commands_options_and_choices(complete, capsys):
     assert complete(capsys, "signedheat", "vol") == ["volume"]
-    assert set(complete(capsys, "signedheat", "")) == set(commands_of(parser()))
+    assert set(complete(capsys, "signedheat", "")) == set(commands_of(parser_of(COMMANDS)))
     assert complete(capsys, "signedheat", "offset", "a.stl", "--pad") == ["--padding"]
     assert complete(capsys, "signedheat", "sample", "--layout", "") == ["arrays", "deepsdf"]
     assert "closing" in complete(capsys, "signedheat", "morph", "")
@@ -47,6 +47,6 @@ def test_zsh_takes_the_script(capsys):
 def test_every_command_and_option_is_in_the_script(capsys):
     assert main(["completion", "zsh"]) == 0
     text = capsys.readouterr().out
-    for name, command in commands_of(parser()).items():
+    for name, command in commands_of(parser_of(COMMANDS)).items():
         assert f"{name}) offered=" in text
         assert all(option in text for action in command._actions for option in action.option_strings)

@@ -20,7 +20,8 @@ from fuzz.frame import Wrong, family
 from fuzz.inputs import Random, chance, one_of
 from signedheat import memory, samples
 from signedheat.cli import main
-from signedheat.cli.parser import parser
+from signedheat.cli.options import parser_of
+from signedheat.cli.shell import COMMANDS as DECLARED
 
 FREE = 600_000_000
 """Bytes that commands are told to be free, so that what is refused for its size is refused soon."""
@@ -118,7 +119,7 @@ def build(random: Random, folder: Path) -> Command:
 
 
 def _subparsers() -> dict[str, Any]:
-    return next(action.choices for action in parser()._actions if getattr(action, "choices", None))
+    return next(action.choices for action in parser_of(DECLARED)._actions if getattr(action, "choices", None))
 
 
 def _positional(random: Random, action: Action, files: dict[str, str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The command line: a module for each command, which declares what it takes and runs it.
+"""The command line: commands are declared where they are run, `solids`, `curves`, `batch`, `info`, `view`, `shell`.
 
 However a command ends, it ends here: with a status, and with one line on standard error if it failed.
 """
@@ -16,8 +16,8 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import SignedHeatError
-from .signals import Signals
-from .streams import open_standard_streams, say, tell
+from .options import parser_of
+from .terminal import Signals, open_standard_streams, say, write_out
 
 FAILED, BUG = 1, 70
 
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     """Everything else is imported here, where all that may go wrong is caught."""
-    arguments = import_module(f"{__name__}.parser").parser().parse_args(argv)
+    arguments = parser_of(import_module(f"{__name__}.shell").COMMANDS).parse_args(argv)
     if arguments.check is not None:
         arguments.check(arguments)
     import_module("signedheat.public")
@@ -62,9 +62,9 @@ def _run(argv: Sequence[str] | None) -> int:
     with import_module(f"{__name__}.standard").standard_files(arguments) as standard:
         summary, text = arguments.run(arguments)
     if arguments.json and not standard.takes_output:
-        tell(standard.named(json.dumps(summary)))
+        write_out(standard.named(json.dumps(summary)))
     elif text and not (arguments.quiet or standard.takes_output):
-        tell(standard.named(text))
+        write_out(standard.named(text))
     return FAILED if summary.get("failed") else 0  # of many, some
 
 

@@ -1,4 +1,4 @@
-"""``signedheat batch``: the same for many shapes."""
+"""Commands about many shapes: `batch` and `watertight`."""
 
 from __future__ import annotations
 
@@ -12,73 +12,83 @@ import signedheat as sh
 
 from ..errors import SignedHeatError, SourceError
 from .options import (
+    METHOD,
     MOST_WORKERS,
+    ROOM,
+    SAMPLING,
+    SCHEDULER,
+    STEPS,
     Summary,
-    add_command,
-    add_many_options,
-    add_method_options,
-    add_room_options,
-    add_sampling_options,
-    add_step_options,
-    check_grid_options,
+    check_grid,
+    command,
     finite,
+    group,
+    is_quiet,
+    option,
+    output,
+    positive,
+    refuse_together,
     whole_number,
+    workers,
 )
-from .parts import computing, pool
-from .progress import ProgressBar
-from .streams import say, tell
+from .parts import pool, shapes
+from .parts import watertight as closed_meshes
+from .terminal import ProgressBar, say, write_out
 
-
-def add_to(commands: Any) -> None:
-    """Declare the command."""
-    parser = add_command(
-        commands,
-        "batch",
-        run,
-        check,
-        help="the same for many shapes",
-        description="Fields, offsets, samples and reports of many shapes, each in a process of its own, with a "
-        "manifest of what came of each. What is done is skipped when the batch is started again.",
-    )
-    parser.usage = "%(prog)s FILE [FILE ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]"
-    add_many_options(parser)
-    wanted = parser.add_argument_group("what is made of each shape, one or more of")
-    wanted.add_argument(
+MANY = (
+    option(
+        "inputs",
+        metavar="FILE",
+        nargs="+",
+        help="files, folders with all in them, patterns in quotes; - takes a list from standard input, a line for each",
+    ),
+    output("results, and manifest.jsonl", "FOLDER"),
+    option("--surface", choices=("stl", "obj", "ply", "off", "vtp"), default="stl", help="files of surfaces (stl)"),
+    workers("processes (one for each processor)"),
+    option("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up"),
+)
+"""What commands take that make something of many shapes."""
+WANTED = group(
+    "what is made of each shape, one or more of",
+    option(
         "--volume",
         nargs="?",
         const="npz",
         choices=("npz", "vti", "nrrd", "npy", "vdb"),
         help="the field, as .npz if nothing is said",
-    )
-    wanted.add_argument(
-        "--offset", type=finite, nargs="+", default=[], metavar="D", help="closed surfaces at distances"
-    )
-    wanted.add_argument(
+    ),
+    option("--offset", type=finite, nargs="+", default=[], metavar="D", help="closed surfaces at distances"),
+    option(
         "--sample", type=whole_number(1), nargs="?", const=250_000, metavar="N", help="points to learn from (250000)"
-    )
-    wanted.add_argument("--info", action="store_true", help="counts and defects, in the manifest")
-    running = parser.add_argument_group("running")
-    running.add_argument(
-        "--threads", type=whole_number(1, MOST_WORKERS), default=1, metavar="N", help="threads of each process (1)"
-    )
-    running.add_argument("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
-    add_sampling_options(parser)
-    add_room_options(parser)
-    add_step_options(parser)
-    add_method_options(parser)
-    parser.set_defaults(origin=None, grid_shape=None, mask=None)
+    ),
+    option("--info", action="store_true", help="counts and defects, in the manifest"),
+)
+RUNNING = group(
+    "running",
+    option("--threads", type=whole_number(1, MOST_WORKERS), default=1, metavar="N", help="threads of each process (1)"),
+    SCHEDULER,
+)
 
 
-def check(arguments: Namespace) -> None:
+def check_batch(arguments: Namespace) -> None:
     """Reject what asks for nothing, and options that contradict each other."""
-    check_grid_options(arguments)
+    check_grid(arguments)
     try:
         job_of(arguments)
     except SignedHeatError as problem:
         arguments.parser.error(str(problem))
 
 
-def run(arguments: Namespace) -> Summary:
+@command(
+    "batch",
+    "the same for many shapes",
+    "Fields, offsets, samples and reports of many shapes, each in a process of its own, with a manifest of what came "
+    "of each. What is done is skipped when the batch is started again.",
+    *(*MANY, WANTED, RUNNING, SAMPLING, ROOM, STEPS, METHOD),
+    check=check_batch,
+    usage="FILE [FILE ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]",
+)
+def batch(arguments: Namespace) -> Summary:
     """Do the job for every shape."""
     options = {"threads": arguments.threads, "scheduler": arguments.scheduler}
     done = made_of_each(arguments, job_of(arguments), **options)
@@ -94,9 +104,44 @@ def run(arguments: Namespace) -> Summary:
         "seconds": round(seconds, 3),
         "failed": len(done.failures),
     }
-    told = ", ".join(f"{number} {state}" for state, number in counts.items())
+    each = ", ".join(f"{number} {state}" for state, number in counts.items())
     before = f" ({done.skipped} of them before)" if done.skipped else ""
-    return summary, f"{done.manifest}: {len(states)} shapes, {told}{before}, {pool.duration(seconds)} of work"
+    return summary, f"{done.manifest}: {len(states)} shapes, {each}{before}, {pool.duration(seconds)} of work"
+
+
+@command(
+    "watertight",
+    "closed meshes of broken shapes",
+    "The closed mesh of each shape, and a line that says what it is: bodies, volume, what was completed, how far it is "
+    "from the faces that were given, and back. Faces are kept where they bound the solid and join with its completion; "
+    "otherwise the surface is contoured with its edges and corners. Sheets are refused unless they are given a "
+    "thickness.",
+    *MANY,
+    option("--thickness", type=positive, metavar="D", help="of the solids around sheets"),
+    option("--contour", action="store_true", help="contour everything: even triangles in place of few"),
+    option("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side, for contours (256)"),
+    option("--spacing", type=positive, metavar="H", help="cells of contours, in units of the file"),
+    check=lambda arguments: refuse_together(arguments, "--spacing", "--resolution"),
+)
+def watertight(arguments: Namespace) -> Summary:
+    """Do it for every shape; a line for each."""
+    job = sh.batches.Watertight(
+        surfaces=f".{arguments.surface}",
+        thickness=arguments.thickness,
+        contoured=arguments.contour,
+        resolution=arguments.resolution or 256,
+        spacing=arguments.spacing,
+    )
+    done = made_of_each(arguments, job, closed_meshes.in_words)
+    summary = {
+        "inputs": arguments.inputs,
+        "manifest": str(done.manifest),
+        "shapes": [{"output": each.outputs, **each.figures} for each in done.outcomes if each.is_done],
+        "skipped": done.skipped,
+        "failed": len(done.failures),
+    }
+    closed = len(done.outcomes) - len(done.failures)
+    return summary, f"{done.manifest}: {closed} of {len(done.outcomes)} shapes closed"
 
 
 def made_of_each(
@@ -107,26 +152,18 @@ def made_of_each(
 ) -> sh.batches.Batch:
     """Do a job for every shape: a line on standard error for each that is not done, and perhaps one for each that is.
 
-    Parameters
-    ----------
-    arguments : Namespace
-        With those of `add_many_options`.
-    job : callable
-        As for `signedheat.batches.run`.
-    in_words : callable, optional
-        The line about a shape that is done, from its figures.
-    **options
-        Further ones of `signedheat.batches.run`.
+    `in_words` makes the line about a shape that is done, from its figures; `options` are further ones of
+    `signedheat.batches.run`.
     """
-    with ProgressBar(arguments.quiet or arguments.json) as progress:
+    with ProgressBar(is_quiet(arguments)) as progress:
 
         def report(outcome: sh.batches.Outcome) -> None:
             if not outcome.is_done:
                 progress.clear()
                 say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
-            elif in_words is not None and not (arguments.quiet or arguments.json):
+            elif in_words is not None and not is_quiet(arguments):
                 progress.clear()
-                tell(f"{outcome.outputs[0]}: {in_words(dict(outcome.figures))}")
+                write_out(f"{outcome.outputs[0]}: {in_words(dict(outcome.figures))}")
 
         return sh.batches.run(
             listed(arguments.inputs),
@@ -146,7 +183,7 @@ def listed(inputs: list[str]) -> list[str]:
     Raises
     ------
     SourceError
-        If standard input is asked for and has no lines.
+        If standard input is to be read and has no lines.
     """
     if "-" not in inputs:
         return inputs
@@ -176,11 +213,11 @@ def job_of(arguments: Namespace) -> sh.batches.Job:
         surfaces=f".{arguments.surface}",
         samples=sampling,
         info=arguments.info,
-        resolution=arguments.resolution or computing.RESOLUTION,
+        resolution=arguments.resolution or shapes.RESOLUTION,
         spacing=spacing[0] if spacing is not None and len(spacing) == 1 else spacing,
         padding=arguments.padding,
         band=arguments.band,
-        constraint=computing.constraint_of(arguments.constraint),
+        constraint=shapes.constraint_of(arguments.constraint),
         diffusion=arguments.diffusion,
         as_oriented=arguments.as_oriented,
         keep_overlaps=arguments.keep_overlaps,

@@ -4,48 +4,17 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
-from typing import Any
 
 from ..errors import SignedHeatError
-from .options import Summary, add_command, whole_number
+from .options import Summary, command, option, whole_number
 from .parts import reports
-from .streams import say
+from .terminal import say_error
 
 CURVES = (".txt", ".json")
 """Extensions of files that have curves, and nothing else."""
 
 
-def add_to(commands: Any) -> None:
-    """Declare the command."""
-    parser = add_command(
-        commands,
-        "info",
-        run,
-        check,
-        help="what a file holds and what is wrong with it",
-        description="Counts, open, nonmanifold and inconsistent edges, degenerate and duplicate elements, bounds; "
-        "which way the parts of a mesh face, doubled walls, bodies within others, sheets, the thinnest wall and gap; "
-        "the memory that grids around a shape take. Of a field: its grid and range.",
-    )
-    parser.usage = "%(prog)s FILE [FILE ...] [--curves CURVES] [options]"
-    parser.add_argument(
-        "files",
-        metavar="FILE",
-        nargs="+",
-        help="shapes, polylines in the plane or fields; a .txt or .json file after a shape has curves on it",
-    )
-    parser.add_argument("--curves", metavar="CURVES", help="curves on the shape: .txt .json .obj .csv")
-    parser.add_argument(
-        "--resolution",
-        type=whole_number(2),
-        nargs="+",
-        default=[64, 128, 256, 512],
-        metavar="N",
-        help="resolutions at which to estimate memory",
-    )
-
-
-def check(arguments: Namespace) -> None:
+def check_files(arguments: Namespace) -> None:
     """Tell curves from files, and reject those of several shapes."""
     last = Path(arguments.files[-1]).suffix.lower()
     if len(arguments.files) == 2 and last in CURVES and arguments.curves is None:
@@ -54,7 +23,31 @@ def check(arguments: Namespace) -> None:
         arguments.parser.error(f"curves lie on one shape, and there are {len(arguments.files)}")
 
 
-def run(arguments: Namespace) -> Summary:
+@command(
+    "info",
+    "what a file holds and what is wrong with it",
+    "Counts, open, nonmanifold and inconsistent edges, degenerate and duplicate elements, bounds; which way the parts "
+    "of a mesh face, doubled walls, bodies within others, sheets, the thinnest wall and gap; the memory that grids "
+    "around a shape take. Of a field: its grid and range.",
+    option(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="shapes, polylines in the plane or fields; a .txt or .json file after a shape has curves on it",
+    ),
+    option("--curves", metavar="CURVES", help="curves on the shape: .txt .json .obj .csv"),
+    option(
+        "--resolution",
+        type=whole_number(2),
+        nargs="+",
+        default=[64, 128, 256, 512],
+        metavar="N",
+        help="resolutions at which to estimate memory",
+    ),
+    check=check_files,
+    usage="FILE [FILE ...] [--curves CURVES] [options]",
+)
+def info(arguments: Namespace) -> Summary:
     """Inspect files; of several, those that cannot be read do not stop the others."""
     if len(arguments.files) == 1:
         return reports.report(arguments.files[0], arguments)
@@ -63,7 +56,7 @@ def run(arguments: Namespace) -> Summary:
         try:
             summary, text = reports.report(file, arguments)
         except SignedHeatError as error:
-            say(f"signedheat: {' '.join(str(error if error.path else error.at(file)).split())}")
+            say_error(error if error.path else error.at(file))
             failed += 1
         else:
             summaries.append(summary)

@@ -1,29 +1,45 @@
-"""Options that several commands share, and the forms that their values must have."""
+"""How commands are declared: options as data beside the function that runs them, and one parser made of all.
+
+Nothing here imports NumPy, so that help and errors of usage come at once.
+"""
 
 from __future__ import annotations
 
 import argparse
 import math
 import re
-from collections.abc import Callable
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
-from .streams import say, tell
+from .. import __version__
+from .terminal import say, write_out
 
 Summary: TypeAlias = tuple[dict[str, Any], str]
 """The result of a command: a dictionary for ``--json``, and text."""
+Run: TypeAlias = Callable[[Namespace], Summary]
+Check: TypeAlias = Callable[[Namespace], None]
+
 MOST_WORKERS = 1024
 PLANAR = (".csv", ".svg")
 """Extensions of files with polylines in the plane."""
 IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
 """Extensions of files that may have images of labels."""
+SURFACES = "surface: .stl .obj .ply .off .vtp"
 UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
 """Units of length."""
-LINES = "; in the plane, polylines: .svg .csv"
-"""What else is a shape, for commands that take lines."""
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component")
 """Names of the constraints that have no number."""
+ABSENT: Mapping[str, Any] = {
+    **dict.fromkeys(("origin", "grid_shape", "mask", "spacing", "padding", "resolution", "band", "preview")),
+    **dict.fromkeys(("tiles", "workers", "scheduler", "label", "units", "transform")),
+    **dict.fromkeys(("as_oriented", "keep_overlaps", "plain"), False),
+    "constraint": "zero-set",
+    "diffusion": 1.0,
+}
+"""Values of the options that a command does not have, so that all commands can share what reads them."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -39,289 +55,117 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
     def _print_message(self, message: str, file: object = None) -> None:
-        tell(message.rstrip("\n"))  # help and version, the only messages that are no errors
+        write_out(message.rstrip("\n"))  # help and version, the only messages that are no errors
 
 
-def add_command(
-    commands: Any,
+@dataclass(frozen=True)
+class Option:
+    """An argument of a command: its names, and what argparse is to know about it."""
+
+    names: tuple[str, ...]
+    settings: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Options under a title of their own."""
+
+    title: str
+    options: tuple[Option, ...]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: what `command` declares, and the function that runs it."""
+
+    name: str
+    run: Run
+    help: str
+    description: str
+    options: tuple[Option | Group, ...] = ()
+    check: Check | None = None
+    usage: str | None = None
+    absent: Mapping[str, Any] = field(default_factory=dict)
+
+    def add_to(self, commands: Any) -> None:
+        """Add it to the commands of a parser."""
+        parser = commands.add_parser(self.name, help=self.help, description=self.description)
+        if self.usage is not None:
+            parser.usage = f"%(prog)s {self.usage}"
+        parser.set_defaults(**{**ABSENT, **self.absent}, run=self.run, parser=parser, check=self.check)
+        parser.add_argument("--json", action="store_true", help="print a summary as JSON")
+        parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+        for each in self.options:
+            inside = parser.add_argument_group(each.title) if isinstance(each, Group) else parser
+            for given in each.options if isinstance(each, Group) else (each,):
+                inside.add_argument(*given.names, **given.settings)
+
+
+def command(
     name: str,
-    run: Callable[[argparse.Namespace], Summary],
-    check: Callable[[argparse.Namespace], None] | None = None,
-    **texts: str,
-) -> Parser:
-    """Add a command with the options that all commands have.
+    help: str,
+    description: str,
+    *options: Option | Group,
+    check: Check | None = None,
+    usage: str | None = None,
+    **absent: Any,
+) -> Callable[[Run], Command]:
+    """Declare a command: the decorator of the function that runs it.
 
     Parameters
     ----------
-    commands : argparse subparsers
-    name : str
-    run : callable
-        What does it, from the arguments; it returns a summary.
+    name, help, description : str
+        As they stand in the help.
+    *options : Option or Group
+        In the order of the help, after those that all commands have.
     check : callable, optional
         What exits with status 2 where arguments contradict each other.
-    **texts
-        ``help`` and ``description``.
+    usage : str, optional
+        What follows the name of the command in the first line of its help.
+    **absent
+        Values for options that it does not have, if others than those of `ABSENT`.
     """
-    parser: Parser = commands.add_parser(name, **texts)
-    parser.set_defaults(run=run, parser=parser, check=check)
-    parser.add_argument("--json", action="store_true", help="print a summary as JSON")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    return parser
+    return lambda run: Command(name, run, help, description, options, check, usage, absent)
 
 
-def add_shape(parser: Parser, planar: str = "") -> None:
-    """Add the shape that a command is about, with what it may be `planar`."""
-    parser.add_argument(
-        "shape", metavar="SHAPE", help=f"surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc{planar}"
+def parser_of(commands: Iterable[Command]) -> Parser:
+    """The parser of the whole command line."""
+    whole = Parser(
+        prog="signedheat",
+        description="Generalized signed distance to broken geometry: negative inside, positive outside, "
+        "in the units of the file.",
     )
+    whole.add_argument("--version", action="version", version=f"signedheat {__version__}")
+    whole.set_defaults(whole=whole)
+    added = whole.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
+    for each in commands:
+        each.add_to(added)
+    return whole
 
 
-def add_format_option(parser: Parser, standard: str) -> None:
-    """Add the option for what is written to standard output, last, with the format if nothing is said."""
-    parser.add_argument("--format", default=standard, metavar="EXT", help=f"of standard output, with -o - ({standard})")
+def option(*names: str, **settings: Any) -> Option:
+    """An option or an argument, with what argparse is to know about it."""
+    return Option(names, settings)
 
 
-def add_grid_options(parser: Parser) -> None:
-    """Add the options of the grid and of the computation."""
-    grid = add_room_options(parser)
-    grid.add_argument(
-        "--origin", type=finite, nargs="+", metavar="X", help="first node of a grid of your own: X Y Z, or X Y"
-    )
-    grid.add_argument(
-        "--shape",
-        type=whole_number(2),
-        nargs="+",
-        metavar="NX",
-        dest="grid_shape",
-        help="its nodes: NX NY NZ, or NX NY",
-    )
-    grid.add_argument(
-        "--mask",
-        metavar="FILE",
-        help="a grid with walls, which distance goes around (it is not sharpened then): .npy .nrrd .vti, solid where "
-        "not 0; in the plane also .png .bmp .tif, solid where dark",
-    )
-    add_step_options(parser)
-    add_method_options(parser)
-    parser.add_argument("--preview", metavar="PNG", help="draw the result: in space, three slices")
+def group(title: str, *options: Option) -> Group:
+    """Options under a title of their own."""
+    return Group(title, options)
 
 
-def add_placing_options(parser: Parser) -> None:
-    """Add the options that change the units and the place of a shape."""
-    place = parser.add_argument_group("place of the shape (by default that of the file, in its units)")
-    place.add_argument(
-        "--units",
-        type=units,
-        metavar="[FROM:]TO",
-        help="units of all numbers: mm, cm, m, inch, foot, micron; FROM where the file does not say its own, as .3mf "
-        "and .glb do",
-    )
-    place.add_argument(
-        "--transform", nargs="+", metavar="M", help="16 numbers of a matrix by rows, or 12, or a file of them"
-    )
+def output(help: str, metavar: str = "OUT") -> Option:
+    """The option for what is written."""
+    return option("-o", "--output", required=True, metavar=metavar, help=help)
 
 
-def units(word: str) -> str:
-    """One unit, or two with a colon between."""
-    for unit in word.split(":", 1):
-        if unit not in UNITS:
-            raise argparse.ArgumentTypeError(f"'{unit}' is none of {', '.join(UNITS)}")
-    return word
+def format_option(standard: str) -> Option:
+    """The option for what is written to standard output, with the format if nothing is said."""
+    return option("--format", default=standard, metavar="EXT", help=f"of standard output, with -o - ({standard})")
 
 
-def add_up_option(parser: Parser) -> None:
-    """Add the option for pictures in space."""
-    parser.add_argument(
-        "--up", choices=["x", "y", "z"], default="z", help="axis that points upwards in the picture (z)"
-    )
-
-
-def add_label_option(parser: Parser) -> None:
-    """Add the option for images of labels."""
-    parser.add_argument(
-        "--label",
-        type=finite,
-        metavar="N",
-        help="of an image of labels (.nrrd .nii .nii.gz .vti .npy) the voxels with this one; the result lies where "
-        "the image does",
-    )
-
-
-def add_room_options(parser: Parser) -> argparse._ArgumentGroup:
-    """Add the options of a grid around a shape."""
-    grid = parser.add_argument_group("grid (by default around the shape)")
-    grid.add_argument("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side (128)")
-    grid.add_argument(
-        "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each axis"
-    )
-    grid.add_argument("--padding", type=not_negative, metavar="P", help="room around the shape, in its units")
-    grid.add_argument(
-        "--band",
-        type=positive,
-        metavar="B",
-        help="fine nodes only up to this distance from the surface, in the units of the shape, and coarse ones beyond: "
-        "for grids too fine to be computed whole",
-    )
-    return grid
-
-
-def add_many_options(parser: Parser) -> None:
-    """Add the arguments of commands that make something of many shapes."""
-    parser.add_argument(
-        "inputs",
-        metavar="FILE",
-        nargs="+",
-        help="files, folders with all in them, patterns in quotes; - takes a list from standard input, a line for each",
-    )
-    parser.add_argument("-o", "--output", required=True, metavar="FOLDER", help="results, and manifest.jsonl")
-    parser.add_argument(
-        "--surface", choices=("stl", "obj", "ply", "off", "vtp"), default="stl", help="files of surfaces (stl)"
-    )
-    parser.add_argument(
-        "--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help="processes (one for each processor)"
-    )
-    parser.add_argument("--time-limit", type=positive, metavar="S", help="seconds after which a shape is given up")
-
-
-def add_tile_options(parser: Parser) -> None:
-    """Add the options of a band that is computed tile by tile."""
-    tiles = parser.add_argument_group("tiles of a band")
-    tiles.add_argument(
-        "--tiles",
-        metavar="FOLDER",
-        help="compute the band in tiles, which are kept in this folder: for bands larger than memory; the same command "
-        "goes on where it was stopped",
-    )
-    tiles.add_argument(
-        "--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help="processes for them (threads of this one)"
-    )
-    tiles.add_argument("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
-
-
-def add_solid_options(parser: Parser) -> None:
-    """Add the options of distance to a solid on a grid around it, of which nothing but the solid is wanted."""
-    add_room_options(parser)
-    add_repair_options(parser)
-    add_method_options(parser)
-    parser.set_defaults(origin=None, grid_shape=None, mask=None, preview=None, plain=False)
-
-
-def add_method_options(parser: Parser) -> None:
-    """Add the options of the method itself."""
-    method = parser.add_argument_group("method")
-    method.add_argument(
-        "--constraint",
-        type=constraint,
-        default="zero-set",
-        metavar="C",
-        help="free, zero-set (default), hard, each-component, soft, or soft:WEIGHT",
-    )
-    method.add_argument(
-        "--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"
-    )
-
-
-def add_step_options(parser: Parser) -> None:
-    """Add the options that leave out steps which are taken by default."""
-    steps = add_repair_options(parser)
-    steps.add_argument("--plain", action="store_true", help="the method's own field, not measured to the shape itself")
-
-
-def add_repair_options(parser: Parser) -> argparse._ArgumentGroup:
-    """Add the options that take a shape as it is."""
-    steps = parser.add_argument_group("steps (all taken by default)")
-    steps.add_argument("--as-oriented", action="store_true", help="turn no face or normal, put back no face")
-    steps.add_argument("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface")
-    return steps
-
-
-def add_curves(parser: Parser, output: str) -> None:
-    """Add the arguments of a distance to curves on a surface, and of its output."""
-    parser.add_argument(
-        "mesh", metavar="MESH", help="surface, points or voxels: .obj .ply .stl .off .vtp .glb .pc .xyz .npy .nrrd .vti"
-    )
-    parser.add_argument("curves", metavar="CURVES", help="curves and points on it: .txt .obj .json .csv")
-    parser.add_argument("-o", "--output", required=True, metavar="OUT", help=output)
-    parser.add_argument(
-        "--constraint",
-        type=surface_constraint,
-        default="zero-set",
-        metavar="C",
-        help="free, zero-set (default), hard, each-component, soft, soft:WEIGHT, or levels:V,V,…, one for each curve",
-    )
-    parser.add_argument(
-        "--diffusion",
-        type=positive,
-        metavar="T",
-        help="diffusion time in squared spacings (1; with --plain three, extrapolated, unless curves end); larger "
-        "values close gaps more roundly",
-    )
-    parser.add_argument(
-        "--globe",
-        action="store_true",
-        help="the mesh is a globe, and curves are longitudes and latitudes in degrees, joined along great circles: "
-        ".csv .geojson",
-    )
-    parser.add_argument(
-        "--intrinsic",
-        action="store_true",
-        help="run the method on better triangles of the same surface, along whose edges the curves run; by default on "
-        "better triangles where the mesh has large angles",
-    )
-    parser.add_argument(
-        "--plain",
-        action="store_true",
-        help="the method's own field, of the curves as they are given, not measured to the curves themselves",
-    )
-    parser.add_argument("--as-oriented", action="store_true", help="turn no curve, and leave none out")
-    parser.add_argument(
-        "--every-piece", action="store_true", help="leave out no piece, also if it belongs to none of the others"
-    )
-
-
-def add_sampling_options(parser: Parser) -> None:
-    """Add the options that say where samples are taken and how they are kept."""
-    group = parser.add_argument_group("samples")
-    group.add_argument(
-        "--near", type=fraction, default=0.8, metavar="S", help="share near the surface, from 0 to 1 (.8)"
-    )
-    group.add_argument(
-        "--widths",
-        type=not_negative,
-        nargs="+",
-        default=[0.05, 0.0158],
-        metavar="W",
-        help="standard deviations of the noise, over the radius of the shape; each gets the same share (.05 .0158)",
-    )
-    group.add_argument("--seed", type=whole_number(0), default=0, metavar="K", help="of the random numbers (0)")
-    group.add_argument("--normalize", action="store_true", help="move and scale the shape into the unit sphere")
-    group.add_argument(
-        "--layout",
-        choices=("arrays", "deepsdf"),
-        default="arrays",
-        help="arrays: points, distances, gradients, …; deepsdf: pos and neg, single precision (arrays)",
-    )
-
-
-def constraint(word: str, with_numbers: str = "soft, soft:WEIGHT") -> str:
-    """The name of a constraint, with its number if it has one; messages also name those `with_numbers`."""
-    name, _, weight = word.partition(":")
-    if name == "soft":
-        if weight:
-            positive(weight)
-    elif word not in CONSTRAINTS:
-        raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(CONSTRAINTS)}, {with_numbers}")
-    return word
-
-
-def surface_constraint(word: str) -> str:
-    """The name of a constraint, with its numbers; on surfaces also given levels."""
-    name, _, values = word.partition(":")
-    if name == "levels":
-        for value in values.split(","):
-            finite(value)
-        return word
-    return constraint(word, with_numbers="soft, soft:WEIGHT, levels:V,V,…")
+def is_quiet(arguments: Namespace) -> bool:
+    """Whether nothing but the result is to be printed."""
+    return bool(arguments.quiet or arguments.json)
 
 
 def finite(word: str) -> float:
@@ -372,12 +216,165 @@ def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
     return parse
 
 
+def units(word: str) -> str:
+    """One unit, or two with a colon between."""
+    for unit in word.split(":", 1):
+        if unit not in UNITS:
+            raise argparse.ArgumentTypeError(f"'{unit}' is none of {', '.join(UNITS)}")
+    return word
+
+
+def constraint(word: str, with_numbers: str = "soft, soft:WEIGHT") -> str:
+    """The name of a constraint, with its number if it has one; messages also name those `with_numbers`."""
+    name, _, weight = word.partition(":")
+    if name == "soft":
+        if weight:
+            positive(weight)
+    elif word not in CONSTRAINTS:
+        raise argparse.ArgumentTypeError(f"'{word}' is none of {', '.join(CONSTRAINTS)}, {with_numbers}")
+    return word
+
+
+def surface_constraint(word: str) -> str:
+    """The name of a constraint, with its numbers; on surfaces also given levels."""
+    name, _, values = word.partition(":")
+    if name == "levels":
+        for value in values.split(","):
+            finite(value)
+        return word
+    return constraint(word, with_numbers="soft, soft:WEIGHT, levels:V,V,…")
+
+
+def shape_option(planar: str = "") -> Option:
+    """The shape that a command is about, with what it may be `planar`."""
+    return option(
+        "shape", metavar="SHAPE", help=f"surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc{planar}"
+    )
+
+
+FLAT_SHAPE = shape_option("; in the plane, polylines: .svg .csv")
+UP = option("--up", choices=["x", "y", "z"], default="z", help="axis that points upwards in the picture (z)")
+LABEL = option(
+    "--label",
+    type=finite,
+    metavar="N",
+    help="of an image of labels (.nrrd .nii .nii.gz .vti .npy) the voxels with this one; the result lies where the "
+    "image does",
+)
+PLACE = group(
+    "place of the shape (by default that of the file, in its units)",
+    option(
+        "--units",
+        type=units,
+        metavar="[FROM:]TO",
+        help="units of all numbers: mm, cm, m, inch, foot, micron; FROM where the file does not say its own, as .3mf "
+        "and .glb do",
+    ),
+    option("--transform", nargs="+", metavar="M", help="16 numbers of a matrix by rows, or 12, or a file of them"),
+)
+ROOM = group(
+    "grid (by default around the shape)",
+    option("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side (128)"),
+    option(
+        "--spacing", type=positive, nargs="+", metavar="H", help="distance between nodes: one, or one for each axis"
+    ),
+    option("--padding", type=not_negative, metavar="P", help="room around the shape, in its units"),
+    option(
+        "--band",
+        type=positive,
+        metavar="B",
+        help="fine nodes only up to this distance from the surface, in the units of the shape, and coarse ones beyond: "
+        "for grids too fine to be computed whole",
+    ),
+)
+GRID = group(
+    ROOM.title,
+    *ROOM.options,
+    option("--origin", type=finite, nargs="+", metavar="X", help="first node of a grid of your own: X Y Z, or X Y"),
+    option(
+        "--shape",
+        type=whole_number(2),
+        nargs="+",
+        metavar="NX",
+        dest="grid_shape",
+        help="its nodes: NX NY NZ, or NX NY",
+    ),
+    option(
+        "--mask",
+        metavar="FILE",
+        help="a grid with walls, which distance goes around (it is not sharpened then): .npy .nrrd .vti, solid where "
+        "not 0; in the plane also .png .bmp .tif, solid where dark",
+    ),
+)
+REPAIR = group(
+    "steps (all taken by default)",
+    option("--as-oriented", action="store_true", help="turn no face or normal, put back no face"),
+    option("--keep-overlaps", action="store_true", help="count what lies inside other bodies as surface"),
+)
+STEPS = group(
+    REPAIR.title,
+    *REPAIR.options,
+    option("--plain", action="store_true", help="the method's own field, not measured to the shape itself"),
+)
+METHOD = group(
+    "method",
+    option(
+        "--constraint",
+        type=constraint,
+        default="zero-set",
+        metavar="C",
+        help="free, zero-set (default), hard, each-component, soft, or soft:WEIGHT",
+    ),
+    option("--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"),
+)
+SCHEDULER = option("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
+
+
+def workers(help: str) -> Option:
+    """The number of processes."""
+    return option("--workers", type=whole_number(1, MOST_WORKERS), metavar="N", help=help)
+
+
+TILES = group(
+    "tiles of a band",
+    option(
+        "--tiles",
+        metavar="FOLDER",
+        help="compute the band in tiles, which are kept in this folder: for bands larger than memory; the same command "
+        "goes on where it was stopped",
+    ),
+    workers("processes for them (threads of this one)"),
+    SCHEDULER,
+)
+SLICES = option("--preview", metavar="PNG", help="draw the result: in space, three slices")
+SAMPLING = group(
+    "samples",
+    option("--near", type=fraction, default=0.8, metavar="S", help="share near the surface, from 0 to 1 (.8)"),
+    option(
+        "--widths",
+        type=not_negative,
+        nargs="+",
+        default=[0.05, 0.0158],
+        metavar="W",
+        help="standard deviations of the noise, over the radius of the shape; each gets the same share (.05 .0158)",
+    ),
+    option("--seed", type=whole_number(0), default=0, metavar="K", help="of the random numbers (0)"),
+    option("--normalize", action="store_true", help="move and scale the shape into the unit sphere"),
+    option(
+        "--layout",
+        choices=("arrays", "deepsdf"),
+        default="arrays",
+        help="arrays: points, distances, gradients, …; deepsdf: pos and neg, single precision (arrays)",
+    ),
+)
+
+
 def is_planar(path: Any) -> bool:
     """Whether a file holds polylines in the plane."""
     return Path(path).suffix.lower() in PLANAR
 
 
-def refuse_together(arguments: argparse.Namespace, first: str, *others: str) -> None:
+def refuse_together(arguments: Namespace, first: str, *others: str) -> None:
     """Exit if an option is given, and one of some others with it."""
 
     def is_given(option: str) -> bool:
@@ -389,7 +386,7 @@ def refuse_together(arguments: argparse.Namespace, first: str, *others: str) -> 
             arguments.parser.error(f"{other} and {first} do not go together: give one of them")
 
 
-def check_grid_options(arguments: argparse.Namespace) -> None:
+def check_grid(arguments: Namespace) -> None:
     """Reject options that contradict each other, and numbers for another dimension."""
     error, own = arguments.parser.error, (arguments.origin, arguments.spacing, arguments.grid_shape)
     dimension = 2 if is_planar(getattr(arguments, "shape", "")) else 3
@@ -411,8 +408,9 @@ def check_grid_options(arguments: argparse.Namespace) -> None:
         error("a grid of your own needs all of --origin, --spacing and --shape")
 
 
-def check_tile_options(arguments: argparse.Namespace) -> None:
-    """Reject tiles without a band, and workers without tiles."""
+def check_tiles(arguments: Namespace) -> None:
+    """The same; and reject tiles without a band, and workers without tiles."""
+    check_grid(arguments)
     if arguments.tiles is not None and arguments.band is None:
         arguments.parser.error("--tiles goes with --band")
     if arguments.tiles is None and (arguments.workers, arguments.scheduler) != (None, None):

@@ -10,27 +10,28 @@ from typing import TYPE_CHECKING
 from ..packages import lazy_module
 
 if TYPE_CHECKING:
+    import numpy as numpy
+
     from .. import compiled as compiled
-    from .. import io as io
+    from .. import diagnostics as diagnostics
     from .. import parallel as parallel
     from .. import samples as samples
-    from .. import view as view
     from ..batches import pool as pool
     from ..batches import watertight as watertight
     from ..curves import close as close
+    from ..curves import distance as distance
     from ..domains import inspection as inspection
-    from . import computing as computing
-    from . import curves as curves
-    from . import images as images
+    from ..lowering.surface import discretization as discretization
     from . import kernel_runs as kernel_runs
-    from . import placing as placing
     from . import reports as reports
-    from . import surfaces as surfaces
-    from . import tets as tets
+    from . import shapes as shapes
 else:
-    PARTS = (
-        *("batches.pool", "batches.watertight", "compiled", "curves.close", "domains.inspection", "io"),
-        *("parallel", "samples", "view", "cli.computing", "cli.curves", "cli.images", "cli.kernel_runs"),
-        *("cli.placing", "cli.reports", "cli.surfaces", "cli.tets"),
-    )
-    globals().update({path.rpartition(".")[2]: lazy_module(f"signedheat.{path}", "commands") for path in PARTS})
+    numpy = lazy_module("numpy", "commands")
+    PARTS = {
+        **{"compiled": "compiled", "diagnostics": "diagnostics", "parallel": "parallel", "samples": "samples"},
+        **{"pool": "batches.pool", "watertight": "batches.watertight", "inspection": "domains.inspection"},
+        **{"close": "curves.close", "distance": "curves.distance"},
+        **{"discretization": "lowering.surface.discretization"},
+        **{"kernel_runs": "cli.kernel_runs", "reports": "cli.reports", "shapes": "cli.shapes"},
+    }
+    globals().update({name: lazy_module(f"signedheat.{path}", "commands") for name, path in PARTS.items()})

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
+from ..domains.curves import Curve
 from ..domains.grid import Grid
 from ..domains.inspection import CloudReport, SurfaceReport, TetReport, inspect
 from ..domains.polygon_mesh import PolygonMesh
+from ..domains.segments import segments_of
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
+from ..geometry.geodesics.paths import gaps
+from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.surface_points import EDGE, FACE, VERTEX, locate_points
 from ..io import read, read_curves, read_polylines
 from ..io.files import extension
 from ..io.labels import LabelImage
@@ -22,11 +30,10 @@ from ..memory import available_memory
 from ..orientation.meshes import Orientation, orientation
 from ..solids.fields import BYTES_AT_WORK, BYTES_PER_NODE
 from ..solids.thickness import Thickness, thickness
-from .computing import describe
-from .curve_reports import as_text, curve_reports
-from .images import field_or_image, image_report
 from .options import Summary, is_planar
+from .shapes import describe, field_or_image, labels_of
 
+NAMES = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
 WHOLE = 0.9999
 """Share of the area that counts as all of it: the rest is rounding."""
 
@@ -69,7 +76,7 @@ def report(file: str, arguments: Namespace) -> Summary:
                 path=arguments.curves,
             )
         summary["curves"] = curve_reports(shape, read_curves(arguments.curves, shape))
-        text += f"\n\n{arguments.curves}\n{as_text(summary['curves'])}"
+        text += f"\n\n{arguments.curves}\n{curves_text(summary['curves'])}"
     return summary, text
 
 
@@ -88,6 +95,24 @@ def lines_report(file: str) -> Summary:
         "upper": bounds[1].tolist(),
     }
     return summary, _table(summary)
+
+
+def image_report(file: str, image: LabelImage) -> dict[str, Any]:
+    """The image: where it is, and its labels or the range of its values."""
+    values, labels = image.labels, labels_of(image)
+    found: dict[str, Any] = {
+        "file": file,
+        "kind": "image of labels" if labels is not None else "image of a field",
+        "shape": [int(n) for n in values.shape],
+        "spacing": image.spacing.tolist(),
+        "origin": image.origin.tolist(),
+        "axes": image.axes.T.ravel().tolist(),
+    }
+    if image.space is not None:
+        found["space"] = image.space
+    if labels is None:
+        return found | {"lowest": float(np.nanmin(values)), "highest": float(np.nanmax(values))}
+    return found | {"labels": labels, "voxels": [int((values == label).sum()) for label in labels]}
 
 
 def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation | None) -> str:
@@ -160,6 +185,73 @@ def orientation_text(found: Orientation) -> str:
         sheets = _count(found.undecided_parts, "sheet")
         said.append(f"{100 * found.undecided_area:.3g} % of the area in {sheets} without an inside")
     return "; ".join(said)
+
+
+def curve_reports(surface: Any, sources: Sequence[Any]) -> list[dict[str, Any]]:
+    """One row per source: elements that its points lie on, kinds of segments, length, open ends."""
+    mesh = surface.triangulation
+    lengths = mesh.edge_lengths[mesh.edges.face_edges]
+    triangles = IntrinsicMesh.from_lengths(mesh.faces, lengths, mesh.n_vertices, mesh.edges)
+    return [curve_report(triangles, source, number) for number, source in enumerate(sources)]
+
+
+def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
+    """The row of one source."""
+    places = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
+    kinds = np.bincount(places.kinds, minlength=3)
+    row: dict[str, Any] = {
+        "kind": "points",
+        "n_points": len(places),
+        "at_vertices": int(kinds[VERTEX]),
+        "on_edges": int(kinds[EDGE]),
+        "in_faces": int(kinds[FACE]),
+    }
+    if not isinstance(source, Curve):
+        return row
+    apart = gaps(triangles, places, source.closed)
+    parts = segments_of(source, triangles, number=number)
+    degree = np.bincount(parts.ends.ravel(), minlength=len(parts.nodes))
+    ends = [
+        f"{NAMES[kind]} {element}"
+        for kind, element in zip(
+            parts.nodes.kinds[degree == 1].tolist(), parts.nodes.elements[degree == 1].tolist(), strict=True
+        )
+    ]
+    row |= {
+        "kind": "oriented curve" if source.oriented else "unoriented curve",
+        "n_segments": source.n_segments,
+        "length": float(parts.lengths.sum()),
+        "along_edges": int((parts.edges >= 0).sum()),
+        "inside_faces": int((parts.edges < 0).sum()),
+        "share_no_face": apart.tolist(),
+        "open_ends": ends,
+        "junctions": int((degree > 2).sum()),
+    }
+    return row
+
+
+def curves_text(rows: Sequence[dict[str, Any]]) -> str:
+    """The rows as text, one line each."""
+    lines = []
+    for number, row in enumerate(rows):
+        points = f"{row['at_vertices']} at vertices, {row['on_edges']} on edges, {row['in_faces']} in faces"
+        line = f"{number:>4}  {row['kind']}, {row['n_points']} points ({points})"
+        if "length" in row:
+            line += f", length {row['length']:.6g}"
+            line += f"; pieces: {row['along_edges']} along edges, {row['inside_faces']} in faces"
+            apart, ends = row["share_no_face"], row["open_ends"]
+            if apart:
+                line += f"; {len(apart)} segments share no face: {_shortened(apart)}"
+            line += f"; open at {_shortened(ends)}" if ends else "; closed"
+            if row["junctions"]:
+                line += f"; {row['junctions']} junctions"
+        lines.append(line)
+    return "\n".join(lines)
+
+
+def _shortened(items: Sequence[Any], most: int = 6) -> str:
+    """The first few items of a list, as text."""
+    return ", ".join(map(str, items[:most])) + (", …" if len(items) > most else "")
 
 
 def _count(number: int, name: str) -> str:

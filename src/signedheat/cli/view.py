@@ -1,4 +1,4 @@
-"""``signedheat view``: a shape or a field in a window, or as a picture."""
+"""Commands that show: `view` a file, `deviation` of a scan, and the `demo`."""
 
 from __future__ import annotations
 
@@ -13,51 +13,46 @@ from typing import Any
 
 import signedheat as sh
 
-from .options import Summary, add_command, add_up_option
-from .parts import computing, images, io, parallel, tets, view
-from .streams import say
+from ..errors import FileFormatError, MissingPackageError
+from .options import UP, Summary, command, is_quiet, option, positive, whole_number
+from .parts import inspection, parallel, samples, shapes
+from .terminal import ProgressBar, say
 
 PATIENCE = 5.0
 """Seconds within which a display must answer."""
+DISTANCE = 0.15
+"""Of the surface around the duck of the demo."""
 
 
-def add_to(commands: Any) -> None:
-    """Declare the command."""
-    parser = add_command(
-        commands,
-        "view",
-        run,
-        help="a shape or a field in a window, or as a picture",
-        description="In a window where there is a display and PyVista; otherwise, or with --output, as a picture: "
-        "slices through a field; a shape, outsides yellow, insides red.",
-    )
-    parser.add_argument("file", metavar="FILE", help="a shape or a field")
-    add_up_option(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", help="picture: .png .pdf .svg .jpg (a window, or FILE.png here)"
-    )
-
-
-def run(arguments: Namespace) -> Summary:
+@command(
+    "view",
+    "a shape or a field in a window, or as a picture",
+    "In a window where there is a display and PyVista; otherwise, or with --output, as a picture: slices through a "
+    "field; a shape, outsides yellow, insides red.",
+    option("file", metavar="FILE", help="a shape or a field"),
+    UP,
+    option("-o", "--output", metavar="FILE", help="picture: .png .pdf .svg .jpg (a window, or FILE.png here)"),
+)
+def view(arguments: Namespace) -> Summary:
     """Draw."""
     output, up = arguments.output, "xyz".index(arguments.up)
     if output is None and has_window():
-        with computing.prefix_errors(arguments.file):
+        with shapes.prefix_errors(arguments.file):
             shape_or_field(arguments.file).plot()
         return {"input": arguments.file, "output": None}, ""
     if output is None:
         output = str(Path(Path(arguments.file).name).with_suffix(".png"))
-    view.ensure_picture_writable(output)
+    sh.view.ensure_picture_writable(output)
     thing = shape_or_field(arguments.file)
-    with computing.prefix_errors(arguments.file):
+    with shapes.prefix_errors(arguments.file):
         if isinstance(thing, sh.VertexField):
-            view.save_surface(thing, output, up=up)
+            sh.view.save_surface(thing, output, up=up)
         elif isinstance(thing, sh.GridField):
-            view.save_slices(thing.whole, output)
+            sh.view.save_slices(thing.whole, output)
         elif isinstance(thing, sh.TetField):
-            view.save_slices(tets.on_grid(thing), output)
+            sh.view.save_slices(shapes.section_of(thing), output)
         else:
-            view.save_scene(thing.boundary if isinstance(thing, sh.TetMesh) else thing, output, up)
+            sh.view.save_scene(thing, output, up)
     return {"input": arguments.file, "output": output}, output
 
 
@@ -89,17 +84,106 @@ def display_answers() -> bool:
 
 def shape_or_field(path: str) -> Any:
     """What a file holds; those of tets may hold either."""
-    found = images.field_or_image(path)
+    found = shapes.field_or_image(path)
     if isinstance(found, sh.io.LabelImage):
-        with computing.prefix_errors(path):
-            return images.thing_of(found)
+        with shapes.prefix_errors(path):
+            return shapes.thing_of(found)
     if found is not None:
         return found
-    if io.files.extension(path) in io.VALUE_FORMATS:
-        with suppress(sh.errors.FileFormatError):  # a shape without values
-            return io.load_field(path)
-    thing = io.read(path)
-    if isinstance(thing, sh.TetMesh) and io.files.extension(path) in io.TET_FIELD_FORMATS:
-        with suppress(sh.errors.FileFormatError):
-            return io.load_field(path)
+    ending = Path(path).suffix.lower()
+    if ending in sh.io.VALUE_FORMATS:
+        with suppress(FileFormatError):  # a shape without values
+            return sh.load_field(path)
+    thing = sh.read(path)
+    if isinstance(thing, sh.TetMesh) and ending in sh.io.TET_FIELD_FORMATS:
+        with suppress(FileFormatError):
+            return sh.load_field(path)
     return thing
+
+
+@command(
+    "deviation",
+    "how far a scan is off a nominal part",
+    "Signed distances of a scan's points to a nominal part, positive outside of it: percentiles; the scan in colours, "
+    "a picture with the histogram, or a table. Both must be in one place: nothing is aligned.",
+    option("scan", metavar="SCAN", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd"),
+    option("nominal", metavar="NOMINAL", help="the part as it should be, broken or not"),
+    option("-o", "--output", metavar="OUT", help="coloured .ply, picture .png .pdf .svg .jpg, or table .csv"),
+    option("--tolerance", type=positive, metavar="T", help="say which share of the points is within it"),
+)
+def deviation(arguments: Namespace) -> Summary:
+    """Read, check that the result can be written, measure, write."""
+    if arguments.output:
+        sh.io.ensure_writable(arguments.output, sh.view.DEVIATION_FORMATS, "deviations")
+    scan, nominal = sh.read(arguments.scan), sh.read(arguments.nominal)
+    with shapes.prefix_errors(arguments.nominal), ProgressBar(is_quiet(arguments)) as progress:
+        found = sh.deviation(scan, nominal, progress)
+    summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **found.figures}
+    low, middle, high = found.percentiles((1, 50, 99))
+    text = f"{arguments.scan}: {len(found.distances)} points, 98 % of them {low:.4g} to {high:.4g} off "
+    text += f"{arguments.nominal}, median {middle:.4g}, root mean square {found.rms:.4g}"
+    if arguments.tolerance is not None:
+        share = found.within(arguments.tolerance)
+        summary |= {"tolerance": arguments.tolerance, "within": share}
+        text += f", {share:.2%} within {arguments.tolerance:g}"
+    if arguments.output:
+        found.save(arguments.output)
+        summary["output"] = arguments.output
+        text += f"; {arguments.output}"
+    return summary, text
+
+
+@command(
+    "demo",
+    "try it on a broken duck that comes along",
+    "Make a broken shape, its distance field, an offset surface and a picture.",
+    option("-o", "--output", default="demo", metavar="FOLDER", help="where to (demo)"),
+    option("--resolution", type=whole_number(8), default=128, metavar="N", help="nodes along the longest side"),
+)
+def demo(arguments: Namespace) -> Summary:
+    """Write everything to one folder."""
+    folder = Path(arguments.output)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileFormatError(
+            f"cannot be made a folder ({error.strerror})", remedy="name another", path=folder
+        ) from error
+    files = {name: folder / name for name in ("duck.stl", "distance.vti", "offset.stl", "picture.png")}
+    for path in files.values():
+        sh.io.ensure_writable(path, {path.suffix}, "a file")
+    try:
+        sh.view.ensure_picture_writable(files["picture.png"])
+    except MissingPackageError as error:  # the rest is worth having
+        del files["picture.png"]
+        if not arguments.quiet:
+            say(f"signedheat: no picture is made: {error}")
+    shape = samples.broken_duck()
+    shape.save(files["duck.stl"])
+    grid = sh.Grid.around(shape.bounds, arguments.resolution, padding=3 * DISTANCE)
+    field = shapes.compute(shape, grid, arguments)
+    surface: Any = field.offset(DISTANCE)
+    field.save(files["distance.vti"])
+    surface.save(files["offset.stl"])
+    lines = [
+        f"{files['duck.stl']}: the input: {_defects(shape)}",
+        f"{files['distance.vti']}: its signed distance at {' × '.join(map(str, grid.shape))} nodes",
+        f"{files['offset.stl']}: the surface {DISTANCE:g} outside: {_defects(surface)}",
+    ]
+    if "picture.png" in files:
+        sh.view.save_row(
+            files["picture.png"],
+            ("in: holes, noise, flipped and\nduplicate faces", shape),
+            ("its signed distance", field, {"shape": shape, "levels": [DISTANCE], "across": (1,)}),
+            (f"out: the closed surface at +{DISTANCE:g}", surface),
+        )
+        lines.append(f"{files['picture.png']}: a picture of them")
+    names = [str(path) for path in files.values()]
+    return {"files": names, "distance": DISTANCE, "field": shapes.describe(field)}, "\n".join(lines)
+
+
+def _defects(shape: sh.TriangleMesh) -> str:
+    found: Any = inspection.inspect(shape)
+    return (
+        f"{found.open_edges} open edges, {found.nonmanifold_edges} nonmanifold, {found.inconsistent_edges} inconsistent"
+    )

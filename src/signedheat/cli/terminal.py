@@ -1,0 +1,177 @@
+"""The terminal: text to standard output and error, whatever these are; a progress bar; signals that ask to stop."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sys
+import threading
+import time
+from types import FrameType
+from typing import Any, TextIO
+
+from ..errors import FileFormatError
+
+PLAIN = str.maketrans(
+    {
+        "×": "x",
+        "φ": "phi",
+        "ε": "epsilon",
+        "λ": "lambda",
+        "−": "-",
+        "–": "-",
+        "…": "...",
+        "≤": "<=",
+        "≥": ">=",
+        "→": "->",
+        "²": "^2",
+        "½": "1/2",
+        "━": "#",
+        "╌": "-",
+    }
+)
+"""What is written instead of characters that a stream cannot hold."""
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+APART = 1.0
+"""Seconds within which a further signal is taken for the same one."""
+
+
+def open_standard_streams() -> None:
+    """Give closed standard streams to the null device, so that no file of ours gets their numbers."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+
+
+def fitting(text: str, stream: TextIO) -> str:
+    """Text that a stream can hold.
+
+    Examples
+    --------
+    >>> import io
+    >>> fitting("φ at 8 × 8 nodes of café.stl", io.TextIOWrapper(io.BytesIO(), encoding="ascii"))
+    'phi at 8 x 8 nodes of caf\\\\xe9.stl'
+    """
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    try:
+        text.encode(encoding)
+    except UnicodeEncodeError:
+        return text.translate(PLAIN).encode(encoding, "backslashreplace").decode(encoding)
+    return text
+
+
+def say(text: str, end: str = "\n") -> None:
+    """Write to standard error; where it is closed or full, nobody can be informed."""
+    stream = sys.stderr
+    try:
+        if stream is not None:
+            stream.write(fitting(text, stream) + end)
+            stream.flush()
+    except (OSError, ValueError):
+        _abandon(stream)
+
+
+def say_error(error: BaseException) -> None:
+    """Write an error to standard error, in one line."""
+    say(f"signedheat: {' '.join(str(error).split())}")
+
+
+def write_out(text: str) -> None:
+    """Write to standard output.
+
+    Raises
+    ------
+    FileFormatError
+        If it is closed or full. That whoever was reading, such as ``head``, has read enough is no error.
+    """
+    stream = sys.stdout
+    try:
+        if stream is None:
+            raise OSError(0, "it is closed")
+        stream.write(fitting(text, stream) + "\n")
+        stream.flush()
+    except BrokenPipeError:
+        _abandon(stream)
+    except (OSError, ValueError) as error:
+        _abandon(stream)
+        raise FileFormatError(
+            f"cannot be written ({getattr(error, 'strerror', None) or error}); what -o names is there",
+            remedy="open it, or use --quiet",
+            path="standard output",
+        ) from error
+
+
+def _abandon(stream: TextIO | None) -> None:
+    """Let what is still in the buffer of a broken stream go nowhere, instead of failing once more at the end."""
+    try:
+        if stream is not None:
+            null = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(null, stream.fileno())
+            os.close(null)
+    except (OSError, ValueError):
+        return
+
+
+class ProgressBar:
+    """A progress callback that draws a bar on standard error, if this is a terminal."""
+
+    def __init__(self, quiet: bool) -> None:
+        self._is_shown = not quiet and sys.stderr is not None and sys.stderr.isatty()
+        self._begin = time.perf_counter()
+
+    def __call__(self, fraction: float, step: str) -> None:
+        if not self._is_shown:
+            return
+        width = max(10, min(40, shutil.get_terminal_size().columns - 36))
+        full = round(width * min(max(fraction, 0.0), 1.0))
+        seconds = time.perf_counter() - self._begin
+        say(f"\r\x1b[2K{'━' * full}{'╌' * (width - full)} {fraction:4.0%} {seconds:6.1f} s  {step}", end="")
+
+    def clear(self) -> None:
+        """Take the bar away, for a line of text."""
+        if self._is_shown:
+            say("\r\x1b[2K", end="")
+
+    def __enter__(self) -> ProgressBar:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.clear()
+
+
+class Stopped(KeyboardInterrupt):
+    """What signals raise: where Python runs text, it notes `KeyboardInterrupt` itself, and ends by SIGINT later."""
+
+
+class Signals:
+    """While this is entered, signals raise `Stopped`, and `caught` is the number of the last one.
+
+    So temporary files are removed on the way out. Signals that are ignored, as under ``nohup``, or that somebody else
+    handles, are left alone; so are all where this is not entered by the main thread.
+    """
+
+    def __init__(self) -> None:
+        self.caught: int | None = None
+        self._last = -APART
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Signals:
+        if threading.current_thread() is threading.main_thread():
+            for number in SIGNALS:
+                if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                    self._before[number] = signal.signal(number, self._raise)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, before in self._before.items():
+            signal.signal(number, before)
+
+    def _raise(self, number: int, frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if self.caught is not None and now - self._last < APART:
+            return
+        self.caught, self._last = number, now
+        raise Stopped
