@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import box
 from signedheat import memory, samples
 from signedheat.cli import main
+from signedheat.geometry.self_intersections import self_intersections
 
 BALL = samples.sphere(4)
 
@@ -171,3 +174,107 @@ def test_the_command_writes_a_closed_surface(tmp_path, capsys):
     assert main(["morph", "shell", str(source), "0.1", "-o", str(target)]) == 2
     assert main(["morph", "erode", str(source), "3", "-o", str(target), "--resolution", "32"]) == 1
     assert str(source) in capsys.readouterr().err
+
+
+def moved(mesh, turn):
+    return sh.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
+
+
+def turned_box(lower=(-1.0, -0.7, -0.2), upper=(1.0, 0.6, 0.3), seed=3):
+    turn = scipy.spatial.transform.Rotation.random(random_state=seed).as_matrix()
+    return moved(box(lower, upper), turn)
+
+
+def wedge(degrees, length=1.0):
+    """A prism on a triangle with an angle at the origin."""
+    half = np.deg2rad(degrees) / 2
+    flat = np.array([[0, 0], [-np.cos(half), np.sin(half)], [-np.cos(half), -np.sin(half)]])
+    points = np.concatenate([np.column_stack([flat, np.full(3, z)]) for z in (0.0, length)])
+    faces = [[0, 2, 1], [3, 4, 5], [0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4], [2, 0, 3], [2, 3, 5]]
+    return sh.TriangleMesh(points, faces)
+
+
+def test_mitred_boxes_stay_boxes():
+    shape = turned_box()
+    for corners in ("mitre", "sharp"):
+        for distance in (0.1, -0.1):
+            made = sh.offset(shape, distance, corners=corners, resolution=48)
+            assert is_closed_and_manifold(made)
+            assert not len(self_intersections(made.vertices, made.faces))
+            assert volume(made) == pytest.approx(np.prod(np.array([2.0, 1.3, 0.5]) + 2 * distance), rel=1e-3)
+    a, b, c, d = 2.0, 1.3, 0.5, 0.1
+    steiner = a * b * c + 2 * d * (a * b + b * c + c * a) + np.pi * d**2 * (a + b + c) + 4 / 3 * np.pi * d**3
+    assert volume(sh.offset(shape, 0.1, resolution=48)) == pytest.approx(steiner, rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("corners", "degrees", "tip"), [("mitre", 90, 2**0.5), ("mitre", 30, 2.0), ("sharp", 30, 3.8637)]
+)
+def test_tips_reach_where_planes_meet_or_as_far_as_they_may(corners, degrees, tip):
+    made = sh.offset(wedge(degrees), 0.1, corners=corners, spacing=0.02)
+    middle = made.vertices[np.abs(made.vertices[:, 2] - 0.5) < 0.3]
+    assert middle[:, 0].max() == pytest.approx(0.1 * tip, abs=2e-3)
+
+
+def test_reflex_edges_are_mitred_inside():
+    """An inner offset of an L is an L."""
+    flat = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2.0]])
+    triangles = np.array([[0, 1, 3], [1, 2, 3], [0, 3, 5], [3, 4, 5]])
+    points = np.concatenate([np.column_stack([flat, np.full(6, z)]) for z in (0.0, 1.0)])
+    i, j = np.arange(6), np.roll(np.arange(6), -1)
+    faces = np.concatenate(
+        [triangles[:, ::-1], triangles + 6, np.stack([i, j, j + 6], 1), np.stack([i, j + 6, i + 6], 1)]
+    )
+    turn = scipy.spatial.transform.Rotation.random(random_state=5).as_matrix()
+    made = sh.offset(moved(sh.TriangleMesh(points, faces), turn), -0.2, corners="mitre", resolution=64)
+    assert is_closed_and_manifold(made)
+    assert volume(made) == pytest.approx(0.6 * (1.6 * 0.6 + 1.0 * 0.6), rel=2e-3)
+
+
+def test_distances_may_vary():
+    slope = sh.offset(BALL, lambda places: 0.2 + 0.1 * places[:, 2], resolution=48)
+    same = sh.offset(BALL, 0.2 + 0.1 * BALL.vertices[:, 2], resolution=48)
+    for made in (slope, same):
+        assert is_closed_and_manifold(made)
+        assert not len(self_intersections(made.vertices, made.faces))
+        lengths = radii(made)
+        np.testing.assert_allclose(lengths, 1.2 + 0.1 * made.vertices[:, 2] / lengths, atol=3e-3)
+    inwards = sh.offset(BALL, 0.2 * BALL.vertices[:, 2], resolution=48)  # outside above, inside below
+    lengths = radii(inwards)
+    np.testing.assert_allclose(lengths, 1 + 0.2 * inwards.vertices[:, 2] / lengths, atol=3e-3)
+
+
+def test_offsets_do_not_depend_on_scale():
+    volumes = []
+    for scale in (1e-6, 1.0, 1e6):
+        shape = moved(turned_box(), scale * np.eye(3))
+        volumes.append(volume(sh.offset(shape, 0.1 * scale, corners="mitre", resolution=30)) / scale**3)
+    np.testing.assert_allclose(volumes, 2.2 * 1.5 * 0.7, rtol=3e-3)  # some edges are cut off at so few nodes
+    np.testing.assert_allclose(volumes, volumes[1], rtol=1e-4)
+
+
+def test_a_wall_may_keep_the_faces_outside_and_have_a_drain():
+    shape = turned_box((-1.0, -0.7, -0.5), (1.0, 0.6, 0.3))
+    wall = sh.morphology.shell(shape, -0.1, 0.0, resolution=48, keep_outside=True)
+    assert is_closed_and_manifold(wall)
+    given = {tuple(corner) for corner in shape.vertices}
+    assert given <= {tuple(corner) for corner in wall.vertices}
+    whole = 2 * 1.3 * 0.8 - 1.8 * 1.1 * 0.6
+    assert volume(wall) == pytest.approx(whole, rel=1e-3)
+    level = box((-1.0, -0.7, -0.5), (1.0, 0.6, 0.3))
+    for keep in (True, False):
+        drained = sh.morphology.shell(level, -0.1, 0.0, resolution=64, keep_outside=keep, drain=0.2)
+        assert is_closed_and_manifold(drained)
+        assert drained.to_trimesh().euler_number == 2  # outside and inside are one surface now
+        assert volume(drained) == pytest.approx(whole - np.pi * 0.1**2 * 0.1, rel=1e-4 if keep else 6e-3)
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_walls_have_no_sealed_crumbs(keep):
+    """A small ball on a stick is thicker than two walls, but only a little, and would have a cavity of its own."""
+    head = samples.union(
+        samples.sphere(4), box((0.9, -0.1, -0.1), (1.5, 0.1, 0.1)), samples.sphere(3, 0.27, (1.6, 0, 0))
+    )
+    assert sh.offset(head, -0.2, resolution=96).to_trimesh().body_count == 2
+    wall = sh.morphology.shell(head, -0.2, 0.0, resolution=96, keep_outside=keep)
+    assert wall.to_trimesh().body_count == 2

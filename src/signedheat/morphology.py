@@ -12,33 +12,44 @@ from collections.abc import Callable, Sequence
 from typing import Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
-from numpy.typing import NDArray
+import scipy
+from numpy.typing import ArrayLike, NDArray
 
 from .domains.curves import Curve, CurveOrPoints, CurvesAndPoints
+from .domains.digital_surface import DigitalSurface
+from .domains.foreign import as_shape
 from .domains.grid import Grid, room_around
 from .domains.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
+from .domains.point_cloud import PointCloud
 from .domains.polygon_mesh import PolygonMesh
 from .domains.polyline import Polyline
 from .domains.tet_mesh import TetMesh
 from .domains.triangle_mesh import TriangleMesh
-from .domains.validation import finite_number
-from .errors import SignedHeatError, SourceError, UnsupportedTypeError
+from .domains.validation import finite_number, positive_number
+from .errors import GeometryError, SignedHeatError, SourceError, UnsupportedTypeError
 from .fields.booleans import smooth_difference, smooth_intersection, smooth_union
 from .fields.grid_field import GridField
 from .fields.to_field import Field
 from .fields.vertex_field import VertexField
+from .geometry.components import element_components
 from .geometry.face_features import FaceFeatures
 from .geometry.face_tree import FaceTree
 from .lowering.area_elements import area_elements, bounds_around
 from .lowering.grid.discretization import refuse_beyond_memory
+from .progress import Progress
 from .sharpening.sharpen import sharpen
 from .signed_distance import signed_distance
+from .solids.complete import complete
+from .solids.contouring import sharp_surface
+from .solids.offsets import Offset, Reach, checked_reach
+from .solids.solid import Solid, weights_in
 from .solver import SignedHeatSolver, as_list
 
 __all__ = [
     "closing",
     "dilate",
     "erode",
+    "offset",
     "opening",
     "shell",
     "smooth_difference",
@@ -52,6 +63,12 @@ ROOM = 0.15
 """Share of its longest side by which a shape is padded, besides what its offsets take."""
 BYTES_PER_NODE = 31.0
 """Measured: what each node of a grid takes where a sheet is thickened."""
+
+LIMITS = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
+"""Distances up to which planes are followed around edges. With 2 the edges and corners of boxes are whole, and edges
+between faces less than 60° apart are cut off; with 10 those of less than 12°, whose tips reach ten distances out."""
+SIDES = 64
+"""Of a hole that lets liquids out."""
 
 Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
 """The boundary of a result, of the same kind as the shape."""
@@ -198,6 +215,73 @@ def closing(
     return _offsets(shape, (distance, -distance), domain, resolution, measure)
 
 
+def offset(
+    shape: Shapes | Solid,
+    distance: float | ArrayLike | Reach,
+    *,
+    corners: Literal["round", "mitre", "sharp"] = "round",
+    resolution: int = RESOLUTION,
+    spacing: ArrayLike | None = None,
+    progress: Progress | None = None,
+) -> TriangleMesh:
+    """The surface at a distance from a shape, which may vary over it, with round or with mitred edges.
+
+    Parameters
+    ----------
+    shape : shape, several, or Solid
+        Broken or not; completed here, unless it is a solid already.
+    distance : float, (n,) float or callable
+        Positive outside, negative inside. Or one for each vertex of a mesh (or point of a cloud), linear between them;
+        or a function that gives one for each of (n, 3) places on the shape.
+    corners : {"round", "mitre", "sharp"}
+        Around convex edges outside, and reflex ones inside: everything at the distance; or the planes of the faces
+        there, moved by it, as far as two distances ("mitre": boxes stay boxes), or ten ("sharp").
+    resolution : int
+        Nodes along the longest side of a grid around the surface.
+    spacing : float or (3,) float, optional
+        Size of its cells, in place of `resolution`.
+    progress : callable, optional
+        Called as ``progress(fraction, step)``; what it raises cancels.
+
+    Returns
+    -------
+    TriangleMesh
+        Closed, manifold, with its edges and corners; triangles do not pass through each other.
+
+    Raises
+    ------
+    OutsideError
+        If no cell of the grid has the surface.
+    SignedHeatError
+        If a distance is not finite, or there is not one for each vertex.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> grown = offset(samples.sphere(4), lambda places: 0.2 + 0.1 * places[:, 2], resolution=40)
+    >>> grown.bounds[:, 2].round(2).tolist()
+    [-1.1, 1.3]
+    """
+    if corners not in LIMITS:
+        raise SignedHeatError(f"corners are {', '.join(LIMITS)}, not {corners!r}", element="corners")
+    solid = shape if isinstance(shape, Solid) else complete(shape)
+    reach: float | Reach
+    if callable(distance):
+        reach = checked_reach(distance)
+        largest = float(reach(solid.triangles.reshape(-1, 3)).max())
+    elif np.ndim(distance) == 0:
+        reach = largest = finite_number(cast("float", distance), "the distance")
+    else:
+        values = np.asarray(distance, dtype=np.float64)
+        reach, largest = checked_reach(_linear(shape, values)), float(values.max(initial=0.0))
+    sides = np.array([[-1.0], [1.0]])
+    grid = Grid.around(solid.bounds + sides * max(largest, 0.0), resolution, None, spacing)
+    if LIMITS[corners] > 1:
+        bounds = solid.bounds + sides * LIMITS[corners] * max(largest, 0.0)
+        grid = Grid.around(bounds, padding=2 * float(grid.spacing.max()), spacing=grid.spacing)
+    return sharp_surface(Offset(solid, reach, LIMITS[corners]), grid, progress)
+
+
 def shell(
     shape: Shapes,
     inner: float,
@@ -206,8 +290,12 @@ def shell(
     *,
     resolution: int = RESOLUTION,
     measure: Measure | None = None,
+    keep_outside: bool = False,
+    drain: float | None = None,
 ) -> TriangleMesh:
     """The solid between two offsets of a shape, ``inner ≤ φ ≤ outer``: a wall, in which holes of the shape are closed.
+
+    Cavities smaller than a ball as wide as the wall is thick are filled.
 
     Parameters
     ----------
@@ -221,6 +309,10 @@ def shell(
         Number of nodes along the longest side of that default grid.
     measure : callable, optional
         As in `dilate`.
+    keep_outside : bool
+        With ``outer=0``: keep the faces that were given, with what completes them, and make the inner side only.
+    drain : float, optional
+        Diameter of a hole straight down (−z) from the bottom of the largest cavity, which lets liquids and powder out.
 
     Returns
     -------
@@ -230,7 +322,10 @@ def shell(
     Raises
     ------
     SignedHeatError
-        If inner is not less than outer, one of them is not finite, or the wall is thinner than a grid cell.
+        If inner is not less than outer, one of them is not finite, the wall is thinner than a grid cell, the outside is
+        to be kept at another distance than 0, or there is no cavity to drain.
+    GeometryError
+        If faces are to be kept and do not join with their completion all around.
     UnsupportedTypeError
         If the domain is not a grid.
     """
@@ -240,10 +335,26 @@ def shell(
             f"a shell needs inner < outer, not {inner:g} and {outer:g}",
             remedy="swap them, or set them apart",
         )
+    if keep_outside and outer != 0:
+        raise SignedHeatError("the faces that were given are at distance 0", remedy="leave out keep_outside")
+    hole = None if drain is None else positive_number(drain, "drain")
     grid = _grid(_room(shape, max(abs(inner), abs(outer)), resolution) if domain is None else domain)
-    phi = (measure or _field)(shape, grid).values
     _refuse_thin(grid, outer - inner)
-    return GridField(grid, np.maximum(inner - phi, phi - outer)).offset(0.0)
+    if keep_outside and measure is None:
+        solid: object = complete(shape)
+    else:
+        field = (measure or _field)(shape, grid)
+        solid = field.solid if isinstance(field, GridField) else None
+    if keep_outside:
+        if not isinstance(solid, Solid):
+            raise SourceError("what was measured knows no faces", remedy="leave out measure or keep_outside")
+        outside, inside = solid.surface(keep_faces=True), solid.surface(inner, spacing=grid.spacing)
+        faces = np.concatenate([outside.faces, inside.faces[:, ::-1] + outside.n_vertices])
+        wall = TriangleMesh(np.concatenate([outside.vertices, inside.vertices]), faces)
+    else:
+        wall = GridField(grid, np.maximum(inner - field.values, field.values - outer)).offset(0.0)
+    wall = _without_crumbs(wall, outer - inner)
+    return wall if hole is None else _drained(wall, hole, float(grid.spacing.max()))
 
 
 def thicken(
@@ -261,8 +372,8 @@ def thicken(
     sheet : TriangleMesh or PolygonMesh
         A surface with boundary; if `below` equals `above` its orientation does not matter.
     above, below : float
-        Thickness on the side that the normals point to, and on the other side; `below` is `above` by default, and 0
-        gives a solid on one side only.
+        Thickness on the side that the normals point to, and on the other side; `below` is `above` by default.
+        **One side only**: ``thicken(sheet, 0.2, 0.0)`` on that of the normals, ``thicken(sheet, 0.0, 0.2)`` behind.
     domain : Grid, optional
         By default a grid around the sheet with room for the result.
     resolution : int
@@ -296,6 +407,87 @@ def thicken(
         phi = _sided(grid, sheet).values
         depth = np.maximum(depth, np.maximum(phi - above, -below - phi))
     return GridField(grid, depth).offset(0.0)
+
+
+def _linear(shape: Shapes | Solid, values: NDArray[np.float64]) -> Reach:
+    """The function that has values at the vertices of a mesh, or at the points of a cloud, and is linear on faces."""
+    mesh = shape.source if isinstance(shape, Solid) else as_shape(shape)  # type: ignore[arg-type]
+    if not isinstance(mesh, TriangleMesh | PolygonMesh | DigitalSurface | PointCloud):
+        raise UnsupportedTypeError(
+            f"a {type(shape).__name__} has no vertices that distances are given at",
+            remedy="pass one mesh, or a function of places",
+            element="distance",
+        )
+    points = mesh.points if isinstance(mesh, PointCloud) else mesh.vertices
+    if values.shape != (len(points),) or not np.isfinite(values).all():
+        raise SignedHeatError(
+            f"there are {len(points)} vertices, and distances of shape {values.shape}, or not all are finite",
+            remedy="give one for each",
+            element="distance",
+        )
+    if isinstance(mesh, PointCloud):
+        tree = scipy.spatial.cKDTree(points)
+        return lambda places: values[tree.query(places)[1]]
+    if not isinstance(mesh, TriangleMesh):
+        values, mesh = mesh.on_triangulation(values), mesh.triangulation
+    vertices, corners = mesh.vertices, mesh.faces
+    faces = FaceTree.of(FaceFeatures.of(vertices, corners))
+
+    def interpolated(places: NDArray[np.float64]) -> NDArray[np.float64]:
+        found = faces.search(places)
+        ids = corners[faces.features.ids[found.faces]]
+        result: NDArray[np.float64] = (weights_in(vertices[ids], found.feet) * values[ids]).sum(axis=1)
+        return result
+
+    return interpolated
+
+
+def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:
+    """A wall without cavities smaller than a ball as wide as it is thick."""
+    parts, volumes = _part_volumes(wall)
+    crumbs = (volumes < 0) & (volumes > -np.pi / 6 * thickness**3)
+    if not crumbs.any():
+        return wall
+    used, faces = np.unique(wall.faces[~crumbs[parts]], return_inverse=True)
+    return TriangleMesh(wall.vertices[used], faces.reshape(-1, 3))
+
+
+def _part_volumes(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(m,) connected part of each face, and the volumes that parts have inside; negative for cavities."""
+    parts = element_components(mesh.faces)
+    a, b, c = (mesh.vertices - mesh.vertices.mean(axis=0))[mesh.faces].transpose(1, 0, 2)
+    return parts, np.bincount(parts, (a * np.cross(b, c)).sum(axis=1)) / 6
+
+
+def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
+    """A wall with a hole straight down from the bottom of its largest cavity, where it is the widest."""
+    parts, volumes = _part_volumes(wall)
+    if not volumes.min() < 0:
+        raise SignedHeatError("the wall has no cavity to drain", remedy="leave out drain, or make the wall thinner")
+    radius = 0.5 * diameter
+    cavity = wall.vertices[np.unique(wall.faces[parts == volumes.argmin()])]
+    low, high = cavity[:, 2].min(), cavity[:, 2].max()
+    lift = min(radius, 0.5 * (high - low))
+    bottom = cavity[cavity[:, 2] <= low + 0.5 * lift]
+    given = complete(wall, as_oriented=True)
+    room = given.distance(np.column_stack([bottom[:, :2], np.full(len(bottom), low + lift)]))
+    x, y = bottom[np.argmax(np.round(room / cell, 6)), :2]
+    angles = 2 * np.pi * np.arange(SIDES) / SIDES
+    rim = np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)])
+    ends = wall.bounds[0, 2] - diameter, low + lift
+    vertices = np.concatenate([*(np.column_stack([rim, np.full(SIDES, z)]) for z in ends), [[x, y, z] for z in ends]])
+    a, b = np.arange(SIDES), np.roll(np.arange(SIDES), -1)
+    below, above = np.full(SIDES, 2 * SIDES), np.full(SIDES, 2 * SIDES + 1)
+    sides = (a, b, below), (b + SIDES, a + SIDES, above), (b, a, b + SIDES), (a, a + SIDES, b + SIDES)  # facing inwards
+    faces = np.concatenate([np.stack(each, axis=1) for each in sides])
+    both = TriangleMesh(
+        np.concatenate([wall.vertices, vertices]), np.concatenate([wall.faces, faces + wall.n_vertices])
+    )
+    solid = complete(both, as_oriented=True)
+    try:
+        return solid.surface(keep_faces=True)
+    except GeometryError:
+        return solid.surface(spacing=cell)
 
 
 def _field(shape: Sources, domain: Domain) -> Field:

@@ -25,6 +25,7 @@ from .fields.redistancing import redistance
 from .fields.tet_field import TetField
 from .fields.vertex_field import VertexField
 from .io import load_field, read, save
+from .morphology import offset
 from .orientation.meshes import orientation
 from .orientation.orient import orient
 from .sharpening.methods import Convex, Geodesic
@@ -71,6 +72,7 @@ __all__ = [
     "globe_curve",
     "intrinsic_delaunay",
     "load_field",
+    "offset",
     "orient",
     "orientation",
     "piecewise_distance",

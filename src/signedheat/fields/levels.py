@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ..domains.grid import Grid
 from ..geometry.marching import CLEARANCE
-from .known_solid import KnownSolid
 
 CLOSE = 1e-3
 """Cells off a level that a point may be and stay as it is."""
@@ -25,8 +24,14 @@ class NodeValues(Protocol):
     def __getitem__(self, nodes: tuple[NDArray[np.int64], ...], /) -> NDArray[np.float64]: ...
 
 
+class Distance(Protocol):
+    """What has a distance at points."""
+
+    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]: ...
+
+
 def on_level(
-    solid: KnownSolid, points: NDArray[np.float64], values: NodeValues, grid: Grid, level: float
+    solid: Distance, points: NDArray[np.float64], values: NodeValues, grid: Grid, level: float
 ) -> NDArray[np.float64]:
     """Points on edges of a grid, where values of the nodes pass a level, moved along to where distance does.
 
@@ -34,7 +39,7 @@ def on_level(
 
     Parameters
     ----------
-    solid : KnownSolid
+    solid : Solid or Offset
         What the values are the distance to.
     points : (n, 3) float
         Where linear interpolation passes the level.

@@ -1,4 +1,4 @@
-"""Level sets of the distance to solids as closed surfaces with sharp edges: dual contouring with exact distances.
+"""Offsets of solids as closed surfaces with sharp edges: dual contouring with exact distances.
 
 Vertices lie within cells of a grid, not on its edges, where the planes of the surface meet (Ju, Losasso, Schaefer &
 Warren 2002). Each connected piece within a cell has one (Schaefer, Ju & Warren 2007), and triangles do not pass through
@@ -22,28 +22,35 @@ from ..geometry.marching import CLEARANCE
 from ..geometry.self_intersections import self_intersections
 from ..operators.grid.blocks import SIDE, Blocks
 from ..progress import Progress
-from .features import Level, placed
-from .fields import Evaluated, in_threads, prepared, tiles_of
+from .features import placed
+from .fields import in_threads, prepared, tiles_of
 from .nodes import solved
+from .offsets import Offset
 
 ROUNDS = 8
 """Times that vertices are moved where triangles pass through each other; twice is enough for nearly all shapes."""
 WINDOW = 8
 """Blocks along each edge of a window in which crossed edges are looked for together."""
+IN_BLOCK = np.array(list(np.ndindex(SIDE, SIDE, SIDE)))
+"""(512, 3) nodes of a block."""
+STEEPEST = 2.0
+"""Change of the height above a surface, over how far one goes, up to which blocks near it are found from coarse to
+fine: distance changes by 1 at most, and where one that varies does so by more, blocks are found as its surface goes on.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Edges of a grid that a level crosses.
+    """Edges of a grid that a surface crosses.
 
     Attributes
     ----------
     nodes, axes : (e, 3) int, (e,) int
         First node of each, and what it runs along.
     rising : (e,) bool
-        Whether the first node is below the level.
+        Whether the first node is inside.
     shares : (e,) float
-        How far from the first node the level is, by linear interpolation.
+        How far from the first node the surface is, by linear interpolation.
     """
 
     nodes: NDArray[np.int64]
@@ -54,10 +61,32 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class BlockValues:
-    """Distances at the nodes of blocks, indexed by nodes."""
+    """Heights at the nodes of blocks, indexed by nodes."""
 
     blocks: Blocks
     values: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
+        """Heights above a surface, at nodes which neighbours find together if it is a level of distance."""
+        tree, windings = prepared(offset.solid)
+        values = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
+        level = offset.level
+
+        def solve(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+            places = blocks.places[rows].astype(np.int64)
+            if level is not None:
+                values[rows] = solved(tree, windings, grid, places)[0].astype(np.float64) - level
+                return rows
+            nodes = (SIDE * places[:, None] + IN_BLOCK).reshape(-1, 3)
+            heights = offset.distance(grid.origin + nodes * grid.spacing)
+            heights[(nodes >= grid.shape).any(axis=1)] = np.nan
+            values[rows] = heights.reshape(-1, SIDE, SIDE, SIDE)
+            return rows
+
+        for _ in in_threads(solve, tiles_of(blocks)):
+            pass
+        return cls(blocks, values)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -68,8 +97,8 @@ class BlockValues:
         return self.blocks.values_at(self.values, np.stack(nodes, axis=1))
 
 
-def sharp_surface(solid: Evaluated, grid: Grid, level: float, progress: Progress | None = None) -> TriangleMesh:
-    """The surface on which the distance to a solid has a level, closed and manifold, with its edges and corners.
+def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) -> TriangleMesh:
+    """A surface at a distance from a solid, closed and manifold, with its edges and corners.
 
     Raises
     ------
@@ -77,15 +106,15 @@ def sharp_surface(solid: Evaluated, grid: Grid, level: float, progress: Progress
         If no node of the grid lies on one of the two sides.
     """
     report = progress or (lambda fraction, step: None)
-    values, crossings, cells = _crossed(solid, grid, level)
+    values, crossings, cells = _crossed(offset, grid)
     report(0.4, "edges")
     nodes, axes = crossings.nodes, crossings.axes
     guesses = nodes.astype(np.float64)
     guesses[np.arange(len(nodes)), axes] += np.clip(crossings.shares, CLEARANCE, 1 - CLEARANCE)
-    points = on_level(solid, grid.origin + guesses * grid.spacing, values, grid, level)
+    points = on_level(offset, grid.origin + guesses * grid.spacing, values, grid, 0.0)
     shares = ((points - grid.origin) / grid.spacing - nodes)[np.arange(len(nodes)), axes]
     report(0.6, "vertices")
-    choices = placed(Level(solid, level), grid, cells, points)
+    choices = placed(offset, grid, cells, points)
     report(0.9, "faces")
     vertices, faces = _apart(cells, crossings, np.clip(shares, CLEARANCE, 1 - CLEARANCE), choices)
     report(1.0, "faces")
@@ -118,53 +147,41 @@ def _apart(
     return found, faces
 
 
-def _crossed(solid: Evaluated, grid: Grid, level: float) -> tuple[BlockValues, Crossings, DualCells]:
-    """Distances near a level, the edges that it crosses, and the pieces of it in cells.
+def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
+    """Heights near a surface, the edges that it crosses, and its pieces in cells.
 
-    Where the level goes on into blocks that are not there, they are added.
+    Where the surface goes on into blocks that are not there, they are added.
     """
-    tree, windings = prepared(solid)
-    places = blocks_at(solid, grid, level)
+    places = blocks_at(offset, grid)
     done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, SIDE, SIDE, SIDE), dtype=np.float32))
     while True:
-        new = Blocks.of(places, grid.shape)
-        values = np.empty((len(new), SIDE, SIDE, SIDE), dtype=np.float32)
-
-        def solve(
-            rows: NDArray[np.int64], new: Blocks = new, values: NDArray[np.float32] = values
-        ) -> NDArray[np.int64]:
-            values[rows] = solved(tree, windings, grid, new.places[rows].astype(np.int64))[0]
-            return rows
-
-        for _ in in_threads(solve, tiles_of(new)):
-            pass
-        both = Blocks.of(np.concatenate([done.blocks.places, new.places]), grid.shape)
+        new = BlockValues.of(offset, grid, Blocks.of(places, grid.shape))
+        both = Blocks.of(np.concatenate([done.blocks.places, new.blocks.places]), grid.shape)
         merged = np.empty((len(both), SIDE, SIDE, SIDE), dtype=np.float32)
-        for part in (done, BlockValues(new, values)):
+        for part in (done, new):
             merged[both.rows(part.blocks.places)] = part.values
         done = BlockValues(both, merged)
-        crossings = crossed_edges(done, level)
+        crossings = crossed_edges(done)
         cells, edges, _, _ = cells_around(crossings.nodes, crossings.axes, grid.shape)
         around = cells[open_cells(edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
         places = np.unique(around.reshape(-1, 3) // SIDE, axis=0)
         places = places[both.rows(places) < 0]
         if not len(places):
             break
-    inside = Level(solid, level).inside
     found = dual_cells(
         crossings.nodes,
         crossings.axes,
         crossings.rising,
         grid.shape,
-        lambda at: inside(grid.origin + at * grid.spacing),
+        lambda at: offset.distance(grid.origin + at * grid.spacing) < 0,
     )
     return done, crossings, found
 
 
-def blocks_at(solid: Evaluated, grid: Grid, level: float) -> NDArray[np.int64]:
-    """(n, 3) places of the blocks of a grid with nodes near a level, found from coarse to fine.
+def blocks_at(offset: Offset, grid: Grid) -> NDArray[np.int64]:
+    """(n, 3) places of the blocks of a grid with nodes near a surface, found from coarse to fine.
 
-    Distance changes by no more than one goes, so that its value at the middle of a block says how near the level is.
+    Heights change by no more than one goes, so that the one at the middle of a block says how near the surface is.
 
     Raises
     ------
@@ -174,13 +191,13 @@ def blocks_at(solid: Evaluated, grid: Grid, level: float) -> NDArray[np.int64]:
     n_blocks = -(-np.array(grid.shape) // SIDE)
     side = 1 << max(0, int(np.ceil(np.log2(n_blocks.max()))))
     places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
-    diagonal = float(np.linalg.norm(grid.spacing))
+    diagonal = (1.0 if offset.level is not None else STEEPEST) * float(np.linalg.norm(grid.spacing))
     while True:
         size = side * SIDE
         centres = grid.origin + (places * size + 0.5 * (size - 1)) * grid.spacing
-        places = places[np.abs(solid.distance(centres) - level) <= (0.5 * (size - 1) + 1.0) * diagonal]
+        places = places[np.abs(offset.distance(centres)) <= (0.5 * (size - 1) + 1.0) * diagonal]
         if not len(places):
-            raise OutsideError(f"the distance takes level {level:g} nowhere on the grid", remedy="choose another level")
+            raise OutsideError(f"the distance takes {offset.named} nowhere on the grid", remedy="choose another level")
         if side == 1:
             return places
         side //= 2
@@ -188,8 +205,8 @@ def blocks_at(solid: Evaluated, grid: Grid, level: float) -> NDArray[np.int64]:
         places = places[(places * side < n_blocks).all(axis=1)]
 
 
-def crossed_edges(known: BlockValues, level: float) -> Crossings:
-    """Edges whose ends lie on both sides of a level.
+def crossed_edges(known: BlockValues) -> Crossings:
+    """Edges whose ends lie on both sides of a surface.
 
     Raises
     ------
@@ -199,7 +216,7 @@ def crossed_edges(known: BlockValues, level: float) -> Crossings:
     blocks, nodes, axes, rising, shares = known.blocks, [], [], [], []
     for window in np.unique(blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * SIDE, WINDOW * SIDE
-        height = blocks.window(known.values, first, (size + 1,) * 3).astype(np.float64) - level
+        height = blocks.window(known.values, first, (size + 1,) * 3).astype(np.float64)
         below, held = height < 0, ~np.isnan(height)
         for axis in range(3):
             ahead = tuple(slice(1, None) if k == axis else slice(0, size) for k in range(3))
@@ -212,7 +229,7 @@ def crossed_edges(known: BlockValues, level: float) -> Crossings:
             shares.append(low / (low - high))
     if not sum(map(len, nodes)):
         raise OutsideError(
-            f"the distance takes level {level:g} nowhere between the nodes of the grid",
+            "the distance takes the level nowhere between the nodes of the grid",
             remedy="choose another level, or smaller cells if the shape is thinner than they are",
         )
     return Crossings(np.concatenate(nodes), np.concatenate(axes), np.concatenate(rising), np.concatenate(shares))

@@ -1,8 +1,6 @@
-"""Vertices of dual contouring: places in cells where the planes that touch a level set meet."""
+"""Vertices of dual contouring: places in cells where the planes that touch a surface meet."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -12,7 +10,7 @@ from ..domains.grid import Grid
 from ..geometry.dual_cells import DualCells
 from ..geometry.marching import CLEARANCE
 from ..geometry.quadrics import Quadrics, minimizers
-from .fields import Evaluated
+from .offsets import Offset
 
 MANY = 1 << 17
 """Pieces of the level whose vertices are found together."""
@@ -28,44 +26,14 @@ AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
 """Cells along a crease at which its ends are looked for."""
 
 
-@dataclass(frozen=True, eq=False)
-class Level:
-    """A level of the distance to a solid.
-
-    Attributes
-    ----------
-    solid : Solid
-        What distance is to.
-    value : float
-        The distance.
-    """
-
-    solid: Evaluated
-    value: float
-
-    def inside(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(n,) whether the distance is less."""
-        below: NDArray[np.bool_] = self.solid.distance(points) < self.value
-        return below
-
-    def planes(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(n, 3) places on the level near points, and its normals there; at level 0 those of the nearest triangles."""
-        if self.value == 0:
-            tree = self.solid.tree
-            found = tree.search(points)
-            return found.feet, tree.features.face_normals[found.faces]
-        closest = self.solid.closest(points)
-        return closest.points + self.value * closest.gradients, closest.gradients
-
-
-def placed(level: Level, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def placed(offset: Offset, grid: Grid, cells: DualCells, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, v, 3) where the vertex of each piece of a level may be, in cells: at best; within its cell; at its middle.
 
     At best it is on a crease or corner, even where the level goes beyond the cell without crossing its edges.
 
     Parameters
     ----------
-    level : Level
+    offset : Offset
         What.
     grid : Grid
         Where.
@@ -85,7 +53,7 @@ def placed(level: Level, grid: Grid, cells: DualCells, points: NDArray[np.float6
         stop = min(begin + MANY, count)
         here = slice(*np.searchsorted(pieces, [begin, stop]))
         parts = _vertices(
-            level,
+            offset,
             grid,
             cells.places[cells.owners[begin:stop]],
             alone[begin:stop],
@@ -114,7 +82,7 @@ def _apart(cells: DualCells, vertices: NDArray[np.float64], wider: NDArray[np.fl
 
 
 def _vertices(
-    level: Level,
+    offset: Offset,
     grid: Grid,
     places: NDArray[np.int64],
     alone: NDArray[np.bool_],
@@ -134,29 +102,28 @@ def _vertices(
     lower, upper = corners + room, corners + grid.spacing - room
     middles = np.clip(sums / np.bincount(owners, minlength=count)[:, None], lower, upper)
     lower, upper = lower - middles, upper - middles
-    on, normals = level.planes(points)
+    on, normals = offset.planes(points)
     quadrics = Quadrics.of(owners, on - middles[owners], normals, count)
     found, ranks, along = minimizers(quadrics, lower, upper)
-    off = level.solid.distance(middles + found) - level.value
+    off = offset.distance(middles + found)
     wider = np.full((count, 3), np.nan)
     creased = np.flatnonzero((ranks > 1) & alone)
     if len(creased):
         # planes that pass through a cell with a crease without crossing its edges there
         low, high = lower[creased] - BEYOND * grid.spacing, upper[creased] + BEYOND * grid.spacing
         probes = found[creased][:, None] + _probes(along[creased], quadrics.sides[creased], grid.spacing)
-        on, normals = level.planes((middles[creased][:, None] + probes).reshape(-1, 3))
+        on, normals = offset.planes((middles[creased][:, None] + probes).reshape(-1, 3))
         which = np.repeat(np.arange(len(creased)), probes.shape[1])
         on -= middles[creased][which]
         within = ((on > low[which]) & (on < high[which])).all(axis=1)
         more = Quadrics.of(which[within], on[within], normals[within], len(creased))
         farther, higher, _ = minimizers(quadrics[creased] + more, low, high)
-        error = np.abs(level.solid.distance(middles[creased] + farther) - level.value)
+        error = np.abs(offset.distance(middles[creased] + farther))
         wanted = (error < ON * step) & ((higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON * step))
         wider[creased[wanted]] = middles[creased[wanted]] + farther[wanted]
     for _ in range(2):
-        closest = level.solid.closest(middles + found)
-        off = closest.distances - level.value
-        onto = np.clip(found - off[:, None] * closest.gradients, lower, upper)
+        off, gradients = offset.slopes(middles + found)
+        onto = np.clip(found - off[:, None] * gradients, lower, upper)
         found = np.where((np.abs(off) > ON * step)[:, None], onto, found)
     return middles + found, middles, wider
 

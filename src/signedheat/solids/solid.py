@@ -28,6 +28,7 @@ from .contouring import sharp_surface
 from .fields import band_field, dense_field
 from .files import save_solid
 from .keeping import given_surface
+from .offsets import Offset
 from .stores import Scheduler
 from .winding import Windings
 
@@ -277,7 +278,7 @@ class Solid(Frozen, ShortRepr):
         reach = self.bounds + np.array([[-1.0], [1.0]]) * max(height, 0.0)
         where = Grid.around(reach, resolution, None, spacing)
         if sharp:
-            return sharp_surface(self, where, height, progress)
+            return sharp_surface(Offset(self, height), where, progress)
         return dense_field(self, where, progress).contour(height)
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -323,7 +324,7 @@ class Solid(Frozen, ShortRepr):
         weights = np.full((len(points), 3), np.nan)
         if self.source is not None:
             given = origins >= 0
-            weights[given] = _weights(self.source.vertices[self.source.faces[origins[given]]], found.feet[given])
+            weights[given] = weights_in(self.source.vertices[self.source.faces[origins[given]]], found.feet[given])
         return signs * lengths, found.feet, origins, weights, gradients, self.confidence[ids]
 
 
@@ -338,7 +339,7 @@ def _mesh(triangles: NDArray[np.float64]) -> TriangleMesh:
     return TriangleMesh(points, corners.reshape(-1, 3))
 
 
-def _weights(corners: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def weights_in(corners: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n, 3) barycentric coordinates of places in triangles."""
     a, b, c = corners.transpose(1, 0, 2)
     u, v, w = b - a, c - a, places - a
