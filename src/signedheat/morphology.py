@@ -534,6 +534,11 @@ def _grid(domain: object) -> Grid[Literal[3]]:
             f"walls are made on a Grid, not on a {type(domain).__name__}",
             remedy="leave the domain out, or pass one",
         )
+    if domain.dimension != 3:
+        raise SourceError(
+            f"a wall lies in 3 dimensions, and the grid in {domain.dimension}",
+            remedy="leave the domain out, or pass a grid in space",
+        )
     return cast("Grid[Literal[3]]", domain)
 
 

@@ -186,7 +186,9 @@ def _cut(
     pieces, alive = np.empty((MOST_PIECES, 9)), np.zeros(MOST_PIECES, dtype=np.bool_)
     result, origins, total = np.empty((len(corners) + 1024, 9)), np.empty(len(corners) + 1024, dtype=np.int64), 0
     for f in range(len(corners)):
-        pieces[0], alive[0], count = corners[f], True, 1
+        for c in range(9):
+            pieces[0, c] = corners[f, c]
+        alive[0], count = True, np.int64(1)
         for g in near[starts[f] : starts[f + 1]]:
             shared = 0
             for i in range(3):
@@ -230,13 +232,16 @@ def _cut(
                             count = _halve(pieces, alive, count, new, ax / long, ay / long, az / long, level, slack)
         if total + count > len(result):
             more = np.empty((2 * len(result) + count, 9))
-            more[:total] = result[:total]
             names = np.empty(len(more), dtype=np.int64)
-            names[:total] = origins[:total]
+            for at in range(total):
+                for c in range(9):
+                    more[at, c] = result[at, c]
+                names[at] = origins[at]
             result, origins = more, names
         for at in range(count):
             if alive[at]:
-                result[total] = pieces[at]
+                for c in range(9):
+                    result[total, c] = pieces[at, c]
                 origins[total] = f
                 total += 1
     return result[:total].copy(), origins[:total].copy(), met

@@ -64,7 +64,8 @@ def same_rows(rows: NDArray[np.integer]) -> NDArray[np.int64]:
     >>> same_rows(np.array([[5, 5, 5], [1, 2, 3], [5, 5, 5]])).tolist()
     [0, 1, 0]
     """
-    return np.asarray(_same_rows(np.ascontiguousarray(rows)))
+    numbers = np.ascontiguousarray(rows)
+    return np.asarray(_same_rows(numbers.view(np.int64) if numbers.itemsize == 8 else numbers.astype(np.int64)))
 
 
 def distinct_rows(rows: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -164,7 +165,7 @@ def _weld(points: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
 
 
 @compiled
-def _same_rows(rows: NDArray[np.integer]) -> NDArray[np.int64]:
+def _same_rows(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     count, width = rows.shape
     size = 16
     while size < 2 * count:

@@ -61,6 +61,7 @@ class WindingTree:
         On a face it is that of one of its sides: take `behind`.
         """
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
+        points = np.ascontiguousarray(points)  # one kind of array, for which the kernel is compiled
         (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
         return numbers
 

@@ -92,7 +92,7 @@ def film(loop: NDArray[np.float64]) -> Lid:
 def _membrane(lid: Lid, matrix: sparse.csr_array) -> Lid:
     n = lid.n_rim
     weights = -sparse.triu(matrix, 1).tocoo()
-    weights = sparse.coo_array((np.maximum(weights.data, 1e-6), weights.coords), shape=matrix.shape)
+    weights.data = np.maximum(weights.data, 1e-6)
     weights = (weights + weights.T).tocsr()
     inner = sparse.diags_array(weights.sum(axis=1)[n:]) - weights[n:, n:]
     vertices = lid.vertices.copy()
