@@ -1,6 +1,6 @@
 """Generalized signed distance to broken geometry, by the signed heat method.
 
-The public names are those of `public.py`. They are imported together when one of them is first asked for, so that the
+The public names are those of `public.py`. They are imported together when one of them is first used, so that the
 command line can answer ``--help`` at once.
 """
 
@@ -23,7 +23,7 @@ __version__ = "0.2.0"
 
 def __getattr__(name: str) -> Any:
     public = import_module(f"{__name__}.public")
-    globals().update({known: getattr(public, known) for known in [*public.__all__, "__all__"]})
+    globals().update({name: getattr(public, name) for name in [*public.__all__, "__all__"]})
     try:
         return globals()[name]
     except KeyError:

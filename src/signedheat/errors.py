@@ -88,7 +88,7 @@ class FileFormatError(SignedHeatError):
 
 
 class UnsupportedTypeError(SignedHeatError, TypeError):
-    """An argument of a type that is not known here: no domain, no constraint, no field."""
+    """An argument of a type that has no meaning here: no domain, no constraint, no field."""
 
 
 class MissingPackageError(SignedHeatError, ImportError):

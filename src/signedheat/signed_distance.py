@@ -194,11 +194,11 @@ def signed_distance(
     """
     domain = cast("Domain | None", converted(domain))
     measure = _measure(source, domain)
-    known = [name for name, each in inspect.signature(measure).parameters.items() if each.kind is each.KEYWORD_ONLY]
+    accepted = [name for name, each in inspect.signature(measure).parameters.items() if each.kind is each.KEYWORD_ONLY]
     for option in options:
-        if option not in known:
+        if option not in accepted:
             raise UnsupportedTypeError(
-                f"{option} is no option here", remedy=f"the options are {', '.join(known)}", element=option
+                f"{option} is no option here", remedy=f"the options are {', '.join(accepted)}", element=option
             )
     return measure(source, domain, **options)
 

@@ -67,7 +67,7 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     """
     points = torch.as_tensor(points)
     found = solid.closest(points.detach().cpu().double().numpy())
-    feet = torch.from_numpy(found.points)
+    nearest = torch.from_numpy(found.points)
     if vertices is not None:
         if solid.source is None:
             raise SourceError(
@@ -85,9 +85,10 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
         weights = torch.from_numpy(found.barycentric[given])
         moves = vertices.cpu().double()
         moves = moves - moves.detach()
-        feet = feet.index_add(0, torch.from_numpy(given), (weights[..., None] * moves[corners]).sum(dim=1))
+        nearest = nearest.index_add(0, torch.from_numpy(given), (weights[..., None] * moves[corners]).sum(dim=1))
     exact = points.cpu().double()
     slopes = torch.from_numpy(found.gradients)
-    values = torch.from_numpy(found.distances) + ((exact - exact.detach() - (feet - feet.detach())) * slopes).sum(dim=1)
+    moved = (exact - exact.detach()) - (nearest - nearest.detach())
+    values = torch.from_numpy(found.distances) + (moved * slopes).sum(dim=1)
     result: Tensor = values.to(device=points.device, dtype=points.dtype)
     return result

@@ -21,9 +21,9 @@ def redistance(
     """Signed distance of the nodes of a grid to the zero set of an array: of a level set, or of an image of ±1.
 
     Where the zero set is smooth, distance is of second order, and exact for planes and spheres; at its edges it is
-    that to the contour of values that are linear between nodes. An array of two opposite values tells the side of each
-    node and nothing else: of the contours that part them so, a smooth one is taken. In rough arrays the nearest piece
-    of the zero set may be missed, and distance be up to a third of a cell too large.
+    that to the contour of values that are linear between nodes. An array of two opposite values has the side of each
+    node and nothing else: of the contours that separate them so, a smooth one is taken. In rough arrays the nearest
+    piece of the zero set may be missed, and distance be up to a third of a cell too large.
 
     Parameters
     ----------

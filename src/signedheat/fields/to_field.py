@@ -34,7 +34,7 @@ AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
 @singledispatch
 def to_field(discretization: Any, values: NDArray[np.float64], source: Any, diagnostics: Diagnostics) -> Field:
     """The field with the values of a discretisation's unknowns, and with its notes added to the diagnostics."""
-    raise UnsupportedTypeError(f"no field is known for {type(discretization).__name__}", element="domain")
+    raise UnsupportedTypeError(f"there is no field for {type(discretization).__name__}", element="domain")
 
 
 @to_field.register
@@ -62,8 +62,8 @@ def _(
             "distance there is NaN",
             UnreachedWarning,
         )
-    told = replace(diagnostics, unreached=unreached).noting(sampled(source.whole))
-    return GridField(grid, everywhere.reshape(grid.shape), told)
+    noted = replace(diagnostics, unreached=unreached).noting(sampled(source.whole))
+    return GridField(grid, everywhere.reshape(grid.shape), noted)
 
 
 @to_field.register
@@ -92,11 +92,11 @@ def _(
         )
     small = small_loops(source)
     notes = (*discretization.notes, *([SmallLoops(small)] if small else []))
-    told = replace(diagnostics, unreached=unreached).noting(*notes)
+    noted = replace(diagnostics, unreached=unreached).noting(*notes)
     finer = None
     if triangulation is not None:
-        finer = VertexField(triangulation, everywhere[: triangulation.n_vertices], told, source)
-    return VertexField(discretization.domain, values, told, source, finer)
+        finer = VertexField(triangulation, everywhere[: triangulation.n_vertices], noted, source)
+    return VertexField(discretization.domain, values, noted, source, finer)
 
 
 @to_field.register
@@ -113,8 +113,8 @@ def _(
             UnreachedWarning,
         )
     turned = (TetsTurned(len(mesh.reoriented)),) if len(mesh.reoriented) else ()
-    told = replace(diagnostics, unreached=unreached).noting(*source.notes, *turned)
-    return TetField(mesh, at_vertices, told, source)
+    noted = replace(diagnostics, unreached=unreached).noting(*source.notes, *turned)
+    return TetField(mesh, at_vertices, noted, source)
 
 
 def sampled(source: GridSource) -> SampledSource:

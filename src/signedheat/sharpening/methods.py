@@ -178,5 +178,5 @@ def at_most_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def typical_size(sizes: NDArray[np.float64], dimension: int) -> float:
-    """A length from areas or volumes: a field that varies by less is constant, and tells no scale."""
+    """A length from areas or volumes: a field that varies by less is constant, and has no scale."""
     return float(sizes.mean() ** (1 / dimension))

@@ -72,7 +72,7 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
     smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With
     ``curves``: exact distance to the curves and points themselves, however they cross the faces. In regions that curves
-    bound, these tell the side; elsewhere the field does, and its zero set stands in for missing curve where it is
+    bound, these decide the side; elsewhere the field does, and its zero set replaces missing curve where it is
     farther from any curve than the triangles are large, or begins at the free end of one.
 
     On tets: distance along straight lines in space, which bend around the boundary of the mesh, to the zero set. With a

@@ -45,7 +45,7 @@ class Reached:
 
     distances: NDArray[np.float64]
     nearest: NDArray[np.int64]
-    feet: NDArray[np.float64]
+    points: NDArray[np.float64]
     hidden: int
 
 
@@ -68,7 +68,7 @@ def distance_around(
     triangles_at = by_element(surface.corners, len(surface.positions), 3)
     queue = Queue.empty(len(points))
     slack = GRAZING * lowered.spacing
-    distance, nearest, feet, hidden = any_angle_distance(
+    distance, nearest, found, hidden = any_angle_distance(
         walls,
         points,
         *tets_at,
@@ -81,7 +81,7 @@ def distance_around(
         queue,
     )
     curved = np.flatnonzero(np.isfinite(distance) & (surface.owners[nearest] >= 0))
-    tets, places = surface.owners[nearest[curved]], feet[curved]
+    tets, places = surface.owners[nearest[curved]], found[curved]
     weights = barycentric(mesh, tets, places + planes.center)
     gradients = mesh.geometry.mean_gradients(np.nan_to_num(values), unknowns, len(values))[unknowns[tets]]
     slope = np.linalg.norm(np.einsum("pk,pki->pi", weights, gradients), axis=1)
@@ -89,7 +89,7 @@ def distance_around(
     most = LARGEST_BEND * lowered.spacing
     bend = np.clip(rise / np.where(slope > 0, slope, np.inf), -most, most)
     distance[curved] = np.maximum(distance[curved] + np.copysign(1.0, values[curved]) * bend, 0.0)
-    return Reached(distance, nearest, feet, int(hidden))
+    return Reached(distance, nearest, found, int(hidden))
 
 
 def by_element(ids: NDArray[np.int64], n: int, width: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -31,13 +31,13 @@ MOST_PER_NODE = 22
 BYTES_AROUND_SOLIDS = {1: 3400, 2: 3400, 3: 1100, 4: 1500}
 """The same on grids with solid nodes, by dimension."""
 ROOM = 1.08
-"""By how much the spacing that is told to fit is larger than it must be: what is free changes from run to run."""
+"""By how much the suggested spacing is larger than it must be: what is free changes from run to run."""
 
 
-def memory_estimate(grid: Grid, per_node: float | None = None, beside: float = 0.0) -> int:
+def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.0) -> int:
     """Estimated peak memory of a distance computation on the grid, in bytes; of others, if `per_node` is given.
 
-    What is needed `beside` the nodes and the libraries is added.
+    `extra` bytes, needed for neither nodes nor libraries, are added.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def memory_estimate(grid: Grid, per_node: float | None = None, beside: float = 0
     """
     if per_node is None:
         per_node = (BYTES_PER_NODE if grid.mask is None else BYTES_AROUND_SOLIDS)[grid.dimension]
-    return int(per_node * grid.n_nodes + beside) + libraries()
+    return int(per_node * grid.n_nodes + extra) + libraries()
 
 
 def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> float:
@@ -66,20 +66,20 @@ def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> 
 def refuse_beyond_memory(
     grid: Grid,
     per_node: float | None = None,
-    beside: float = 0.0,
+    extra: float = 0.0,
     area: float = 0.0,
     at_most: tuple[float, float, float] | None = None,
 ) -> None:
     """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory; allocates nothing.
 
-    Of φ alone, more is known when the area of the surface is. The spacing that is told has room for `at_most`:
+    For φ alone, the area of the surface makes the estimate better. The suggested spacing has room for `at_most`:
     bytes for each node, bytes besides and area, where it may turn out that so much is needed.
     """
-    available, needed = available_memory(), memory_estimate(grid, per_node, beside)
+    available, needed = available_memory(), memory_estimate(grid, per_node, extra)
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
         return
-    fitting = ROOM * fitting_spacing(grid, available, *(at_most or (per_node, beside, area)))
+    fitting = ROOM * fitting_spacing(grid, available, *(at_most or (per_node, extra, area)))
     spacing = " × ".join(dict.fromkeys(f"{step:.3g}" for step in fitting))
     coarser = f"choose a spacing of {spacing} or more, or a lower resolution"
     some_nodes = (fitting < grid.upper - grid.origin).all()
@@ -91,11 +91,11 @@ def refuse_beyond_memory(
 
 
 def fitting_spacing(
-    grid: Grid, available: int, per_node: float | None = None, beside: float = 0.0, area: float = 0.0
+    grid: Grid, available: int, per_node: float | None = None, extra: float = 0.0, area: float = 0.0
 ) -> NDArray[np.float64]:
     """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
-    base = memory_estimate(grid, 0.0, beside)
-    whole = memory_estimate(grid, per_node, beside) - base
+    base = memory_estimate(grid, 0.0, extra)
+    whole = memory_estimate(grid, per_node, extra) - base
     spacing = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
     per_node = whole / grid.n_nodes
 

@@ -13,7 +13,7 @@ from ...domains.grid import Grid
 from ...operators.grid.walls import lines_are_clear
 
 REFLECTION = 3
-"""Width, in nodes, of the layer beside a wall in which reflected heat turns gradients by more than a degree."""
+"""Width, in nodes, of the layer along a wall in which reflected heat turns gradients by more than a degree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +76,8 @@ class FreeNodes:
         result = np.zeros(len(directions))
         for axis, step in enumerate(self.grid.spacing):
             for side, sign in ((2 * axis, 1.0), (2 * axis + 1, -1.0)):
-                beside, component = self.neighbors[:, side], directions[:, axis]
-                result += np.where(beside >= 0, sign * (component + component[beside]) / (2 * step), 0.0)
+                neighbors, component = self.neighbors[:, side], directions[:, axis]
+                result += np.where(neighbors >= 0, sign * (component + component[neighbors]) / (2 * step), 0.0)
         return result
 
     def gradients(self, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -142,7 +142,7 @@ def edges_of(vertices: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[
     base = np.floor(vertices)
     crossed = vertices > base
     on_edge = crossed.sum(axis=1) == 1
-    a, b, c = base.astype(np.int64).T + 1  # −1 beside walls
+    a, b, c = base.astype(np.int64).T + 1  # −1 next to walls
     return on_edge, ((a << BITS | b) << BITS | c) * 4 + np.where(on_edge, crossed.argmax(axis=1), 3)
 
 
@@ -180,7 +180,7 @@ def contour_parts(
     """The vertices and faces of `block_contour`, in another order, window by window.
 
     Faces use vertices of their own part and of those before. Only the vertices on walls between windows are kept, as
-    long as windows beside them are to come.
+    long as neighboring windows are to come.
 
     Parameters
     ----------

@@ -123,8 +123,8 @@ def _settle(
                 for side in range(2):
                     at = np.int64(node[d]) + 2 * side - 1
                     if 0 <= at < counts[d]:
-                        beside = v + (2 * side - 1) * strides[d]
-                        if not settled[beside] and not solid[beside]:
+                        neighbor = v + (2 * side - 1) * strides[d]
+                        if not settled[neighbor] and not solid[neighbor]:
                             push(queue, v, distances[v])
     while queue.size[0] > 0:
         u = pop(queue)

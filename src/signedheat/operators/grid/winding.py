@@ -1,8 +1,8 @@
 """Winding numbers on a grid: one Poisson equation says how often a shape winds around every node.
 
 The winding number of a surface falls by one where it is crossed along its normal and is harmonic elsewhere (Jacobson et
-al. 2013), so that ``−Δw = ∇·(n δ)``, n δ the area vectors spread over the nodes around them. What the shape does to the
-walls of the box, the far field of its area vectors tells.
+al. 2013), so that ``−Δw = ∇·(n δ)``, n δ the area vectors spread over the nodes around them. On the walls of the box
+w is the far field of the area vectors.
 """
 
 from __future__ import annotations

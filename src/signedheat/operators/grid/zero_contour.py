@@ -47,7 +47,7 @@ class Contour(NamedTuple):
     edges : (e, 5) int
         Node (4 indices) and axis of each edge that it crosses.
     zeros : (c − e, 4) int
-        Nodes that are zero, with nothing negative beside them: they count as crossings, behind the others.
+        Nodes that are zero, without a negative neighbor: they count as crossings, behind the others.
     points : (c, 4) float
         The crossings: where smooth on the zero set of the cubic interpolant, else of values linear along edges.
     curved : (c, 18) float
@@ -102,7 +102,7 @@ def zero_contour(
     steps : (4,) float
         Distance between nodes; 1 along unused axes.
     solid : (*values.shape) bool, optional
-        Nodes whose values are not known: only crossings between two others count.
+        Nodes without a value: only crossings between two others count.
     """
     unused = 4 - values.ndim
     field = np.ascontiguousarray(values).reshape(padded_shape(values.shape))
@@ -162,7 +162,7 @@ def _marched(
     """Vertices, in cells, and triangles; the edges that the array's crossings are on; their numbers by vertex, or −1.
 
     Marching cubes (Lewiner et al. 2003) decides how crossings are connected, by values that are compressed, so that
-    every crossing tells its edge. Arrays with fewer than three axes are repeated along axes before theirs.
+    the edge of every crossing can be read off. Arrays with fewer than three axes are repeated along axes before theirs.
     """
     unused = 3 - values.ndim
     if not ((values < 0).any() and (values >= 0).any()):
