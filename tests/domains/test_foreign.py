@@ -221,3 +221,27 @@ def test_tets_of_meshio_that_are_no_rows_of_four_vertices_are_refused():
     mesh.cells[0].data = np.zeros((1, 8), dtype=int)
     with refused(sh.errors.GeometryError, "tets"):
         sh.TetMesh.from_meshio(mesh)
+
+
+class OnlyDlpack:
+    """An array of a library that NumPy cannot read otherwise."""
+
+    def __init__(self, values):
+        self.values = np.array(values)
+
+    def __dlpack__(self, stream=None, **options):
+        return self.values.__dlpack__()
+
+    def __dlpack_device__(self):
+        return self.values.__dlpack_device__()
+
+
+def test_arrays_through_dlpack():
+    ball = samples.sphere(2)
+    shape = sh.TriangleMesh(OnlyDlpack(ball.vertices), OnlyDlpack(np.array(ball.faces)))
+    points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    found = sh.complete(shape).distance(OnlyDlpack(points))
+    np.testing.assert_array_equal(found, sh.complete(ball).distance(points))
+    np.testing.assert_array_equal(np.from_dlpack(found), found)
+    levels = np.array([1.0, -1.0, 3.0])
+    np.testing.assert_array_equal(sh.redistance(OnlyDlpack(levels)), sh.redistance(levels))

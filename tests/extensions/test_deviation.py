@@ -32,6 +32,15 @@ def test_turned_faces_of_scan_and_part_do_not_matter():
     np.testing.assert_array_equal(sh.deviation(samples.with_flipped_faces(scan, 0.5), broken).distances, exact)
 
 
+@pytest.mark.parametrize("kind", [sh.TriangleMesh, sh.PolygonMesh])
+def test_vertices_that_no_face_uses_were_not_scanned(kind):
+    ball = samples.sphere(2, 1.1)
+    stray = kind(np.vstack([[[9.0, 9.0, 9.0]], ball.vertices]), ball.faces + 1)
+    found = sh.deviation(stray, samples.sphere(4))
+    np.testing.assert_array_equal(found.distances, sh.deviation(ball, samples.sphere(4)).distances)
+    np.testing.assert_array_equal(found.points, ball.vertices)
+
+
 def test_places_on_completion_are_marked():
     half = samples.sphere(3)
     half = sh.TriangleMesh(half.vertices, half.faces[half.vertices[half.faces].mean(axis=1)[:, 2] < 0.8])

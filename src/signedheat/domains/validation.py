@@ -69,11 +69,12 @@ def whole_numbers(values: object, name: str, error: type[SignedHeatError] = Geom
 
 
 def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[Any]:
-    """`values` as an array of any type."""
+    """`values`, rows of numbers or an array of any library that NumPy can read or that speaks DLPack, as an array."""
     if np.ma.isMaskedArray(values):
         raise error(f"{name} are a masked array", remedy="drop what is masked, or fill it in", element=name)
     try:
-        return np.asarray(values)
+        dlpack = hasattr(values, "__dlpack__") and not hasattr(values, "__array__")
+        return np.from_dlpack(values) if dlpack else np.asarray(values)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
         raise error(f"{name} do not form an array: rows differ in length or kind", element=name) from None
 

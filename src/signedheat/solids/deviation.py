@@ -40,7 +40,7 @@ class Deviation(Frozen):
     Attributes
     ----------
     scan : PointCloud, TriangleMesh or PolygonMesh
-        What was scanned.
+        What was scanned, without vertices that no face uses.
     distances : (n,) float
         Of its points or vertices, in their units.
     nearest : (n, 3) float
@@ -153,9 +153,22 @@ def deviation(
         shape = shape.boundary
     if not isinstance(shape, PointCloud | TriangleMesh | PolygonMesh):
         raise SourceError(f"a {type(shape).__name__} is no scan", remedy="pass a mesh or points", element="scan")
+    shape = shape if isinstance(shape, PointCloud) else _without_unused_vertices(shape)
     solid = nominal if isinstance(nominal, Solid) else complete(nominal, progress=progress)
     points = shape.points if isinstance(shape, PointCloud) else shape.vertices
     if points.shape[1] != 3:
         raise SourceError("the scan lies in the plane", remedy="pass a shape in space", element="scan")
     found = solid.closest(points)
     return Deviation(shape, found.distances, found.points, found.completed)
+
+
+def _without_unused_vertices(mesh: TriangleMesh | PolygonMesh) -> TriangleMesh | PolygonMesh:
+    """The mesh itself if faces use all its vertices: others were not scanned."""
+    corners = mesh.faces if isinstance(mesh, TriangleMesh) else mesh.corners
+    used, numbers = np.unique(corners, return_inverse=True)
+    if len(used) == mesh.n_vertices:
+        return mesh
+    vertices = mesh.vertices[used]
+    if isinstance(mesh, TriangleMesh):
+        return TriangleMesh(vertices, numbers.reshape(-1, 3))
+    return PolygonMesh(vertices, np.split(numbers, mesh.offsets[1:-1]))
