@@ -224,7 +224,7 @@ def in_delaunay_triangles(
         return None
     finer, merged = triangles, MergedSources.of([part for part in parts if part is not None])
     faces, edges = affected_elements(triangles, merged, [True] * len(parts))
-    if faces or edges:
+    if len(faces) or len(edges):
         finer, merged, _ = FaceCutter(triangles, merged, faces, edges).assemble()
     flipped, merged = flip_new_faces(finer, merged, np.ones(finer.n_faces, dtype=bool))
     return flipped, [PlacedSegments.of(flipped, merged.parts([False] * len(parts)))]

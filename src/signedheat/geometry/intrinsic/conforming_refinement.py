@@ -10,8 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import breadth_first_order
 
-from ..constrained_triangulation import arrange, paths_along, triangulate
+from ...errors import SourceError
+from ..constrained_triangulation import Triangulation, edges_of
 from ..curve_segments import CurveSegments
 from ..edges import EdgeTable
 from ..intrinsic_mesh import IntrinsicMesh
@@ -105,56 +108,47 @@ class MergedSources:
 
 def affected_elements(
     triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]
-) -> tuple[set[int], set[int]]:
-    """Faces to cut and edges to split: those of nonconforming sources, and those that these entail in turn."""
-    nodes, inside = merged.nodes, merged.edges < 0
-    nodes_of, pieces_of = defaultdict(list), defaultdict(list)
-    for i in np.flatnonzero(nodes.kinds == FACE).tolist():
-        nodes_of[int(nodes.elements[i])].append(i)
-    for p in np.flatnonzero(inside).tolist():
-        pieces_of[int(merged.faces[p])].append(p)
-    on_edges = np.unique(nodes.elements[nodes.kinds == EDGE])
-    marked = np.zeros(triangles.n_edges, dtype=bool)
-    marked[on_edges] = True
-    faces_of = defaultdict(list)
-    for f, k in zip(*(a.tolist() for a in np.nonzero(marked[triangles.edges.face_edges])), strict=True):
-        faces_of[int(triangles.edges.face_edges[f, k])].append(f)
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Faces to cut and edges to split: those of nonconforming sources, and those that these entail in turn.
 
-    wanted = np.unique(np.concatenate([s for s, bad in zip(merged.samples, unfit, strict=True) if bad]))
-    bad_pieces = inside & np.asarray(unfit)[merged.owners]
-    queue = [int(e) for e in nodes.elements[wanted][nodes.kinds[wanted] == FACE]]
-    queue += merged.faces[bad_pieces].tolist()
-    edges = {int(e) for e in nodes.elements[wanted][nodes.kinds[wanted] == EDGE]}
-    for e in edges:
-        queue += faces_of[e]
-    faces: set[int] = set()
-    while queue:
-        face = queue.pop()
-        if face in faces:
-            continue
-        faces.add(face)
-        for p in pieces_of[face]:
-            for i in merged.ends[p].tolist():
-                e = int(nodes.elements[i])
-                if nodes.kinds[i] == EDGE and e not in edges:
-                    edges.add(e)
-                    queue += faces_of[e]
-    return faces, edges
+    Where a face is cut, the edges on which a segment in it ends are split; where an edge is split, its faces are cut.
+    """
+    nodes, inside, m = merged.nodes, merged.edges < 0, triangles.n_faces
+    last = m + triangles.n_edges
+    face, end = np.repeat(merged.faces[inside], 2), merged.ends[inside].ravel()
+    on_edge = nodes.kinds[end] == EDGE
+    with_points = np.zeros(triangles.n_edges, dtype=bool)
+    with_points[nodes.elements[nodes.kinds == EDGE]] = True
+    at, side = np.nonzero(with_points[triangles.edges.face_edges])
+    wanted = nodes[np.unique(np.concatenate([s for s, bad in zip(merged.samples, unfit, strict=True) if bad]))]
+    begin = [
+        merged.faces[inside & np.asarray(unfit)[merged.owners]],
+        wanted.elements[wanted.kinds == FACE],
+        m + wanted.elements[wanted.kinds == EDGE],
+    ]
+    heads = np.concatenate([m + nodes.elements[end[on_edge]], at, *begin])
+    tails = [face[on_edge], m + triangles.edges.face_edges[at, side]]
+    tails = np.concatenate([*tails, np.full(len(heads) - len(tails[0]) - len(at), last)])
+    graph = csr_matrix((np.ones(len(heads)), (tails, heads)), shape=(last + 1, last + 1))
+    reached = np.sort(breadth_first_order(graph, last, return_predecessors=False))[:-1]
+    return reached[reached < m], reached[reached >= m] - m
 
 
 class FaceCutter:
     """An intrinsic mesh while some of its faces are being cut."""
 
-    def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: set[int], edges: set[int]) -> None:
+    def __init__(
+        self, triangles: IntrinsicMesh, merged: MergedSources, faces: NDArray[np.int64], edges: NDArray[np.int64]
+    ) -> None:
         self.triangles, self.merged = triangles, merged
         self.n_vertices, self.n_edges = triangles.n_vertices, triangles.n_edges
         self.faces: list[NewFace] = []
         self.pieces: list[NewSegment] = []
-        self.cut_faces = sorted(faces)
+        self.cut_faces = faces.tolist()
         nodes = merged.nodes
         self.vertex_of = np.where(nodes.kinds == VERTEX, nodes.elements, -1).tolist()
         self.node_at = {v: i for i, v in enumerate(self.vertex_of) if v >= 0}
-        self.on_edge: dict[int, list[int]] = {e: [] for e in sorted(edges)}
+        self.on_edge: dict[int, list[int]] = {e: [] for e in edges.tolist()}
         self.in_face: dict[int, list[int]] = {f: [] for f in self.cut_faces}
         for i, (kind, element) in enumerate(zip(nodes.kinds.tolist(), nodes.elements.tolist(), strict=True)):
             home = self.on_edge if kind == EDGE else self.in_face if kind == FACE else {}
@@ -240,23 +234,28 @@ class FaceCutter:
                 edge_of[chain[j], chain[j + 1]] = sub, forward
                 along = (chain[j], chain[j + 1]) if forward else (chain[j + 1], chain[j])
                 frames[sub] = (*along, bool(triangles.reflected[face, k]))
+        cut = Triangulation.of(points, sides)
         for i in self.in_face[face]:
-            points.append((float(merged.nodes.barycentric[i, 1]), float(merged.nodes.barycentric[i, 2])))
+            cut.insert((float(merged.nodes.barycentric[i, 1]), float(merged.nodes.barycentric[i, 2])))
             vertices.append(self.vertex_of[i])
 
         local = {v: k for k, v in reversed(list(enumerate(vertices)))}
-        ends = [tuple(local[self.vertex_of[i]] for i in merged.ends[p].tolist()) for p in inside]
-        chains = arrange(points, ends)
-        vertices += [self.new_vertex() for _ in range(len(points) - len(vertices))]
-        flat = np.array(points)
+        ends = [[local[self.vertex_of[i]] for i in merged.ends[p].tolist()] for p in inside]
+        ways = [cut.connect(*pair) for pair in ends]
+        if any(way[-1] != end for way, (_, end) in zip(ways, ends, strict=True)):
+            raise SourceError(
+                f"the curves cross face {face}, which is as thin as rounding",
+                remedy="merge the vertices that nearly coincide",
+                element=f"face {face}",
+            )
+        vertices += [self.new_vertex() for _ in range(len(cut.points) - len(vertices))]
+        flat = np.array(cut.points)
         q = triangles.corner_positions[face]
         positions = q[0] + flat[:, 0] * (q[1] - q[0]) + flat[:, 1] * (q[2] - q[0])
 
-        segments = [pair for chain in chains for pair in pairwise(chain)]
-        parts = triangulate(points, sides, segments)
-        for corner in parts:
+        for corner in cut.triangles:
             edges, ahead = [], []
-            for u, v in pairwise((*corner, corner[0])):
+            for u, v in edges_of(corner):
                 if (u, v) not in edge_of:
                     edge = self.new_edge()
                     edge_of[u, v], edge_of[v, u], frames[edge] = (edge, True), (edge, False), (u, v, False)
@@ -264,7 +263,7 @@ class FaceCutter:
                 ahead.append(edge_of[u, v][1])
             self.faces.append(NewFace(face, [vertices[i] for i in corner], edges, ahead, positions[list(corner)]))
 
-        for p, chain in zip(inside, paths_along(points, parts, chains), strict=True):
+        for p, chain in zip(inside, map(cut.along, ways), strict=True):
             whole = abs(positions[chain[-1]] - positions[chain[0]])
             for u, v in pairwise(chain):
                 edge = (edge_of.get((u, v)) or edge_of[v, u])[0]
@@ -357,8 +356,9 @@ def points_on_elements(
     at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
     vertices = points_at_vertices(triangles, elements[at_vertex])
     faces[at_vertex], weights[at_vertex] = vertices.faces, vertices.barycentric
-    side = triangles.first_halfedges[elements[on_edge]]
-    faces[on_edge], weights[on_edge] = side // 3, barycentric_on_sides(side % 3, along[on_edge])
+    faces[on_edge], side = np.divmod(triangles.first_halfedges[elements[on_edge]], 3)
+    ahead = triangles.edges.forward[faces[on_edge], side]
+    weights[on_edge] = barycentric_on_sides(side, np.where(ahead, along[on_edge], 1 - along[on_edge]))
     return LocatedPoints(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
 
 
@@ -371,29 +371,18 @@ def flip_new_faces(
     """
     if not triangles.agree_on_lengths:
         return triangles, merged
-    on_edge = merged.edges >= 0
+    on_edge, nodes = merged.edges >= 0, merged.nodes
     fixed = np.ones(triangles.n_edges, dtype=bool)
     fixed[triangles.edges.face_edges[is_new]] = False
     fixed[merged.edges[on_edge]] = True
     fixed[triangles.edges.face_edges[merged.faces[~on_edge]]] = True
-    fixed[triangles.edges.face_edges[merged.nodes.elements[merged.nodes.kinds == FACE]]] = True
-    fixed[merged.nodes.elements[merged.nodes.kinds == EDGE]] = True
-    gluing = flip_all(glue(triangles, fixed))
-    better = lay_out(gluing)
-
-    side = better.first_halfedges
-    ahead, same = gluing.forward[side], gluing.front[side]  # the frame of an edge, in what is its first face by now
-    carrier = merged.edges[on_edge]
-    vectors, faces = merged.vectors.copy(), merged.faces.copy()
-    seen = vectors[on_edge]
-    vectors[on_edge] = np.where(ahead[carrier], 1, -1) * seen.real + 1j * np.where(same[carrier], 1, -1) * seen.imag
-    faces[on_edge] = side[carrier] // 3
-    inside = merged.faces[~on_edge]
-    turned = better.edge_vectors[inside, 0] * np.conj(triangles.edge_vectors[inside, 0])
-    vectors[~on_edge] *= turned / np.abs(turned)
-
-    nodes = merged.nodes
-    along = np.where((nodes.kinds == EDGE) & ~ahead[np.where(nodes.kinds == EDGE, nodes.elements, 0)], 1, 0)
-    along = np.where(along, 1 - nodes.along, nodes.along)
-    located = points_on_elements(better, nodes.kinds, nodes.elements, along, nodes.barycentric)
-    return better, replace(merged, nodes=located, faces=faces, vectors=vectors)
+    fixed[triangles.edges.face_edges[nodes.elements[nodes.kinds == FACE]]] = True
+    fixed[nodes.elements[nodes.kinds == EDGE]] = True
+    better = lay_out(flip_all(glue(triangles, fixed)))
+    same = (better.edges.face_edges == triangles.edges.face_edges).all(axis=1)
+    positions = np.where(same[:, None], triangles.corner_positions, better.corner_positions)
+    better = replace(better, corner_positions=positions)  # faces of which no edge was flipped keep their layout
+    faces = merged.faces.copy()
+    faces[on_edge] = better.first_halfedges[merged.edges[on_edge]] // 3
+    located = points_on_elements(better, nodes.kinds, nodes.elements, nodes.along, nodes.barycentric)
+    return better, replace(merged, nodes=located, faces=faces)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,15 +48,15 @@ def flip_to_delaunay(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | 
 
 def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> Gluing:
     """Start an intrinsic triangulation, with an empty history."""
-    edges = triangles.edges
+    edges, first = triangles.edges, triangles.first_halfedges
     edge, n_edges = edges.face_edges.ravel(), triangles.n_edges
     starts, order = triangles.halfedges_of_edges
-    first, last = starts[:-1], starts[1:] - 1
+    used = starts[1:] > starts[:-1]
     sibling = np.empty_like(edge)
     sibling[order] = np.roll(order, -1)
-    used = first <= last
-    sibling[order[last[used]]] = order[first[used]]
-    start = np.where(used, order[np.minimum(first, len(order) - 1)], 0)
+    sibling[order[starts[1:][used] - 1]] = order[starts[:-1][used]]
+    start, front = np.zeros(n_edges, dtype=np.int64), np.zeros(len(edge), dtype=bool)
+    start[edge[first]], front[first] = first, True
     sums = np.bincount(edge, weights=triangles.edge_lengths.ravel(), minlength=n_edges)
     lengths = sums / np.maximum(edges.face_counts, 1)
     unit = _power_of_two(lengths.mean())
@@ -63,7 +65,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None)
         tail=triangles.corner_vertices.ravel().copy(),
         edge=edge.copy(),
         forward=edges.forward.ravel().copy(),
-        front=start[edge] == np.arange(len(edge)),
+        front=front,
         sibling=sibling,
         start=start,
         length=lengths / unit,
@@ -88,19 +90,17 @@ def flip_all(gluing: Gluing) -> Gluing:
 
 
 def lay_out(gluing: Gluing) -> IntrinsicMesh:
-    """The current triangulation as an intrinsic mesh. Edges keep their ids."""
+    """The current triangulation as an intrinsic mesh. Edges keep their ids and their frames."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
-    corners, edge = gluing.tail[: 3 * n_faces].reshape(-1, 3), gluing.edge[: 3 * n_faces]
-    forward, heads = gluing.forward[: 3 * n_faces], np.roll(corners, -1, axis=1).ravel()
-    first = np.zeros(n_edges, dtype=np.int64)
-    first[edge[::-1]] = np.arange(3 * n_faces)[::-1]
-    table = EdgeTable(
-        np.stack([gluing.tail[first], heads[first]], axis=1),
-        edge.reshape(-1, 3).copy(),
-        (forward == forward[first[edge]]).reshape(-1, 3),
-    )
-    lengths = gluing.length[edge].reshape(-1, 3) * gluing.unit
-    return IntrinsicMesh.from_lengths(corners.copy(), lengths, n_vertices, table)
+    corners, edge = gluing.tail[: 3 * n_faces].reshape(-1, 3).copy(), gluing.edge[: 3 * n_faces].copy()
+    front, heads = np.flatnonzero(gluing.front[: 3 * n_faces]), np.roll(corners, -1, axis=1).ravel()
+    leading = np.full(n_edges, -1)
+    leading[edge[front]] = front
+    ends = np.stack([corners.ravel()[leading], heads[leading]])
+    vertices = np.where(gluing.forward[leading], ends, ends[::-1]).T
+    table = EdgeTable(vertices, edge.reshape(-1, 3), gluing.forward[: 3 * n_faces].reshape(-1, 3).copy())
+    mesh = IntrinsicMesh.from_lengths(corners, gluing.length[table.face_edges] * gluing.unit, n_vertices, table)
+    return replace(mesh, leading_sides=leading[leading >= 0])
 
 
 def doubled(array: NDArray) -> NDArray:

@@ -32,8 +32,8 @@ class Gluing(NamedTuple):
     forward : (3 m,) bool
         Whether the halfedge runs in the direction of its edge.
     front : (3 m,) bool
-        Which of the two sides of its edge the halfedge is on; transferred through all steps, so that the two sides of a
-        source can be told apart.
+        Which of the two sides of its edge the halfedge is on: it stays through all steps, so that the two sides of a
+        source do, until the edge is flipped.
     sibling : (3 m,) int
         Next halfedge of the same edge, cyclically; the halfedge itself at a boundary.
     start : (e,) int
@@ -214,6 +214,7 @@ def flip(g, h):
     g.tail[t], g.tail[t1], g.tail[t2] = a, b, j
     g.length[g.edge[h]] = length
     g.forward[h], g.forward[t] = True, False
+    g.front[h], g.front[t] = True, False  # it is another edge now
     return True
 
 

@@ -52,7 +52,7 @@ class ConformingRefinement(Frozen):
             return cls(triangles, marked, parents, corners)
         merged = MergedSources.of(parts)
         faces, edges = affected_elements(triangles, merged, [True] * len(parts))
-        if faces or edges:
+        if len(faces) or len(edges):
             cut = FaceCutter(triangles, merged, faces, edges)
             finer, merged, is_new = cut.assemble()
             kept = np.setdiff1d(parents, cut.cut_faces)
