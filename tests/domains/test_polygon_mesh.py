@@ -5,7 +5,8 @@ import pytest
 
 import signedheat as sh
 from shapes import domain_cases as cases
-from signedheat.geometry.virtual_refinement import cut_into_triangles, virtual_refinement, virtual_vertices
+from signedheat.geometry.ear_clipping import cut_into_ears
+from signedheat.geometry.virtual_refinement import virtual_refinement, virtual_vertices
 
 
 def refined(vertices, polygons):
@@ -54,7 +55,7 @@ def test_polygons_far_from_convex_are_covered_once(turns):
     assert mesh.face_areas.sum() == pytest.approx(8, rel=1e-12)
     normal = mesh.face_area_vectors.sum(axis=0)
     assert (mesh.face_area_vectors @ normal > 0).all()
-    assert len(cut_into_triangles(corners)) == 6
+    assert len(cut_into_ears(corners, normal)) == 6
 
 
 def test_a_polygon_that_crosses_itself_is_still_covered():

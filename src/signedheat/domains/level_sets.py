@@ -167,5 +167,4 @@ def inward(mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64]) 
 def is_consistent(mesh: Triangles) -> bool:
     """Whether the faces are consistently oriented: no two run along an edge in the same direction."""
     edges = mesh.edges
-    ahead = np.bincount(edges.face_edges.ravel(), edges.forward.ravel(), len(edges.vertices))
-    return bool((ahead <= 1).all() and (edges.face_counts - ahead <= 1).all())
+    return bool((edges.face_counts + np.abs(edges.balance) <= 2).all())

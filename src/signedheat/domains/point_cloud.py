@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.local_triangulations import LocalTriangulations, local_triangulations
+from ..geometry.welding import same_rows
 from .exchange import Exchangeable
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
@@ -114,12 +115,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         lower, upper = self.bounds
         cell = 1e-7 * max(float((upper - lower).max()), np.finfo(float).tiny)
         cells = np.rint((self.points - lower) / cell)
-        order = np.lexsort(cells.T[::-1])
-        first = np.ones(self.n_points, dtype=bool)
-        first[1:] = (cells[order[1:]] != cells[order[:-1]]).any(axis=1)
-        owner = np.empty(self.n_points, dtype=np.int64)
-        owner[order] = order[first][np.cumsum(first) - 1]  # lexsort is stable: the first of each is its least id
-        return frozen(owner)
+        return frozen(same_rows(cells.astype(np.int64)))
 
     @cached_property
     def _distinct(self) -> tuple[NDArray[np.int64], LocalTriangulations]:

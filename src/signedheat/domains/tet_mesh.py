@@ -21,7 +21,7 @@ from ..packages import lazy_module
 from .display import Displayed
 from .exchange import save_shape
 from .triangle_mesh import TriangleMesh
-from .validation import coordinates, element_ids, frozen
+from .validation import coordinates, element_ids, frozen, used_bounds
 
 if TYPE_CHECKING:
     import meshio
@@ -134,8 +134,7 @@ class TetMesh(Displayed, Frozen):
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) lower and upper corner of the bounding box of the tets, without unreferenced vertices."""
-        used = self.vertices[np.unique(self.tets)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
+        return used_bounds(self.vertices, self.tets)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a ``.mesh``, ``.msh``, ``.vtu``, ``.vtk``, or ``.node`` and ``.ele`` file."""

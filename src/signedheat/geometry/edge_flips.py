@@ -53,10 +53,10 @@ def flipped_along_creases(
     if not 0 < len(faces) <= MOST:
         return faces
     sharp = _Creases.of(vertices, faces)
-    if not len(sharp.edges):
+    if not len(sharp.sides):
         return faces
     near = np.zeros(len(vertices), dtype=bool)
-    near[faces[sharp.faces_beside]] = True
+    near[faces[sharp.sides // 3]] = True
     some = np.flatnonzero(near[faces].any(axis=1))
     result: NDArray[np.int64] = faces.copy()
     for _ in range(ROUNDS):
@@ -78,43 +78,25 @@ class _Creases:
         Triangles.
     table : EdgeTable
         Their edges.
-    sides : (e, 2) int
-        Sides of faces along each edge, three times the face plus the corner where it begins; −1 where there is none.
     normals : (m, 3) float
         Unit normals.
-    edges : (k,) int
-        Those at which two faces make an angle of more than `SHARP`.
+    sides : (k, 2) int
+        Both halfedges of the edges at which two faces make an angle of more than `SHARP`.
     """
 
     faces: NDArray[np.int64]
     table: EdgeTable
-    sides: NDArray[np.int64]
     normals: NDArray[np.float64]
-    edges: NDArray[np.int64]
+    sides: NDArray[np.int64]
 
     @classmethod
     def of(cls, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> _Creases:
         table = edge_table(faces)
-        flat = table.face_edges.ravel()
-        sides = np.full((len(table.vertices), 2), -1)
-        sides[flat[::-1], 0] = np.arange(len(flat))[::-1]  # the first is written last
-        sides[flat, 1] = np.arange(len(flat))
-        sides[sides[:, 0] == sides[:, 1], 1] = -1
         normals = _unit_normals(vertices, *faces.T)
-        two = np.flatnonzero(sides[:, 1] >= 0)
-        cosines = np.einsum("ij,ij->i", *normals[sides[two] // 3].transpose(1, 0, 2))
-        return cls(faces, table, sides, normals, two[cosines < np.cos(SHARP)])
-
-    @property
-    def faces_beside(self) -> NDArray[np.int64]:
-        """(2 k,) faces at the sharp edges."""
-        return np.asarray(self.sides[self.edges] // 3).ravel()
-
-    def beyond(self, edges: NDArray[np.int64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(k,) the face on the other side of an edge of each of some faces; the face itself where there is none."""
-        one, other = (self.sides[edges] // 3).T
-        found: NDArray[np.int64] = np.where(one == faces, np.where(self.sides[edges, 1] < 0, faces, other), one)
-        return found
+        one = np.flatnonzero(table.mates > np.arange(faces.size))
+        other = table.mates[one]
+        sharp = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) < np.cos(SHARP)
+        return cls(faces, table, normals, np.stack([one, other], axis=1)[sharp])
 
 
 def _flips(
@@ -125,26 +107,26 @@ def _flips(
     The edge from a to b has c and d across; the edge from c to d takes its place, unless there is one already: of the
     vertices that are `whole`, one of which it needs, all faces are here.
     """
-    faces, around = creases.faces, creases.table.face_edges
-    sides = creases.sides[creases.edges]
-    first, second, i, j = sides[:, 0] // 3, sides[:, 1] // 3, sides[:, 0] % 3, sides[:, 1] % 3
+    faces, mates = creases.faces, creases.table.mates
+    (first, second), (i, j) = (creases.sides // 3).T, (creases.sides % 3).T
     a, b = faces[first, i], faces[first, (i + 1) % 3]
     c, d = faces[first, (i + 2) % 3], faces[second, (j + 2) % 3]
-    rim = (  # from, to, the edge, the face it belongs to, and which of the new ones it will
-        (b, c, around[first, (i + 1) % 3], first, 1),
-        (c, a, around[first, (i + 2) % 3], first, 0),
-        (a, d, around[second, (j + 1) % 3], second, 0),
-        (d, b, around[second, (j + 2) % 3], second, 1),
+    rim = (  # from, to, the side, the face it belongs to, and which of the new ones it will
+        (b, c, (i + 1) % 3, first, 1),
+        (c, a, (i + 2) % 3, first, 0),
+        (a, d, (j + 1) % 3, second, 0),
+        (d, b, (j + 2) % 3, second, 1),
     )
     made = np.stack([_unit_normals(vertices, a, d, c), _unit_normals(vertices, d, b, c)])
     normals = creases.normals
     gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *made)
     reach = np.linalg.norm(vertices[c] - vertices[d], axis=1)
     beside = [first, second]
-    for tail, head, edge, owner, new in rim:
-        other = creases.beyond(edge, owner)
+    for tail, head, side, owner, new in rim:
+        beyond = mates[3 * owner + side]
+        there = beyond >= 0
+        other = np.where(there, beyond // 3, owner)
         beside.append(other)
-        there = other != owner
         before = _bend(vertices, tail, head, normals[owner], normals[other])
         gain += np.where(there, before - _bend(vertices, tail, head, made[new], normals[other]), 0.0)
     taken = np.sort(edge_keys(*creases.table.vertices.T))

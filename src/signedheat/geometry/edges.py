@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..frozen import Frozen, read_only
-from .components import connected_components
+from .components import connected_components, grouped
 from .triangle_kernels import find_edges
 
 
@@ -186,6 +186,26 @@ class EdgeTable(Frozen):
     def face_counts(self) -> NDArray[np.int64]:
         """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
         return read_only(np.bincount(self.face_edges.ravel(), minlength=len(self.vertices)))
+
+    @cached_property
+    def balance(self) -> NDArray[np.int64]:
+        """(e,) number of faces that run along each edge, less those that run against it."""
+        ahead = np.bincount(self.face_edges.ravel(), self.forward.ravel(), len(self.vertices)).astype(np.int64)
+        return read_only(2 * ahead - self.face_counts)
+
+    @cached_property
+    def halfedges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(e + 1,) where the halfedges 3 f + k of each edge begin, and the halfedges: see `grouped`."""
+        return grouped(self.face_edges.ravel(), len(self.vertices))
+
+    @cached_property
+    def mates(self) -> NDArray[np.int64]:
+        """(3 m,) the other halfedge of the edge of each, where there are exactly two; else −1."""
+        starts, members = self.halfedges
+        first = starts[:-1][np.diff(starts) == 2]
+        mates = np.full(self.face_edges.size, -1)
+        mates[members[first]], mates[members[first + 1]] = members[first + 1], members[first]
+        return read_only(mates)
 
     def per_edge(self, values: NDArray[Any]) -> NDArray[Any]:
         """(e,) what (m, 3) values at the sides of faces say of each edge: the last of its faces; zero where none is."""

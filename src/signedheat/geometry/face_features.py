@@ -8,9 +8,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
 from .box_tree import morton_codes
-from .components import by_first_use, grouped
+from .components import by_first_use, connected_components, grouped
+from .directions import unit
 from .edges import EdgeTable, edge_table
 from .nearest import triangle_rows
 from .welding import same_positions
@@ -146,12 +146,30 @@ class FaceFeatures:
         if copies.any():
             faces, trusted, ids = faces[~copies], trusted[~copies], ids[~copies]
             table = edge_table(faces)
-        corners = np.ascontiguousarray(vertices[faces].reshape(-1, 9))
+        places = vertices[faces]
+        corners = np.ascontiguousarray(places.reshape(-1, 9))
         starts, around = grouped(faces.ravel(), len(vertices))
-        n_edges = len(table.vertices)
-        normals = _normals(corners, faces, table.face_edges, table.forward, n_edges, len(vertices))
-        face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular, across = normals
-        vertex_regular &= _one_fan(faces, across, starts, around)
+        sides = np.roll(places, -1, axis=1) - places
+        face_normals = unit(np.cross(sides[:, 0], sides[:, 1]))
+        lengths = np.sqrt(np.einsum("mki,mki->mk", sides, sides))
+        products = np.maximum(lengths * np.roll(lengths, 1, axis=1), 1e-300)
+        cosines = np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)) / -products
+        angles = np.arccos(np.clip(cosines, -1.0, 1.0)).ravel()
+        thrice = np.repeat(face_normals, 3, axis=0)
+        edge_normals = _sums(table.face_edges.ravel(), thrice, len(table.vertices))
+        vertex_normals = _sums(faces.ravel(), angles[:, None] * thrice, len(vertices))
+
+        edge_regular = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
+        mates = np.where(edge_regular[table.face_edges].ravel(), table.mates, -1)
+        across = np.where(mates < 0, -1, mates // 3).reshape(-1, 3).astype(np.int32)
+        one = np.flatnonzero(mates >= 0)
+        following = np.roll(np.arange(len(mates)).reshape(-1, 3), -1, axis=1).ravel()
+        fans = connected_components(len(mates), one, following[mates[one]])  # both leave the same vertex
+        fan = np.empty(len(vertices), dtype=np.int64)
+        fan[faces.ravel()] = fans
+        vertex_regular = np.ones(len(vertices), dtype=bool)
+        vertex_regular[faces.ravel()[fans != fan[faces.ravel()]]] = False  # cones that touch are several
+        vertex_regular[table.vertices[~edge_regular]] = False
         return cls(
             corners,
             triangle_rows(corners),
@@ -185,90 +203,6 @@ def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
     return copies
 
 
-@compiled
-def _one_fan(
-    faces: NDArray[np.int64], across: NDArray[np.int32], starts: NDArray[np.int64], around: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    """(n,) whether a walk around each vertex, over edges, comes to all of its faces: cones that touch are several."""
-    result = np.ones(len(starts) - 1, dtype=np.bool_)
-    for v in range(len(starts) - 1):
-        count = starts[v + 1] - starts[v]
-        if count == 0:
-            continue
-        face = around[starts[v]] // 3
-        for step in range(1, count + 1):
-            corner = 0 if faces[face, 0] == v else 1 if faces[face, 1] == v else 2
-            face = across[face, corner]
-            if face < 0 or (face == around[starts[v]] // 3) != (step == count):
-                result[v] = False
-                break
-    return result
-
-
-@compiled
-def _normals(
-    corners: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    edges: NDArray[np.int64],
-    forward: NDArray[np.bool_],
-    n_edges: int,
-    n_vertices: int,
-) -> tuple[
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.bool_],
-    NDArray[np.bool_],
-    NDArray[np.int32],
-]:
-    face_normals = np.zeros((len(faces), 3))
-    edge_normals = np.zeros((n_edges, 3))
-    vertex_normals = np.zeros((n_vertices, 3))
-    counts, balance = np.zeros(n_edges, dtype=np.int32), np.zeros(n_edges, dtype=np.int32)
-    edge_faces = np.full((n_edges, 2), -1, dtype=np.int64)
-    side, lengths, normal = np.empty((3, 3)), np.empty(3), np.empty(3)
-    for f in range(len(faces)):
-        for c in range(3):
-            lengths[c] = 0.0
-            for d in range(3):
-                side[c, d] = corners[f, 3 * ((c + 1) % 3) + d] - corners[f, 3 * c + d]
-                lengths[c] += side[c, d] ** 2
-            lengths[c] = np.sqrt(lengths[c])
-        square = 0.0
-        for d in range(3):
-            p, q = (d + 1) % 3, (d + 2) % 3
-            normal[d] = side[0, p] * side[1, q] - side[0, q] * side[1, p]
-            square += normal[d] ** 2
-        if square > 0.0:
-            for d in range(3):
-                face_normals[f, d] = normal[d] / np.sqrt(square)
-        for c in range(3):
-            e = edges[f, c]
-            if counts[e] < 2:
-                edge_faces[e, counts[e]] = f
-            counts[e] += 1
-            balance[e] += 1 if forward[f, c] else -1
-            p = (c + 2) % 3
-            cosine = 0.0
-            for d in range(3):
-                edge_normals[e, d] += face_normals[f, d]
-                cosine -= side[c, d] * side[p, d]
-            cosine /= lengths[c] * lengths[p] if lengths[c] * lengths[p] > 0.0 else 1.0
-            angle = np.arccos(min(max(cosine, -1.0), 1.0))
-            for d in range(3):
-                vertex_normals[faces[f, c], d] += angle * face_normals[f, d]
-    edge_regular = np.zeros(n_edges, dtype=np.bool_)
-    vertex_regular = np.ones(n_vertices, dtype=np.bool_)
-    for e in range(n_edges):
-        square = edge_normals[e, 0] ** 2 + edge_normals[e, 1] ** 2 + edge_normals[e, 2] ** 2
-        edge_regular[e] = counts[e] == 2 and balance[e] == 0 and square > FOLD * FOLD
-    across = np.full((len(faces), 3), -1, dtype=np.int32)
-    for f in range(len(faces)):
-        for c in range(3):
-            e = edges[f, c]
-            if edge_regular[e]:
-                across[f, c] = edge_faces[e, 0] if edge_faces[e, 0] != f else edge_faces[e, 1]
-            else:
-                vertex_regular[faces[f, c]] = False
-                vertex_regular[faces[f, (c + 1) % 3]] = False
-    return face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular, across
+def _sums(at: NDArray[np.integer], vectors: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+    """(n, 3) sums of (k, 3) vectors at each of n places."""
+    return np.stack([np.bincount(at, column, n) for column in vectors.T], axis=1)

@@ -60,7 +60,7 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
     ([[0, 1]], [[1, 0]], [1])
     """
     edge = triangles.edges.face_edges.ravel()
-    starts, order = triangles.halfedges_of_edges
+    starts, order = triangles.edges.halfedges
     count = np.diff(starts)
     following = np.arange(1, len(order) + 1)
     following[starts[1:][count > 0] - 1] = starts[:-1][count > 0]

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .components import connected_components, grouped, members_of
+from .ear_clipping import cut_into_ears
 from .edges import edge_table
 
 MOST_SIDES = 12
@@ -16,8 +17,8 @@ def hole_fillings(
 ) -> NDArray[np.int64]:
     """Triangles that fill holes of at most `MOST_SIDES` sides.
 
-    A boundary loop is a hole if the faces lie outside it: an outer boundary, however short, is left open. Ears of least
-    circumradius are cut off first; an ear that would make an edge that exists already is not.
+    A boundary loop is a hole if the faces lie outside it: an outer boundary, however short, is left open. An ear that
+    would make an edge that exists already is not cut off.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ def hole_fillings(
     linked = np.flatnonzero(following >= 0)
     loops = connected_components(len(tails), linked, following[linked])
     short = np.bincount(loops, minlength=1)[loops] <= MOST_SIDES if len(tails) else np.empty(0, dtype=bool)
-    known = {(min(i, j), max(i, j)) for i, j in edges.vertices[_touching(edges.vertices, tails[short])].tolist()}
+    known = {_pair(i, j) for i, j in edges.vertices[_touching(edges.vertices, tails[short])].tolist()}
     fillings: list[tuple[int, int, int]] = []
     for first in np.unique(loops[short], return_index=True)[1]:
         loop = _loop_from(int(np.flatnonzero(short)[first]), following)
@@ -102,24 +103,10 @@ def _ears(
     fan = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
     if fan @ normal <= 0:
         return []
-    triangles, made = [], set()
-    while len(loop) > 3:
-        here = points[loop]
-        before, after = np.roll(here, 1, axis=0), np.roll(here, -1, axis=0)
-        u, v, w = here - before, after - here, before - after
-        twice_area = np.cross(u, v) @ normal / np.linalg.norm(normal)
-        product = np.prod([np.linalg.norm(d, axis=1) for d in (u, v, w)], axis=0)
-        with np.errstate(over="ignore"):
-            radii = np.where(twice_area > 0, product / np.maximum(twice_area, 1e-300), np.inf)
-        for ear in np.argsort(radii):
-            i, j, k = loop[ear - 1], loop[ear], loop[(ear + 1) % len(loop)]
-            diagonal = (min(i, k), max(i, k))
-            if twice_area[ear] > 0 and diagonal not in known and diagonal not in made:
-                break
-        else:
-            return []
-        triangles.append((i, j, k))
-        made.add(diagonal)
-        del loop[ear]
-    known |= made
-    return [*triangles, (loop[0], loop[1], loop[2])]
+    ears = cut_into_ears(corners, normal, lambda i, k: _pair(loop[i], loop[k]) not in known)
+    known |= {_pair(loop[i], loop[k]) for i, _, k in ears[:-1]}
+    return [(loop[i], loop[j], loop[k]) for i, j, k in ears]
+
+
+def _pair(i: int, j: int) -> tuple[int, int]:
+    return min(i, j), max(i, j)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError
 from ..frozen import Frozen
-from .components import element_components, grouped
+from .components import element_components
 from .edges import EdgeTable, edge_table
 from .meshes import Triangles
 from .triangle_kernels import gather
@@ -154,15 +154,8 @@ class IntrinsicMesh(Frozen):
         """(k,) halfedge 3 f + j in the first face of every edge that has a face."""
         if self.leading_sides is not None:
             return self.leading_sides
-        first = np.full(self.n_edges, -1, dtype=np.int64)
-        flat = self.edges.face_edges.ravel()
-        first[flat[::-1]] = np.arange(len(flat))[::-1]
-        return first[first >= 0]
-
-    @cached_property
-    def halfedges_of_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(e + 1,) where the halfedges 3 f + j of each edge begin, and the halfedges: see `grouped`."""
-        return grouped(self.edges.face_edges.ravel(), self.n_edges)
+        starts, halfedges = self.edges.halfedges
+        return halfedges[starts[:-1][np.diff(starts) > 0]]
 
     @cached_property
     def is_consistently_oriented(self) -> bool:

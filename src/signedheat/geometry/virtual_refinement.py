@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .ear_clipping import cut_into_ears
+
 _SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its polygon's counts as turned over
 
 
@@ -80,7 +82,7 @@ def virtual_refinement(
     part = (whole * total[fan_of]).sum(axis=1)
     turned = np.zeros(len(fans), dtype=bool)
     turned[fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]]] = True
-    cuts = {k: cut_into_triangles(vertices[corners[polygons == fans[k]]]) for k in np.flatnonzero(turned)}
+    cuts = {k: _cut(vertices[corners[polygons == fans[k]]]) for k in np.flatnonzero(turned)}
     cuts = {k: triangles for k, triangles in cuts.items() if len(triangles)}
     kept = np.ones(len(fans), dtype=bool)
     kept[list(cuts)] = False
@@ -140,44 +142,10 @@ def area_vectors(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.f
     return 0.5 * np.cross(b - a, c - a)
 
 
-def cut_into_triangles(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Cut a simple polygon along diagonals, best-shaped ears first: (k − 2, 3) corners; empty if it runs out of ears.
-
-    Takes cubic time in the number of corners.
-
-    Examples
-    --------
-    >>> arrow = np.array([[0.0, 0, 0], [2, -1, 0], [1, 0, 0], [2, 1, 0]])
-    >>> cut_into_triangles(arrow).tolist()
-    [[0, 1, 2], [0, 2, 3]]
-    """
-    normal = np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)
-    first = np.linalg.svd(polygon - polygon.mean(axis=0))[2][0]
-    second = np.cross(normal, first)
-    length = np.linalg.norm(second)
-    if length == 0:
-        return np.empty((0, 3), dtype=np.int64)
-    plane = polygon @ first + 1j * (polygon @ second / length)
-    left = np.arange(len(polygon))
-    triangles = []
-    while len(left) > 3:
-        before, here, after = np.roll(left, 1), left, np.roll(left, -1)
-        a, b, c = plane[before], plane[here], plane[after]
-        area = (np.conj(b - a) * (c - a)).imag
-        size = np.abs(b - a) ** 2 + np.abs(c - b) ** 2 + np.abs(a - c) ** 2
-        quality = area / np.where(size > 0, size, 1.0)
-        z = plane[left][:, None]
-        inside = np.ones((len(left), len(left)), dtype=bool)  # [point, ear]
-        for u, v in ((a, b), (b, c), (c, a)):
-            inside &= (np.conj(v - u) * (z - u)).imag >= 0
-        inside &= (left[:, None] != before) & (left[:, None] != here) & (left[:, None] != after)
-        quality = np.where(inside.any(axis=0), -1.0, quality)
-        ear = int(np.argmax(quality))
-        if quality[ear] <= 0:
-            return np.empty((0, 3), dtype=np.int64)
-        triangles.append([before[ear], here[ear], after[ear]])
-        left = np.delete(left, ear)
-    return np.sort(np.array([*triangles, left]), axis=1)
+def _cut(polygon: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(k − 2, 3) corners of the triangles of a polygon cut along diagonals."""
+    normal = area_vectors(polygon, np.roll(polygon, -1, axis=0), polygon.mean(axis=0)).sum(axis=0)
+    return np.sort(cut_into_ears(polygon, normal), axis=1)
 
 
 def _without_repeats(

@@ -33,10 +33,9 @@ FEW = 256
 def parts_of(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """(m,) the part that each face is of: faces that share an edge which two faces have, in opposite directions."""
     table = edge_table(faces)
-    n = len(table.vertices)
-    balance = np.bincount(table.face_edges.ravel(), np.where(table.forward, 1, -1).ravel(), n)
-    joins = (table.face_counts == 2) & (balance == 0)
-    sides = np.where(joins[table.face_edges], table.face_edges, n + np.arange(3 * len(faces)).reshape(-1, 3))
+    joins = (table.face_counts == 2) & (table.balance == 0)
+    alone = len(table.vertices) + np.arange(3 * len(faces)).reshape(-1, 3)
+    sides = np.where(joins[table.face_edges], table.face_edges, alone)
     return element_components(sides)
 
 

@@ -99,8 +99,7 @@ def _open_edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     faces = same_positions(corners)[np.arange(len(corners)).reshape(-1, 3)]
     a, b, c = faces.T
     table = edge_table(faces[(a != b) & (b != c) & (c != a)])
-    balance = np.bincount(table.face_edges.ravel(), np.where(table.forward, 1.0, -1.0).ravel(), len(table.vertices))
-    ends: NDArray[np.float64] = corners[table.vertices[balance != 0]]
+    ends: NDArray[np.float64] = corners[table.vertices[table.balance != 0]]
     return ends
 
 

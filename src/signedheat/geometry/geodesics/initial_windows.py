@@ -32,7 +32,7 @@ class Faces(NamedTuple):
     @classmethod
     def of(cls, triangles: IntrinsicMesh) -> Faces:
         """The arrays of an intrinsic mesh."""
-        table, (first_halfedge, halfedges) = triangles.edges, triangles.halfedges_of_edges
+        table, (first_halfedge, halfedges) = triangles.edges, triangles.edges.halfedges
         first_corner, corners = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
         return cls(
             triangles.corner_vertices,

@@ -100,7 +100,7 @@ def geodesic_paths(
     starts, ends = faces_at(triangles, start), faces_at(triangles, end)
     edges = triangles.edges
     sides, fractions, counts = shortest_lines(
-        triangles.corner_positions, edges.face_edges.ravel(), edges.forward.ravel(), *triangles.halfedges_of_edges,
+        triangles.corner_positions, edges.face_edges.ravel(), edges.forward.ravel(), *edges.halfedges,
         Queue.empty(triangles.n_edges), *starts, *ends,
     )  # fmt: skip
     located = locate_points(triangles, sides // 3, barycentric_on_sides(sides % 3, fractions), name)

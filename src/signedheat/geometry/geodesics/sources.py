@@ -262,7 +262,7 @@ def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask
 
 def halfedges_of(triangles: IntrinsicMesh, edges: Ids) -> tuple[Ids, Ids]:
     """All halfedges ``3 face + side`` of each of some edges, as pairs: index into `edges`, and halfedge."""
-    return members_of(*triangles.halfedges_of_edges, edges)
+    return members_of(*triangles.edges.halfedges, edges)
 
 
 def on_sides(triangles: IntrinsicMesh, faces: Ids, sides: Ids, along: NDArray[np.float64]) -> Points:

@@ -50,7 +50,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None)
     """Start an intrinsic triangulation, with an empty history."""
     edges, first = triangles.edges, triangles.first_halfedges
     edge, n_edges = edges.face_edges.ravel(), triangles.n_edges
-    starts, order = triangles.halfedges_of_edges
+    starts, order = edges.halfedges
     used = starts[1:] > starts[:-1]
     sibling = np.empty_like(edge)
     sibling[order] = np.roll(order, -1)

@@ -154,6 +154,20 @@ def record(g, kind, first, second, vertex, a, b, c, d):
 
 
 @kernel
+def faces_around(steps: NDArray[np.int64], n: int, around: NDArray[np.int64], start: NDArray[np.int64]) -> None:
+    """The faces that step n of a history has or makes, and the corner of each that its first point is at."""
+    kind = steps[n, 0]
+    around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
+    start[0] = start[1] = start[2] = 0
+    if kind == TURN:
+        around[1] = around[2] = -1
+    elif kind != SPLIT_FACE:
+        around[0], start[0], around[2] = steps[n, 1] // 3, steps[n, 1] % 3, -1
+    if kind == FLIP:
+        around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
+
+
+@kernel
 def turn_over(g, face):
     """Reverse a face: corners (0, 1, 2) become (0, 2, 1)."""
     h = 3 * face

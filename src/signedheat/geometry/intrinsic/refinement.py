@@ -7,11 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..components import connected_components
 from .coincidence_kernels import coinciding
 from .delaunay import doubled, lay_out
 from .gluing_kernels import Gluing
-from .refinement_kernels import DONE, FULL, GROW, N_BINS, NARROW, PAUSED, Agenda, Goal, list_all, refine
+from .refinement_kernels import DONE, FULL, GROW, N_BINS, PAUSED, Agenda, Goal, list_all, narrow_vertices, refine
 
 PER_FACE = ("tail", "edge", "forward", "front", "sibling")
 PER_EDGE = ("start", "length", "fixed", "flips")
@@ -138,24 +137,3 @@ def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:
         room=np.empty((4096, 5)),
         halfedges=np.empty(4096, dtype=np.int64),
     )
-
-
-def narrow_vertices(gluing: Gluing) -> NDArray[np.bool_]:
-    """(n,) vertices at which two fixed edges meet at less than 60°, or with a total angle of less than 60°."""
-    corners, total = sectors(gluing)
-    narrow = np.zeros(int(gluing.counts[2]), dtype=bool)
-    narrow[gluing.tail[: len(corners)][total[corners] < NARROW]] = True
-    return narrow
-
-
-def sectors(gluing: Gluing) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Sector that every corner belongs to, from fixed edge to fixed edge around a vertex, and angle of each sector."""
-    n = 3 * int(gluing.counts[0])
-    h = np.flatnonzero(~gluing.fixed[gluing.edge[:n]])
-    t = gluing.sibling[h]
-    following = 3 * (t // 3) + (t + 1) % 3
-    other = np.where(gluing.forward[h] == gluing.forward[t], t, following)
-    label = connected_components(n, h, other)
-    leaving = lay_out(gluing).edge_vectors
-    angles = np.angle(-np.conj(leaving) * np.roll(leaving, 1, axis=1))
-    return label, np.bincount(label, weights=angles.ravel())

@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from .circumcenter_kernels import BLOCKED, LOST, cross, encroached, find_circumcenter
 from .coincidence_kernels import NEARNESS
 from .gluing_kernels import (
-    FLIP,
-    SPLIT_EDGE,
-    SPLIT_FACE,
     apex_position,
+    faces_around,
     flip_until_delaunay,
     following,
     kernel,
@@ -79,10 +77,13 @@ class Goal(NamedTuple):
 def refine(g, agenda, goal, patience):
     """Insert vertices until every face meets the goal, where possible; pause after `patience` of them."""
     pause = g.counts[2] + patience
+    around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):
         for n in range(agenda.seen[0], g.counts[3]):
-            for f in changed_faces(g, n):
-                list_face(g, agenda, f, goal)
+            faces_around(g.steps, n, around, start)
+            for f in around:
+                if f >= 0:
+                    list_face(g, agenda, f, goal)
         agenda.seen[0] = g.counts[3]
         f = next_bad(g, agenda, goal)
         if f < 0:
@@ -96,19 +97,6 @@ def refine(g, agenda, goal, patience):
             list_face(g, agenda, f, goal)
             return GROW
     return GROW
-
-
-@kernel
-def changed_faces(g, n):
-    """The faces that step n of the history changed or made, some perhaps listed twice."""
-    kind, first, second = g.steps[n, 0], g.steps[n, 1], g.steps[n, 2]
-    if kind == FLIP:
-        return first // 3, second // 3, second // 3
-    if kind == SPLIT_EDGE:
-        return first // 3, second, second
-    if kind == SPLIT_FACE:
-        return first, second, second + 1
-    return first, first, first
 
 
 @kernel
@@ -250,6 +238,16 @@ def sector(g, corner):
 
 
 @kernel
+def narrow_vertices(g):
+    """(n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
+    narrow = np.zeros(g.counts[2], dtype=np.bool_)
+    for corner in range(3 * g.counts[0]):
+        if not narrow[g.tail[corner]]:
+            narrow[g.tail[corner]] = sector(g, corner) < NARROW
+    return narrow
+
+
+@kernel
 def has_room(g, agenda, ring):
     """Whether splitting an edge with so many faces fits into the arrays (splitting a face needs less)."""
     faces, edges, vertices, steps = g.counts[0], g.counts[1], g.counts[2], g.counts[3]
@@ -264,9 +262,11 @@ def has_room(g, agenda, ring):
 @kernel
 def look_around(g, agenda, step):
     """Push the edges of all faces that the steps from `step` on have changed on the stack."""
+    around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     for n in range(step, g.counts[3]):
-        for f in changed_faces(g, n):
-            for k in range(3):
+        faces_around(g.steps, n, around, start)
+        for f in around:
+            for k in range(3 if f >= 0 else 0):
                 look_at(g, agenda.stack, agenda.stacked, g.edge[3 * f + k])
 
 

@@ -11,7 +11,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .gluing_kernels import FLIP, SPLIT_EDGE, SPLIT_FACE, TURN, Gluing, apex_position, diamond, following, kernel
+from .gluing_kernels import (
+    FLIP,
+    SPLIT_EDGE,
+    SPLIT_FACE,
+    TURN,
+    Gluing,
+    apex_position,
+    diamond,
+    faces_around,
+    following,
+    kernel,
+)
 
 BEFORE = np.full((4, 3, 3), -1)
 """By kind of step, face and corner: which of the four points is that corner before the step; `AFTER`, after it."""
@@ -27,20 +38,6 @@ ALONG = 1e-9
 From face to face lines drift by some 1e-15; results are the same from 1e-12 to 1e-7."""
 ROUNDING = 1e-10
 """Of squared lengths, in parts of the size of their terms."""
-
-
-@kernel
-def faces_around(steps: NDArray[np.int64], n: int, around: NDArray[np.int64], start: NDArray[np.int64]) -> None:
-    """The faces that step n of a history has or makes, and the corner of each that its first point is at."""
-    kind = steps[n, 0]
-    around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
-    start[0] = start[1] = start[2] = 0
-    if kind == TURN:
-        around[1] = around[2] = -1
-    elif kind != SPLIT_FACE:
-        around[0], start[0], around[2] = steps[n, 1] // 3, steps[n, 1] % 3, -1
-    if kind == FLIP:
-        around[1], start[1] = steps[n, 2] // 3, steps[n, 2] % 3
 
 
 @kernel
