@@ -6,7 +6,7 @@
 Each program runs in a process of its own, one after the other, on the same mesh and curves: a bumpy sphere and level
 sets that cross its faces, nothing imposed but where said. Seconds of all threads or, with --wall, on the clock; memory
 in megabytes above what imports and input take. "ours" is the scheme of the peer, one diffusion time; "default" is
-`SignedHeatSolver(mesh)`, which combines three.
+`SignedHeatSolver(mesh)`, which extrapolates in it.
 
 With --triangles instead: what refining meshes of large angles and needles gains and costs (`auto_refinement.py`).
 """

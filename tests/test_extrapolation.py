@@ -1,12 +1,15 @@
 """Directions extrapolated in the diffusion time, against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import signedheat as sh
 from refusals import refused
 from signedheat.discretization import discretize
-from signedheat.extrapolation import EXPONENTS, blended, default_diffusion
+from signedheat.extrapolation import default_diffusion
+from signedheat.lowering.surface.vector_heat import EXPONENTS, extrapolated
 
 ROUND = (1.2, 0.6)  # half axes of an ellipse
 
@@ -39,22 +42,63 @@ def test_error_falls_like_the_triangles_size(shear):
     assert fine < 0.5 * min(relative_error(36, shear, tau) for tau in (1.0, 4.0))
 
 
-@pytest.mark.parametrize("times", [sh.Extrapolated(), sh.Extrapolated(2.0, 2.0), sh.Extrapolated(30.0, 1.5)])
-def test_errors_of_both_kinds_cancel(times):
-    tau = np.array(times.times)
-    assert times.weights.sum() == pytest.approx(1)
-    for power in EXPONENTS:
-        assert times.weights @ tau**power == pytest.approx(0, abs=1e-9)
-    assert np.allclose(tau[1:] / tau[:-1], times.ratio)
-    angles = 0.3 + 0.02 / tau + 0.01 * np.sqrt(tau)
-    blend = blended(times, [np.exp(1j * a) for a in angles[:, None]], source=None)
-    assert np.abs(blend) == pytest.approx(1)
-    assert np.angle(blend) == pytest.approx(0.3, abs=0.3 * np.abs(angles - 0.3).max())
+@pytest.mark.parametrize("power", EXPONENTS)
+def test_errors_of_both_kinds_cancel(power):
+    """X = exp(i (.3 + ε tᵉ)) at t = 1, of whose two changes with t the columns are made."""
+    slope = 1j * 0.02 * power
+    first, second = slope, slope * power + slope**2  # D X / X and D² X / X
+    columns = np.exp(0.32j) * np.array([[1.0, 1.0 + first, 0.5 * (second - 1.0 + 3.0 * (1.0 + first))]])
+    assert np.angle(extrapolated(columns)) == pytest.approx(0.3, abs=0.02**2)
+    assert np.angle(extrapolated(1e-280 * columns)) == pytest.approx(0.3, abs=0.02**2)
 
 
-def test_one_time_is_itself():
-    directions = np.array([0.6 + 0.8j])
-    assert blended(2.0, [directions], source=None) is directions
+def test_changes_with_time_are_those_of_other_times():
+    """Directions far from and near a curve, from factors of one time and of times close to it."""
+    mesh = lattice(24, 0.5)
+    surface = discretize(mesh)
+    curve = mesh.level_set(np.hypot(*mesh.vertices[:, :2].T), 0.9)
+    source = surface.lower(curve, 2.0)
+    x, once, twice = (surface.triangles.sum_in_faces(c) for c in replaced(surface, source, extrapolated=True).T)
+    step = 1e-3
+    early, late = (
+        surface.triangles.sum_in_faces(replaced(surface, source, time=source.time * np.exp(s))[:, 0])
+        for s in (-step, step)
+    )
+    turned, now, later = np.angle(early / x), np.angle(x / x), np.angle(late / x)
+    first = once / x - 1.0
+    assert np.allclose(first.imag, (later - turned) / (2 * step), atol=1e-4)
+    second = (1.0 - 3.0 * once / x + 2.0 * twice / x - first**2).imag
+    assert np.allclose(second, (later - 2 * now + turned) / step**2, atol=1e-2 * max(1.0, np.abs(second).max()))
+
+
+def replaced(surface, source, **changes):
+    """X of the source with something else about it."""
+    (stage,) = surface.diffuse(replace(source, **changes))
+    return stage
+
+
+def test_directions_are_extrapolated_beyond_the_range_of_numbers_too():
+    """A strip so long that X underflows on it: what follows is solved for in stages, changes with t included."""
+    n = 700
+    x, y = (a.ravel() for a in np.meshgrid(np.arange(n + 1.0), np.arange(3.0), indexing="ij"))
+    low = np.arange(3 * n).reshape(n, 3)[:, :-1].ravel()
+    faces = np.concatenate([np.stack([low, low + 3, low + 4], 1), np.stack([low, low + 4, low + 1], 1)])
+    mesh = sh.TriangleMesh(np.stack([x, y, 0 * x], 1), faces)
+    surface = discretize(mesh)
+    source = surface.lower(mesh.level_set(x, 0.5), 1.0)
+    stages = surface.diffuse(replace(source, extrapolated=True))
+    assert len(stages) > 1
+    directions = surface.to_cells(stages)
+    assert np.allclose(np.abs(directions), 1, atol=1e-6)
+    field = sh.SignedHeatSolver(mesh, sh.Extrapolated(1.0)).distance(mesh.level_set(x, 0.5))
+    assert np.allclose(field.values, x - 0.5, atol=1e-6)
+
+
+def test_one_time_in_space():
+    with refused(sh.errors.UnsupportedTypeError, "diffusion"):
+        sh.SignedHeatSolver(sh.Grid((0, 0), 1.0, (8, 8)), sh.Extrapolated()).distance(
+            sh.Polyline([[2.0, 2.0], [5.0, 5.0]])
+        )
 
 
 def test_many_sources_give_what_each_gives():
@@ -76,10 +120,10 @@ def test_scale_and_side():
     assert np.allclose(larger.values, 1e3 * values, atol=1e-6)
 
 
-@pytest.mark.parametrize("arguments", [(0.0,), (-1.0,), (np.nan,), (4.0, 1.0), (4.0, 0.5), (4.0, np.inf)])
-def test_times_that_make_no_sense_are_refused(arguments):
-    with refused(sh.errors.SignedHeatError, "middle" if len(arguments) == 1 else "ratio"):
-        sh.Extrapolated(*arguments)
+@pytest.mark.parametrize("tau", [0.0, -1.0, np.nan, np.inf])
+def test_times_that_make_no_sense_are_refused(tau):
+    with refused(sh.errors.SignedHeatError, "tau"):
+        sh.Extrapolated(tau)
 
 
 def test_the_default_is_extrapolated_on_surfaces_alone():
@@ -111,8 +155,8 @@ def test_times_depend_on_the_extent_of_a_part_in_h_alone():
     copies = 1e3 * (coarse.vertices + np.arange(3)[:, None, None])
     faces = coarse.faces + coarse.n_vertices * np.arange(3)[:, None, None]
     parts = sh.TriangleMesh(copies.reshape(-1, 3), faces.reshape(-1, 3))
-    one, three, finer = (default_diffusion(discretize(mesh)).middle for mesh in (coarse, parts, fine))
-    assert one > sh.Extrapolated().middle
+    one, three, finer = (default_diffusion(discretize(mesh)).tau for mesh in (coarse, parts, fine))
+    assert one > sh.Extrapolated().tau
     assert three == pytest.approx(one, rel=1e-9)
     assert finer / one == pytest.approx(1.5 ** (2 / 5), rel=1e-3)  # but for the edges of the boundary
 
@@ -125,8 +169,8 @@ def test_where_curves_end_inside_one_time_is_taken(rim):
     if not rim:
         line = [sh.Curve(c.faces[3:], c.barycentric[3:]) for c in line]
     solver = sh.SignedHeatSolver(mesh)
-    one = np.array_equal(solver.distance(line).values, solver.with_diffusion(1.0).distance(line).values)
-    assert one is not rim
+    found, one = (s.distance(line).values for s in (solver, solver.with_diffusion(1.0)))
+    assert np.allclose(found, one, rtol=0, atol=1e-9) is not rim
     together = solver.distance_many([line, mesh.points_at(3), line])
     for curves, field in zip([line, mesh.points_at(3), line], together, strict=True):
         assert np.allclose(field.values, solver.distance(curves).values, rtol=0, atol=1e-9)

@@ -165,8 +165,8 @@ def convergence(page: Page) -> None:
     log ε against the log of the mean edge length. The paper finds about 1 for all methods. At t = h² heat falls by a
     factor e along an edge, which triangles do not resolve: directions far from the source keep an error of the size
     h²/t, which depends on the triangles' shapes and not on their size, so that one time alone converges more slowly. A
-    longer t smooths the source, an error of the size √t. The default, `Extrapolated`, combines three t so that both
-    cancel, on fine meshes somewhat longer ones. "default" is
+    longer t smooths the source, an error of the size √t. The default, `Extrapolated`, goes by how directions change
+    with t, so that both cancel; on fine meshes t is somewhat longer. "default" is
     `SignedHeatSolver(mesh).distance(curves)`, "one time" `SignedHeatSolver(mesh, 1.0)`, which is the paper's; "falls":
     on how many ε falls at every level. The default's exception is one surface whose coarsest mesh of 160 vertices it
     refines, as 2 % of the area has large angles, and the next not: 1.255 and 1.262, against 1.535 and 1.262 unrefined.

@@ -48,7 +48,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         Where distance is measured.
     diffusion : float or Extrapolated, optional
         τ in ``t = τ h²``, h the mean distance between unknowns; the paper's is 1. Larger values close gaps in broken
-        sources along rounder lines. By default 1 in space and, on surfaces, `Extrapolated`, which takes three.
+        sources along rounder lines. By default 1 in space and, on surfaces, `Extrapolated`.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
     intrinsic : "auto", True or False
@@ -151,13 +151,12 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         with stopwatch("sources"):
             listed, left_out = given_curves(self.domain, as_list(sources))
             discretization, adapted = discretization.adapt(listed)
-            times = self._times(discretization)
-            sources_by_time = lowered_for_times(discretization, adapted, times)
+            sources_by_time = lowered_for_times(discretization, adapted, self._times(discretization))
         with stopwatch("diffuse"):
             vectors = [diffuse(discretization, source) for source in sources_by_time]
         with stopwatch("normalize"):
             source = sources_by_time[0]
-            directions = blended(times, (normalize(discretization, each) for each in vectors), source)
+            directions = blended(sources_by_time, (normalize(discretization, each) for each in vectors))
             del vectors
         with stopwatch("integrate"):
             values = integrate(discretization, directions, source, constraint)
@@ -201,18 +200,17 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             batch = []
             for entry in sources[begin : begin + _BATCH]:
                 discretization, adapted = self.discretization.adapt(given_curves(self.domain, as_list(entry))[0])
-                times = self._times(discretization)
-                batch.append((discretization, lowered_for_times(discretization, adapted, times)))
-            for (discretization, _), run in groupby(batch, key=lambda entry: (entry[0], len(entry[1]))):
-                by_time = list(zip(*(sources for _, sources in run), strict=True))
-                lowered, times = by_time[0], self._times(discretization)
+                batch.append((discretization, lowered_for_times(discretization, adapted, self._times(discretization))))
+            for (discretization, _), run in groupby(batch, key=lambda entry: (entry[0], [s.time for s in entry[1]])):
+                of_each = [sources for _, sources in run]
+                by_time = list(zip(*of_each, strict=True))
+                lowered = by_time[0]
                 stopwatch = Stopwatch(None, steps=1)
                 with stopwatch("together"):
                     diffused = [diffuse_many(discretization, each) for each in by_time]
                     together = zip(*diffused, strict=True)
                     cells = ([normalize(discretization, vectors) for vectors in each] for each in together)
-                    pairs = zip(cells, lowered, strict=True)
-                    directions = (blended(times, each, source) for each, source in pairs)
+                    directions = (blended(sources, each) for sources, each in zip(of_each, cells, strict=True))
                     solved = list(integrate_many(discretization, directions, lowered, constraint))
                 seconds = {step: total / len(lowered) for step, total in stopwatch.seconds.items()}
                 for source, values in zip(lowered, solved, strict=True):

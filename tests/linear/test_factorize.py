@@ -135,15 +135,14 @@ def test_a_factor_outlives_a_change_of_threads(backend, dtype, made_on, solved_o
     assert np.array_equal(again.solve(rhs), solution)
 
 
-@pytest.mark.parametrize("together", [1, 2, 3])
 @backends
-def test_factors_like_others_are_independent_of_them(surface, backend, together):
+def test_factors_like_others_are_independent_of_them(surface, backend):
     """Matrices with entries at the same places share an order and memory; each solves its own system whenever asked."""
     first = surface.stiffness + sparse.diags_array(np.linspace(1, 2, surface.triangles.n_vertices))
     second = first + sparse.diags_array(np.geomspace(1e-3, 1e6, surface.triangles.n_vertices))
     other = sparse.identity(surface.triangles.n_vertices, format="csr") * 3.0  # entries at fewer places
     matrices = [sparse.csr_matrix(matrix) for matrix in (first, second, other)]
-    factors = [factorize(matrices[0], backend, together=together)]
+    factors = [factorize(matrices[0], backend)]
     factors += [factorize(matrix, backend, like=factors[0]) for matrix in matrices[1:]]
     truth = np.random.default_rng(0).normal(size=matrices[0].shape[0])
     for k in (0, 1, 2, 0, 0, 1):

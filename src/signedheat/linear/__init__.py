@@ -83,7 +83,6 @@ def factorize(
     order: NDArray[np.integer] | None = None,
     reused: bool = False,
     like: Factor | None = None,
-    together: int = 1,
 ) -> Factor:
     """Factorise a sparse Hermitian positive definite matrix.
 
@@ -98,9 +97,8 @@ def factorize(
     reused : bool
         Whether many systems will be solved. PARDISO then finds an order of its own, with which it solves on all cores.
     like : Factor, optional
-        Of a matrix with entries at the same places: PARDISO then takes half the time or less.
-    together : int
-        How many factors like each other PARDISO keeps; it makes them anew where there are more.
+        Of a matrix with entries at the same places: PARDISO then takes half the time or less. The factor that solved
+        last is in memory, the other is made anew when it is to solve.
 
     Returns
     -------
@@ -123,7 +121,7 @@ def factorize(
     if isinstance(like, PardisoFactor) and name == "pardiso" and (again := like.like_this(upper)):
         return again
     if name == "pardiso":
-        return PardisoFactor(upper, None if reused else order, together)
+        return PardisoFactor(upper, None if reused else order)
     if name == "cholmod":
         return CholmodFactor(upper, order)
     if upper.shape[0] >= LARGE and backend is None and HAS_MKL:

@@ -38,14 +38,12 @@ class PardisoFactor:
         Upper triangle, as `upper_triangle` makes it.
     order : (n,) int, optional
         Elimination order: ``order[k]`` is the unknown eliminated k-th. Without it, METIS finds one.
-    together : int
-        How many factors `like_this` stay in memory together with it.
     """
 
     backend = "pardiso"
 
-    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None, together: int = 1) -> None:
-        self._take(_Analysis(upper, order, together), upper)
+    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None = None) -> None:
+        self._take(_Analysis(upper, order), upper)
 
     def _take(self, analysis: _Analysis, upper: sparse.csr_matrix) -> None:
         self.n, self.dtype = upper.shape[0], upper.dtype
@@ -56,8 +54,7 @@ class PardisoFactor:
     def like_this(self, upper: sparse.csr_matrix) -> PardisoFactor | None:
         """Factor of another matrix with entries at the same places, for half the time; None if they are not.
 
-        If there are more than stay in memory together, the one that was used least recently makes room; it is
-        factorised again when it is asked to solve.
+        It takes the memory of this one, which is factorised again when it is asked to solve.
         """
         if not self._analysis.fits(upper) or not _makes_factors_anew():
             return None
@@ -73,8 +70,8 @@ class PardisoFactor:
         columns = np.asfortranarray(rhs, dtype=self.dtype)
         solution = np.empty_like(columns, order="F")
         with self._analysis.lock:
-            place = self._analysis.factorize(self._values)
-            self._analysis.call(_SOLVE, columns, solution, place)
+            self._analysis.factorize(self._values)
+            self._analysis.call(_SOLVE, columns, solution)
         return solution
 
     @property
@@ -90,29 +87,22 @@ class PardisoFactor:
 
 
 class _Analysis:
-    """What factors of matrices with entries at the same places share: the order, and memory for a few of them."""
+    """What factors of matrices with entries at the same places share: the order, and memory for one of them."""
 
-    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None, together: int) -> None:
-        self.call = _Call(upper, order, together)
+    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None) -> None:
+        self.call = _Call(upper, order)
         self.lock = threading.Lock()
-        self._made: list[tuple[int, NDArray[Any]]] = []  # place and matrix, the least recently used first
+        self._made: NDArray[Any] | None = None
         self._finalizer = weakref.finalize(self, _Call.release, self.call)
         self.call(_ANALYZE)
 
-    def factorize(self, values: NDArray[Any]) -> int:
-        """The place of the factor of the matrix with these values; it is made unless it is there."""
-        self.call.values = values
-        kept = next((entry for entry in self._made if entry[1] is values), None)
-        if kept is None:
-            if len(self._made) == self.call.together:
-                self._made.pop(0)
-            taken = {place for place, _ in self._made}
-            kept = next(place for place in range(1, self.call.together + 1) if place not in taken), values
-            self.call(_FACTORIZE, place=kept[0])
-        else:
-            self._made.remove(kept)
-        self._made.append(kept)
-        return kept[0]
+    def factorize(self, values: NDArray[Any]) -> None:
+        """Make the factor of the matrix with these values, unless it is there."""
+        if self._made is values:
+            return
+        self._made, self.call.values = None, values
+        self.call(_FACTORIZE)
+        self._made = values
 
     def fits(self, upper: sparse.csr_matrix) -> bool:
         """Whether a matrix has its entries at the places of the others."""
@@ -124,8 +114,7 @@ class _Analysis:
 class _Call:
     """The arguments that all PARDISO calls on one factorisation share."""
 
-    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None, together: int) -> None:
-        self.together = together
+    def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None) -> None:
         wide = upper.nnz >= 2**31
         index = np.int64 if wide else np.int32
         self._function = _library().pardiso_64 if wide else _library().pardiso
@@ -144,9 +133,7 @@ class _Call:
         self.parameters[34] = 1  # indices count from zero
         self._threads = _library().MKL_Get_Max_Threads()
 
-    def __call__(
-        self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None, place: int = 1
-    ) -> None:
+    def __call__(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
         integer = self._integer
         status = integer(0)
         n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])
@@ -155,8 +142,8 @@ class _Call:
         others = _library().MKL_Set_Num_Threads_Local(self._threads)
         self._function(
             _address(self._handle),
-            ctypes.byref(integer(self.together)),
-            ctypes.byref(integer(place)),
+            ctypes.byref(integer(1)),  # factors in memory
+            ctypes.byref(integer(1)),  # which of them
             ctypes.byref(integer(self._kind)),
             ctypes.byref(integer(phase)),
             ctypes.byref(integer(self._n)),

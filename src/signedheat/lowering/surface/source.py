@@ -53,6 +53,8 @@ class SurfaceSource(Frozen):
         The triangles that the sources are lowered to; the first vertices are those of the domain's own triangles.
     parts : list of CurveSegments
         The sources on these triangles.
+    extrapolated : bool
+        Whether directions are to be extrapolated in t.
     """
 
     vectors: csr_array
@@ -64,6 +66,7 @@ class SurfaceSource(Frozen):
     oriented: bool
     triangles: IntrinsicMesh
     parts: Sequence[CurveSegments]
+    extrapolated: bool = False
 
     @cached_property
     def ending(self) -> NDArray[np.bool_]:
