@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..frozen import read_only
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.triangle_kernels import add_fluxes, add_up
 
 
 def cotan_matrix(triangles: IntrinsicMesh) -> sparse.csr_matrix:
@@ -37,8 +35,9 @@ def divergence(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> 
     The negative of the divergence in the paper, as C is the negative of its Laplacian.
     The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
     """
-    directions = np.ascontiguousarray(directions)
-    return add_fluxes(triangles.corner_vertices, triangles.corner_positions, directions, triangles.n_vertices)
+    opposite = np.roll(triangles.corner_positions, -2, axis=1) - np.roll(triangles.corner_positions, -1, axis=1)
+    fluxes = 0.5 * (np.conj(opposite) * directions[:, None]).imag
+    return np.bincount(triangles.corner_vertices.ravel(), fluxes.ravel(), triangles.n_vertices)  # type: ignore[no-any-return]
 
 
 def assemble(
@@ -64,5 +63,11 @@ def assemble(
            [0.+0.j, 1.+0.j, 2.+0.j],
            [0.+0.j, 0.+0.j, 1.+0.j]])
     """
-    starts, columns, values = add_up(read_only(unknowns), diagonal, coupling, n)
-    return sparse.csr_matrix((values, columns, starts), shape=(n, n))
+    following = np.roll(unknowns, -1, axis=1)
+    above = np.where(unknowns <= following, coupling, np.conj(coupling))
+    above = np.where(unknowns == following, 2.0 * above.real, above)
+    every, corners = np.arange(n), unknowns.ravel()
+    rows = np.concatenate([every, corners, np.minimum(unknowns, following).ravel()]).astype(np.int32)
+    columns = np.concatenate([every, corners, np.maximum(unknowns, following).ravel()]).astype(np.int32)
+    entries = np.concatenate([np.zeros(n), diagonal.ravel(), above.ravel()])
+    return sparse.coo_matrix((entries, (rows, columns)), shape=(n, n)).tocsr()

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..compiled import compiled
 from ..geometry.tet_faces import FaceTable
 
 THIN = 1e-2
@@ -157,59 +156,8 @@ def _assemble(
     n: int,
 ) -> sparse.csr_matrix:
     """Sparse (n, n) matrix with ``Σ_T factor · N_a·N_b`` at the entry (id of a, id of b), plus the ties."""
-    indptr, columns = _pattern(ids, n)
-    data = np.zeros(len(columns))
-    _accumulate(vectors, factors, ties, ids, indptr, columns, data)
-    return sparse.csr_matrix((data, columns, indptr), shape=(n, n))
-
-
-@compiled
-def _pattern(ids, n):
-    """Sparsity pattern (CSR, sorted columns) of the matrix that couples the four ids of each tet."""
-    starts = np.zeros(n + 1, dtype=np.int64)
-    for t in range(len(ids)):
-        for a in range(4):
-            starts[ids[t, a] + 1] += 1
-    for i in range(n):
-        starts[i + 1] += starts[i]
-    tets_at = np.empty(starts[n], dtype=np.int32)
-    filled = starts[:-1].copy()
-    for t in range(len(ids)):
-        for a in range(4):
-            tets_at[filled[ids[t, a]]] = t
-            filled[ids[t, a]] += 1
-    seen = np.full(n, -1, dtype=np.int64)
-    indptr = np.zeros(n + 1, dtype=np.int32)
-    for i in range(n):
-        indptr[i + 1] = indptr[i]
-        for k in range(starts[i], starts[i + 1]):
-            for a in range(4):
-                j = ids[tets_at[k], a]
-                if seen[j] != i:
-                    seen[j] = i
-                    indptr[i + 1] += 1
-    columns = np.empty(indptr[n], dtype=np.int32)
-    ends = indptr.copy()
-    seen[:] = -1
-    for i in range(n):  # the pattern is symmetric: by row, each goes to the end of its columns, which are then in order
-        for k in range(starts[i], starts[i + 1]):
-            for a in range(4):
-                j = ids[tets_at[k], a]
-                if seen[j] != i:
-                    seen[j] = i
-                    columns[ends[j]] = i
-                    ends[j] += 1
-    return indptr, columns
-
-
-@compiled
-def _accumulate(vectors, factors, ties, ids, indptr, columns, data):
-    for t in range(len(ids)):
-        for a in range(4):
-            row = ids[t, a]
-            for b in range(4):
-                value = 0.0
-                for i in range(3):
-                    value += vectors[t, a, i] * vectors[t, b, i]
-                k = indptr[row] + np.searchsorted(columns[indptr[row] : indptr[row + 1]], ids[t, b])
-                data[k] += factors[t] * value + ties[t] * (3.0 if a == b else -1.0)
+    entries = np.einsum("mai,mbi->mab", vectors, vectors) * factors[:, None, None]
+    entries += ties[:, None, None] * (4.0 * np.eye(4) - 1.0)
+    corners = ids.astype(np.int32)
+    rows, columns = np.repeat(corners, 4, axis=1), np.tile(corners, 4)
+    return sparse.coo_matrix((entries.ravel(), (rows.ravel(), columns.ravel())), shape=(n, n)).tocsr()
