@@ -37,7 +37,7 @@ def divergence(triangles: IntrinsicMesh, directions: NDArray[np.complex128]) -> 
     """
     opposite = np.roll(triangles.corner_positions, -2, axis=1) - np.roll(triangles.corner_positions, -1, axis=1)
     fluxes = 0.5 * (np.conj(opposite) * directions[:, None]).imag
-    return np.bincount(triangles.corner_vertices.ravel(), fluxes.ravel(), triangles.n_vertices)  # type: ignore[no-any-return]
+    return np.asarray(np.bincount(triangles.corner_vertices.ravel(), fluxes.ravel(), triangles.n_vertices), np.float64)
 
 
 def assemble(

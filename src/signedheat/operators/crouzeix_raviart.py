@@ -46,7 +46,9 @@ def vector_heat_forces(
     return sums
 
 
-def _local_entries(triangles: IntrinsicMesh, time: float, faces: NDArray[np.int64] | slice) -> tuple:
+def _local_entries(
+    triangles: IntrinsicMesh, time: float, faces: NDArray[np.int64] | slice
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(m, 3) diagonal entries of M + tL; (m, 3) entries between each edge and the next, before the turn of Eq. 8."""
     cot = triangles.corner_cotangents[faces]
     following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1

@@ -31,7 +31,9 @@ class LinearElements:
     slope_matrix: sparse.csr_matrix
 
     @classmethod
-    def of(cls, corners: NDArray[np.int64], sizes: NDArray[np.float64], hats: NDArray[np.float64], n: int):
+    def of(
+        cls, corners: NDArray[np.int64], sizes: NDArray[np.float64], hats: NDArray[np.float64], n: int
+    ) -> LinearElements:
         """From the gradients (m, d + 1, d) of the hat functions of each cell, one at a corner and zero at the others.
 
         Examples
@@ -50,8 +52,8 @@ class LinearElements:
     @classmethod
     def on_triangles(cls, triangles: IntrinsicMesh) -> LinearElements:
         """Elements of a surface; gradients are in the layout of each face."""
-        hats = 1j * np.roll(triangles.edge_vectors, -1, axis=1) / (2.0 * triangles.face_areas)[:, None]
-        hats = np.stack([hats.real, hats.imag], axis=2)
+        slopes = 1j * np.roll(triangles.edge_vectors, -1, axis=1) / (2.0 * triangles.face_areas)[:, None]
+        hats = np.stack([slopes.real, slopes.imag], axis=2)
         return cls.of(triangles.corner_vertices, triangles.face_areas, hats, triangles.n_vertices)
 
     @classmethod
@@ -65,15 +67,15 @@ class LinearElements:
     def masses(self) -> NDArray[np.float64]:
         """(n,) integrals of the hat functions: A_i of Eq. 18."""
         share = np.repeat(self.sizes / self.corners.shape[1], self.corners.shape[1])
-        return np.bincount(self.corners.ravel(), share, self.slope_matrix.shape[1])
+        return np.asarray(np.bincount(self.corners.ravel(), share, self.slope_matrix.shape[1]), np.float64)
 
     def slopes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m, d) ∇φ in every cell, whose length Eq. 17 bounds by one."""
-        return (self.slope_matrix @ values).reshape(len(self.sizes), -1)
+        return np.asarray(self.slope_matrix @ values).reshape(len(self.sizes), -1)
 
     def divergence(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """b of Eq. 13, ``b_i = ∫ ⟨∇λ_i, Y⟩``, for one vector per cell."""
-        return self.slope_matrix.T @ (self.sizes[:, None] * vectors).ravel()
+        return np.asarray(self.slope_matrix.T @ (self.sizes[:, None] * vectors).ravel())
 
     def slope_error(self, values: NDArray[np.float64]) -> float:
         """Root mean square of ``|∇φ| − 1`` over the cells in which φ is known."""

@@ -59,7 +59,7 @@ class Tetrahedra:
         """(m,) length of each tet's longest edge."""
         points = [self.vertices[self.tets[:, k]] for k in range(4)]
         squares = [np.square(points[i] - points[j]).sum(axis=1) for i in range(4) for j in range(i)]
-        return np.sqrt(np.max(squares, axis=0))
+        return np.asarray(np.sqrt(np.max(squares, axis=0)))
 
     @cached_property
     def thickness(self) -> NDArray[np.float64]:
@@ -80,13 +80,13 @@ class Tetrahedra:
     @cached_property
     def weights(self) -> NDArray[np.float64]:
         """(m,) w: one, less than one for thin tets, zero for flat ones."""
-        return np.minimum(self.thickness / THIN, 1)
+        return np.asarray(np.minimum(self.thickness / THIN, 1))
 
     @cached_property
     def ties(self) -> NDArray[np.float64]:
         """(m,) extra stiffness between any two faces of a flat tet, whose own stiffness is nearly zero."""
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
-        return lengths * (1 - np.minimum(self.thickness / FLAT, 1))
+        return np.asarray(lengths * (1 - np.minimum(self.thickness / FLAT, 1)))
 
     def face_mass(self, faces: FaceTable) -> NDArray[np.float64]:
         """(f,) M of Eq. 12, lumped: a quarter of the volume at each face.
@@ -95,7 +95,7 @@ class Tetrahedra:
         quarters are its row sums; they are as accurate, and simpler.
         """
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
-        return np.bincount(faces.tet_faces.ravel(), weights=quarter, minlength=len(faces.vertices))
+        return np.asarray(np.bincount(faces.tet_faces.ravel(), quarter, len(faces.vertices)), np.float64)
 
     def face_laplacian(self, faces: FaceTable) -> sparse.csr_matrix:
         """(f, f) Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T|, −(3/2) |e| cot θ between two faces.
@@ -119,7 +119,7 @@ class Tetrahedra:
         Eq. 22 is printed without the ⅓, and with the opposite sign, as the paper's Laplacian is negative semidefinite.
         """
         parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.weights / -3)[:, None]
-        return np.bincount(corners.ravel(), weights=parts.ravel(), minlength=n)
+        return np.asarray(np.bincount(corners.ravel(), parts.ravel(), n), np.float64)
 
     def gradients(self, corner_values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m, 3) gradient of the linear interpolant of (m, 4) corner values; zero on flat tets."""
@@ -133,7 +133,7 @@ class Tetrahedra:
         sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * weights[:, None]
         volumes = np.bincount(corners.ravel(), np.repeat(self.weights * self.volumes, 4), n)
         totals = [np.bincount(corners.ravel(), np.repeat(column, 4), n) for column in sums.T]
-        return np.stack(totals, axis=1) / np.where(volumes > 0, volumes, 1)[:, None]
+        return np.asarray(np.stack(totals, axis=1) / np.where(volumes > 0, volumes, 1)[:, None])
 
 
 def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -145,7 +145,7 @@ def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> ND
     array([1.])
     """
     a, b, c, d = (vertices[tets[:, k]] for k in range(4))
-    return np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6
+    return np.asarray(np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6)
 
 
 def _assemble(

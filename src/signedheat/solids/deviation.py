@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 
 import numpy as np
@@ -37,10 +38,12 @@ Progress = Callable[[float, str], None]
 class Deviation(Frozen):
     """Signed distances of a scan's points to a nominal part: positive where there is too much material.
 
+    Statistics leave out vertices that no face uses.
+
     Attributes
     ----------
     scan : PointCloud, TriangleMesh or PolygonMesh
-        What was scanned, without vertices that no face uses.
+        What was scanned.
     distances : (n,) float
         Of its points or vertices, in their units.
     nearest : (n, 3) float
@@ -59,28 +62,36 @@ class Deviation(Frozen):
         """(n, 3) positions of the scan's points or vertices."""
         return self.scan.points if isinstance(self.scan, PointCloud) else self.scan.vertices
 
+    @cached_property
+    def of_surface(self) -> NDArray[np.float64]:
+        """(m,) the distances of all points, or of the vertices that faces use."""
+        if isinstance(self.scan, PointCloud):
+            return self.distances
+        corners = self.scan.faces if isinstance(self.scan, TriangleMesh) else self.scan.corners
+        return self.distances[np.unique(corners)]
+
     @property
     def rms(self) -> float:
         """Root mean square."""
-        return float(np.sqrt(np.mean(self.distances**2)))
+        return float(np.sqrt(np.mean(self.of_surface**2)))
 
     @property
     def extreme(self) -> float:
         """What 99 % of the absolute deviations are below."""
-        return float(np.percentile(np.abs(self.distances), EXTREME))
+        return float(np.percentile(np.abs(self.of_surface), EXTREME))
 
     def within(self, tolerance: float) -> float:
         """Share of the points that are as near to the part as a tolerance, on either side."""
-        return float((np.abs(self.distances) <= tolerance).mean())
+        return float((np.abs(self.of_surface) <= tolerance).mean())
 
     def percentiles(self, percents: ArrayLike = PERCENTILES) -> NDArray[np.float64]:
         """Deviations that so many per cent of the points are below."""
-        return np.asarray(np.percentile(self.distances, np.asarray(percents, dtype=np.float64)))
+        return np.asarray(np.percentile(self.of_surface, np.asarray(percents, dtype=np.float64)))
 
     def histogram(self, bins: int = BINS) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """(bins,) numbers of points and (bins + 1,) limits; what is beyond `extreme` counts in the first or last."""
         reach = self.extreme if self.extreme > 0 else 1.0
-        inside = np.clip(self.distances, -reach, reach)
+        inside = np.clip(self.of_surface, -reach, reach)
         counts, limits = np.histogram(inside, bins, (-reach, reach))
         return counts.astype(np.int64), limits
 
@@ -88,8 +99,8 @@ class Deviation(Frozen):
     def figures(self) -> dict[str, object]:
         """What sums it up, ready for JSON."""
         return {
-            "points": len(self.distances),
-            "mean": float(self.distances.mean()),
+            "points": len(self.of_surface),
+            "mean": float(self.of_surface.mean()),
             "rms": self.rms,
             "percentiles": {f"{p:g}": v for p, v in zip(PERCENTILES, self.percentiles().tolist(), strict=True)},
             "on_completion": float(self.completed.mean()),
@@ -110,7 +121,7 @@ class Deviation(Frozen):
 
     def __repr__(self) -> str:
         low, middle, high = self.percentiles((1, 50, 99))
-        return f"Deviation({len(self.distances)} points, {low:.3g} to {high:.3g}, median {middle:.3g})"
+        return f"Deviation({len(self.of_surface)} points, {low:.3g} to {high:.3g}, median {middle:.3g})"
 
 
 def deviation(
@@ -153,22 +164,9 @@ def deviation(
         shape = shape.boundary
     if not isinstance(shape, PointCloud | TriangleMesh | PolygonMesh):
         raise SourceError(f"a {type(shape).__name__} is no scan", remedy="pass a mesh or points", element="scan")
-    shape = shape if isinstance(shape, PointCloud) else _without_unused_vertices(shape)
     solid = nominal if isinstance(nominal, Solid) else complete(nominal, progress=progress)
     points = shape.points if isinstance(shape, PointCloud) else shape.vertices
     if points.shape[1] != 3:
         raise SourceError("the scan lies in the plane", remedy="pass a shape in space", element="scan")
     found = solid.closest(points)
     return Deviation(shape, found.distances, found.points, found.completed)
-
-
-def _without_unused_vertices(mesh: TriangleMesh | PolygonMesh) -> TriangleMesh | PolygonMesh:
-    """The mesh itself if faces use all its vertices: others were not scanned."""
-    corners = mesh.faces if isinstance(mesh, TriangleMesh) else mesh.corners
-    used, numbers = np.unique(corners, return_inverse=True)
-    if len(used) == mesh.n_vertices:
-        return mesh
-    vertices = mesh.vertices[used]
-    if isinstance(mesh, TriangleMesh):
-        return TriangleMesh(vertices, numbers.reshape(-1, 3))
-    return PolygonMesh(vertices, np.split(numbers, mesh.offsets[1:-1]))

@@ -20,7 +20,9 @@ def crossed_edges(field: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 @compiled
-def _cubic(field, place, weights, gradient):
+def _cubic(
+    field: NDArray[np.float64], place: NDArray[np.float64], weights: NDArray[np.float64], gradient: NDArray[np.float64]
+) -> float:
     """Value of the cubic convolution interpolant (Keys 1981) at a position in cells; writes its `gradient`."""
     base = np.empty(4, dtype=np.int64)
     for axis in range(4):
@@ -72,7 +74,9 @@ def _cubic(field, place, weights, gradient):
 
 
 @compiled
-def crossings_at(field, edges, steps):
+def crossings_at(
+    field: NDArray[np.float64], edges: NDArray[np.int32], steps: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(e, 18) position, unit normal and shape operator (symmetric, ten numbers) of the zero set at crossed edges."""
     result = np.zeros((len(edges), 18))
     weights = np.empty((2, 4, 4))
@@ -141,7 +145,14 @@ def crossings_at(field, edges, steps):
 
 
 @compiled
-def seed_edge_ends(nearest, squares, edges, points, steps, first):
+def seed_edge_ends(
+    nearest: NDArray[np.int32],
+    squares: NDArray[np.float32],
+    edges: NDArray[np.int32],
+    points: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    first: int,
+) -> None:
     """Give both ends of each crossed edge its crossing as a candidate: a point from `first` on."""
     for e in range(len(edges)):
         p = first + e
@@ -158,7 +169,13 @@ def seed_edge_ends(nearest, squares, edges, points, steps, first):
 
 
 @compiled
-def nearest_tiles(nearest, squares, points, steps, tiles):
+def nearest_tiles(
+    nearest: NDArray[np.int32],
+    squares: NDArray[np.float32],
+    points: NDArray[np.float64],
+    steps: NDArray[np.float64],
+    tiles: NDArray[np.int64],
+) -> None:
     """Take over nearer crossings from neighbouring lines already visited, and along each line in both directions."""
     n0, n1, n2, n = nearest.shape
     step = np.float32(steps[3])

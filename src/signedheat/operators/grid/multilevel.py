@@ -223,7 +223,7 @@ def collapse(
     for level in levels[:-1]:
         halves = [n if f == 1 else n // 2 + 1 if f == 2 else 1 for n, f in zip(shapes[-1], level.factors, strict=True)]
         shapes.append(tuple(halves))
-    result = np.empty((components, 1, 1, 1, 1), dtype=np.float32)
+    result: NDArray[np.float32] = np.empty((components, 1, 1, 1, 1), dtype=np.float32)
     for depth in range(len(levels) - 1, -1, -1):
         level = levels[depth]
         fine_shape = shapes[depth]
@@ -238,7 +238,14 @@ def collapse(
 
 
 @compiled
-def _carry(vectors, inside, factors, power, coarse, counts):
+def _carry(
+    vectors: NDArray[np.float32],
+    inside: NDArray[np.bool_],
+    factors: NDArray[np.int64],
+    power: np.float32,
+    coarse: NDArray[np.float32],
+    counts: NDArray[np.integer],
+) -> None:
     """Copy vectors to the nodes of both grids, lengths raised to a power; count the known nodes of each stretch."""
     n0, n1, n2, n3 = vectors.shape[:4]
     for i in range(0, n0, 2 if factors[0] == 2 else 1):
@@ -260,7 +267,9 @@ def _carry(vectors, inside, factors, power, coarse, counts):
 
 
 @compiled
-def _interpolate(coarse, factors, out, axis, start, stop):
+def _interpolate(
+    coarse: NDArray[np.float32], factors: NDArray[np.int64], out: NDArray[np.float32], axis: int, start: int, stop: int
+) -> None:
     """Interpolate the values of a coarser grid to all nodes, linearly along every axis that was coarsened."""
     _, n0, n1, n2, n = out.shape
     row = np.empty(coarse.shape[4], dtype=np.float32)
@@ -295,7 +304,9 @@ def _interpolate(coarse, factors, out, axis, start, stop):
 
 
 @compiled
-def unit_vectors(vectors, inside, out, axis, start, stop):
+def unit_vectors(
+    vectors: NDArray[np.float32], inside: NDArray[np.bool_], out: NDArray[np.float32], axis: int, start: int, stop: int
+) -> None:
     """The vectors scaled to length one; where they have underflowed, `out` keeps the values of a coarser level."""
     dimension, n0, n1, n2, n = out.shape
     stretches = inside.shape[3]
@@ -320,7 +331,9 @@ def unit_vectors(vectors, inside, out, axis, start, stop):
 
 
 @compiled
-def quotients(vectors, inside, out, axis, start, stop):
+def quotients(
+    vectors: NDArray[np.float32], inside: NDArray[np.bool_], out: NDArray[np.float32], axis: int, start: int, stop: int
+) -> None:
     """The second component divided by the first; `out` keeps its values where the first has underflowed."""
     _, n0, n1, n2, n = out.shape
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):

@@ -65,7 +65,7 @@ class NodeSources:
 
 
 @compiled
-def with_room(sums, used, more):
+def with_room(sums: NDArray[np.float32], used: int, more: int) -> NDArray[np.float32]:
     """`sums`, or a longer copy of it, with room for `more` rows beyond the `used` ones."""
     if used + more <= sums.shape[0]:
         return sums
@@ -78,7 +78,14 @@ def with_room(sums, used, more):
 
 
 @compiled
-def _scatter(nodes, weights, values, places, sums, n):
+def _scatter(
+    nodes: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    values: NDArray[np.float64],
+    places: NDArray[np.int32],
+    sums: NDArray[np.float32],
+    n: int,
+) -> NDArray[np.float32]:
     used = sums.shape[0]
     for s in range(nodes.shape[0]):
         if used + nodes.shape[1] > sums.shape[0]:
@@ -96,7 +103,14 @@ def _scatter(nodes, weights, values, places, sums, n):
 
 
 @compiled
-def _restrict(places, sums, shape, factors, coarse_places, coarse):
+def _restrict(
+    places: NDArray[np.int32],
+    sums: NDArray[np.float32],
+    shape: NDArray[np.int64],
+    factors: NDArray[np.int64],
+    coarse_places: NDArray[np.int32],
+    coarse: NDArray[np.float32],
+) -> NDArray[np.float32]:
     used = coarse.shape[0]
     for i in range(shape[0]):
         for j in range(shape[1]):

@@ -70,7 +70,7 @@ def solve_poisson(
     padded = padded_shape(transformed.shape)
     eigenvalues = [np.zeros(1)] * (4 - len(eigenvalues)) + eigenvalues
     by_slabs(padded, _divide, *eigenvalues, transformed.reshape(padded))
-    return scipy.fft.idctn(transformed, type=2, overwrite_x=True, workers=workers)
+    return np.asarray(scipy.fft.idctn(transformed, type=2, overwrite_x=True, workers=workers))
 
 
 def interpolation_stencil(
@@ -106,7 +106,16 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
 
 
 @compiled
-def _divide(values0, values1, values2, values3, transformed, axis, start, stop):
+def _divide(
+    values0: NDArray[np.float64],
+    values1: NDArray[np.float64],
+    values2: NDArray[np.float64],
+    values3: NDArray[np.float64],
+    transformed: NDArray[np.float64],
+    axis: int,
+    start: int,
+    stop: int,
+) -> None:
     """Divide by the eigenvalues of C, sums of one-dimensional ones; the quotient is zero where they are zero."""
     n0, n1, n2, n = transformed.shape
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
@@ -121,7 +130,14 @@ def _divide(values0, values1, values2, values3, transformed, axis, start, stop):
 
 
 @compiled
-def _divergence(components, scales, out, axis, start, stop):
+def _divergence(
+    components: NDArray[np.floating],
+    scales: NDArray[np.float64],
+    out: NDArray[np.float64],
+    axis: int,
+    start: int,
+    stop: int,
+) -> None:
     dimension = components.shape[0]
     n0, n1, n2, n = out.shape
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):

@@ -81,7 +81,16 @@ def line_pivots(shape: tuple[int, ...], ratios: NDArray[np.float64]) -> NDArray[
 
 
 @compiled
-def _sweep_tiles(vectors, sums, places, active, shape, ratios, pivots, tiles):
+def _sweep_tiles(
+    vectors: NDArray[np.float32],
+    sums: NDArray[np.float32],
+    places: NDArray[np.int32],
+    active: NDArray[np.bool_],
+    shape: tuple[int, int, int, int],
+    ratios: tuple[np.float32, np.float32, np.float32, np.float32],
+    pivots: NDArray[np.float32],
+    tiles: NDArray[np.int64],
+) -> None:
     """Update the lines of tiles in order, four components at once. Slices of lines help the compiler to vectorise."""
     n0, n1, n2, n = shape
     ratio0, ratio1, ratio2, along = ratios

@@ -21,7 +21,7 @@ SMALL = 100_000
 
 def padded_shape(shape: tuple[int, ...]) -> tuple[int, int, int, int]:
     """The shape, preceded by axes of one node to make four."""
-    return (1,) * (4 - len(shape)) + tuple(shape)
+    return (1,) * (4 - len(shape)) + tuple(shape)  # type: ignore[return-value]
 
 
 def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int, *arguments: Any) -> None:
