@@ -8,13 +8,13 @@ shared equally by the tets at that face.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..parallel import in_chunks
+from ..parallel import CHUNK, in_chunks
 from .meshes import Tets
 
 FLAT = 1e-10
@@ -52,12 +52,13 @@ class ClippedPolygons:
     in_face: NDArray[np.int64]
 
 
-@dataclass(frozen=True, eq=False)
-class Planes:
+class Planes(NamedTuple):
     """The planes of the faces of a mesh, the same to the last bit for all tets that share a face.
 
     Attributes
     ----------
+    tet_faces : (m, 4) int
+        Face opposite each corner of each tet.
     normals : (f, 3) float
         Unit normals, out of the first tet; zero for faces without area.
     offsets : (f,) float
@@ -74,6 +75,7 @@ class Planes:
         Centre of the mesh; coordinates are taken relative to it to reduce rounding errors.
     """
 
+    tet_faces: NDArray[np.int64]
     normals: NDArray[np.float64]
     offsets: NDArray[np.float64]
     tolerances: NDArray[np.float64]
@@ -96,6 +98,7 @@ class Planes:
         solid = geometry.thickness > FLAT
         counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
         return cls(
+            tet_faces=np.ascontiguousarray(faces.tet_faces),
             normals=normals,
             offsets=np.einsum("fi,fi->f", normals, (a + b + c) / 3),
             tolerances=TOUCHING * np.sqrt(twice_area) + 1e-15 * np.abs(points).max(),
@@ -104,11 +107,6 @@ class Planes:
             solid=solid,
             center=center,
         )
-
-    @property
-    def in_kernels(self) -> tuple[NDArray[Any], ...]:
-        """What kernels need of them."""
-        return self.normals, self.offsets, self.tolerances, self.signs, self.solid
 
 
 def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -> ClippedPolygons:
@@ -122,18 +120,16 @@ def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -
     >>> clip_triangles(mesh, Planes.of(mesh), across).area_vectors
     array([[0.   , 0.   , 0.125]])
     """
-    starts, near = mesh.search_tree.meeting(triangles, _slack(mesh))
-    triangles = np.ascontiguousarray(triangles - planes.center)
-    parents = np.repeat(np.arange(len(triangles)), np.diff(starts))
-    possible = _may_meet(triangles, parents, near, mesh.faces.tet_faces, *planes.in_kernels)
-    parents, tets = parents[possible], near[possible]
-    area_vectors, areas, centers, in_face = _clip(
-        triangles, parents, tets, mesh.faces.tet_faces, *planes.in_kernels, planes.shares
-    )
-    kept = areas > 0
-    parents, tets, centers = parents[kept], tets[kept], centers[kept] + planes.center
-    places = barycentric(mesh, tets, centers)
-    return ClippedPolygons(tets, parents, area_vectors[kept], areas[kept], places, in_face[kept])
+    found = []
+    for begin in range(0, max(len(triangles), 1), CHUNK):  # most of what is near lies outside
+        some = triangles[begin : begin + CHUNK]
+        starts, tets = mesh.search_tree.meeting(some, _slack(mesh))
+        parents = np.repeat(np.arange(len(some)), np.diff(starts))
+        vectors, areas, centers, in_face = _clip(planes, some - planes.center, parents, tets)
+        kept = areas > 0
+        found.append([a[kept] for a in (tets, parents + begin, vectors, areas, centers, in_face)])
+    tets, parents, vectors, areas, centers, in_face = (np.concatenate(a) for a in zip(*found, strict=True))
+    return ClippedPolygons(tets, parents, vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face)
 
 
 def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -149,7 +145,7 @@ def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> 
 
     def found(some: NDArray[np.float64]) -> tuple[NDArray[np.int64]]:
         near = mesh.search_tree.meeting(np.repeat(some[:, None], 3, axis=1), slack)
-        return (_locate(some - planes.center, *near, mesh.faces.tet_faces, *planes.in_kernels),)
+        return (_locate(planes, some - planes.center, *near),)
 
     slack = _slack(mesh)
     return in_chunks(found, points)[0]
@@ -172,19 +168,25 @@ def barycentric(mesh: Tets, tets: NDArray[np.int64], points: NDArray[np.float64]
 
 
 @compiled
-def _locate(points, starts, near, tet_faces, normals, offsets, tolerances, signs, solid):
+def beyond(planes, tet, k, x, y, z):
+    """Signed distance by which a point, relative to the centre, lies outside the face opposite corner k of a tet."""
+    f = planes.tet_faces[tet, k]
+    height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
+    return planes.signs[tet, k] * height
+
+
+@compiled
+def _locate(planes, points, starts, near):
     found = np.full(len(points), -1, dtype=np.int64)
     for p in range(len(points)):
         deepest = -np.inf
         for t in near[starts[p] : starts[p + 1]]:
-            if not solid[t]:
+            if not planes.solid[t]:
                 continue
             inside = np.inf
             for c in range(4):
-                f = tet_faces[t, c]
-                x, y, z = points[p, 0], points[p, 1], points[p, 2]
-                height = offsets[f] - (normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z)
-                inside = min(inside, signs[t, c] * height + tolerances[f])
+                out = beyond(planes, t, c, points[p, 0], points[p, 1], points[p, 2])
+                inside = min(inside, planes.tolerances[planes.tet_faces[t, c]] - out)
             if inside >= 0.0 and (inside > deepest or (inside == deepest and t < found[p])):
                 deepest = inside
                 found[p] = t
@@ -192,30 +194,14 @@ def _locate(points, starts, near, tet_faces, normals, offsets, tolerances, signs
 
 
 @compiled
-def _may_meet(triangles, parents, tets, tet_faces, normals, offsets, tolerances, signs, solid):
-    """(k,) whether a triangle does not lie outside one of the faces of a tet altogether."""
-    result = np.zeros(len(tets), dtype=np.bool_)
-    for k in range(len(tets)):
-        t, p = tets[k], parents[k]
-        result[k] = solid[t]
-        for c in range(4):
-            f, sign = tet_faces[t, c], signs[t, c]
-            beyond = True
-            for corner in range(3):
-                x, y, z = triangles[p, corner, 0], triangles[p, corner, 1], triangles[p, corner, 2]
-                height = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z
-                beyond &= sign * height > sign * offsets[f] + tolerances[f]
-            result[k] &= not beyond
-    return result
-
-
-@compiled
-def _clip(triangles, parents, tets, tet_faces, normals, offsets, tolerances, signs, solid, shares):
+def _clip(planes, triangles, parents, tets):
     """Area vector, area and centroid of what of a triangle lies in a tet, and the face of the tet that it lies in."""
     area_vectors, centers = np.zeros((len(tets), 3)), np.zeros((len(tets), 3))
     areas, in_face = np.zeros(len(tets)), np.full(len(tets), -1)
     polygon, other, heights, normal = np.empty((8, 3)), np.empty((8, 3)), np.empty(8), np.empty(3)
     for k in range(len(tets)):
+        if not planes.solid[tets[k]]:
+            continue
         a, b, c = triangles[parents[k], 0], triangles[parents[k], 1], triangles[parents[k], 2]
         u0, u1, u2, v0, v1, v2 = b[0] - a[0], b[1] - a[1], b[2] - a[2], c[0] - a[0], c[1] - a[1], c[2] - a[2]
         normal[0], normal[1], normal[2] = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
@@ -225,9 +211,7 @@ def _clip(triangles, parents, tets, tet_faces, normals, offsets, tolerances, sig
             polygon[0, i], polygon[1, i], polygon[2, i] = a[i], b[i], c[i]
         n = 3
         for corner in range(4):
-            f = tet_faces[tets[k], corner]
-            sign = signs[tets[k], corner]
-            n, flat = _cut(polygon, n, other, heights, normals[f], offsets[f], tolerances[f], sign)
+            n, flat = _cut(planes, tets[k], corner, polygon, n, other, heights)
             if flat:
                 in_face[k] = corner
             if n < 3:
@@ -236,7 +220,7 @@ def _clip(triangles, parents, tets, tet_faces, normals, offsets, tolerances, sig
             continue
         areas[k] = _measure(polygon, n, normal, area_vectors[k], centers[k])
         if in_face[k] >= 0:
-            share = shares[tet_faces[tets[k], in_face[k]]]
+            share = planes.shares[planes.tet_faces[tets[k], in_face[k]]]
             areas[k] *= share
             for axis in range(3):
                 area_vectors[k, axis] *= share
@@ -244,15 +228,15 @@ def _clip(triangles, parents, tets, tet_faces, normals, offsets, tolerances, sig
 
 
 @compiled
-def _cut(polygon, n, other, heights, normal, offset, tolerance, sign):
-    """Clip a polygon to the inner side of a plane. Also whether the whole polygon lies in the plane.
+def _cut(planes, tet, corner, polygon, n, other, heights):
+    """Clip a polygon to the inner side of a face of a tet. Also whether the whole polygon lies in the face's plane.
 
     Heights and crossings are the same, to the last bit, for the tets on both sides of the plane.
     """
     most, least = 0.0, 0.0
     for i in range(n):
-        height = normal[0] * polygon[i, 0] + normal[1] * polygon[i, 1] + normal[2] * polygon[i, 2] - offset
-        heights[i] = 0.0 if abs(height) <= tolerance else sign * height
+        height = beyond(planes, tet, corner, polygon[i, 0], polygon[i, 1], polygon[i, 2])
+        heights[i] = 0.0 if abs(height) <= planes.tolerances[planes.tet_faces[tet, corner]] else height
         most = max(most, heights[i])
         least = min(least, heights[i])
     if most <= 0.0:

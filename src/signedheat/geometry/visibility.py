@@ -2,59 +2,20 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from .tet_faces import FaceTable
+from .tet_clipping import Planes, beyond
 
 GRAZING = 1e-6
 """Distance, relative to the size of the tets, by which a line may lie outside the mesh."""
 
 
-def tet_neighbors(faces: FaceTable) -> NDArray[np.int64]:
-    """(m, 4) the tet beyond the face opposite each corner, −1 at the boundary.
-
-    Examples
-    --------
-    >>> from signedheat.geometry.tet_faces import face_table
-    >>> tet_neighbors(face_table(np.array([[0, 1, 2, 3], [4, 1, 3, 2]]))).tolist()
-    [[1, -1, -1, -1], [0, -1, -1, -1]]
-    """
-    flat = faces.tet_faces.ravel()
-    order = np.argsort(flat, kind="stable")
-    same = flat[order[1:]] == flat[order[:-1]]
-    beyond = np.full(len(flat), -1, dtype=np.int64)
-    beyond[order[1:][same]] = order[:-1][same] // 4
-    beyond[order[:-1][same]] = order[1:][same] // 4
-    return beyond.reshape(-1, 4)
-
-
-class FacePlanes(NamedTuple):
-    """Tets, their neighbours and the planes of their faces, to walk along lines; see `tet_clipping.Planes`."""
-
-    tets: NDArray[np.int64]
-    neighbors: NDArray[np.int64]
-    tet_faces: NDArray[np.int64]
-    normals: NDArray[np.float64]
-    offsets: NDArray[np.float64]
-    signs: NDArray[np.float64]
-
-
 @compiled
-def beyond(planes, tet, k, x, y, z):
-    """Signed distance by which a point lies outside the face opposite corner k of a tet."""
-    f = planes.tet_faces[tet, k]
-    height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
-    return planes.signs[tet, k] * height
-
-
-@compiled
-def stays_inside(planes, tet, x, y, z, u, w, t, slack):
+def stays_inside(planes, neighbors, tet, x, y, z, u, w, t, slack):
     """Whether the segment from (x, y, z), in a tet, to (u, w, t), in the mesh, lies in the mesh."""
-    for _ in range(len(planes.tets)):
+    for _ in range(len(neighbors)):
         leave, at = -1, np.inf
         for k in range(4):
             there = beyond(planes, tet, k, u, w, t)
@@ -64,7 +25,7 @@ def stays_inside(planes, tet, x, y, z, u, w, t, slack):
                     leave, at = k, -here / (there - here)
         if leave < 0:
             return True
-        tet = planes.neighbors[tet, leave]
+        tet = neighbors[tet, leave]
         if tet < 0:
             return False
     return False
@@ -72,14 +33,18 @@ def stays_inside(planes, tet, x, y, z, u, w, t, slack):
 
 @compiled
 def visible(
-    planes: FacePlanes, starts: NDArray[np.float64], targets: NDArray[np.float64], slack: float
+    planes: Planes,
+    neighbors: NDArray[np.int64],
+    starts: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    slack: float,
 ) -> NDArray[np.bool_]:
     """(m,) whether the straight line from a point in each tet to its target stays in the mesh, up to a length."""
     seen = np.empty(len(starts), dtype=np.bool_)
     for tet in range(len(starts)):
         x, y, z = starts[tet]
         u, w, t = targets[tet]
-        seen[tet] = stays_inside(planes, tet, x, y, z, u, w, t, slack)
+        seen[tet] = stays_inside(planes, neighbors, tet, x, y, z, u, w, t, slack)
     return seen
 
 

@@ -13,7 +13,7 @@ from ..geometry.geodesics.any_angle import any_angle_distance
 from ..geometry.geodesics.heap_kernels import Queue
 from ..geometry.nearest import nearest_on_triangles, triangle_rows
 from ..geometry.tet_clipping import barycentric
-from ..geometry.visibility import GRAZING, FacePlanes, tet_neighbors
+from ..geometry.visibility import GRAZING
 from ..lowering.tets.discretization import TetDiscretization
 
 LARGEST_BEND = 1.0
@@ -61,15 +61,14 @@ def distance_around(
     triangles = surface.positions[surface.corners]
     nearest, _ = nearest_on_triangles(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)), points)
     nearest[np.isnan(values)] = -1
-    walls = FacePlanes(
-        unknowns, tet_neighbors(mesh.faces), mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs
-    )
     tets_at = by_element(unknowns, len(values), 4)
     triangles_at = by_element(surface.corners, len(surface.positions), 3)
     queue = Queue.empty(len(points))
     slack = GRAZING * lowered.spacing
     distance, nearest, found, hidden = any_angle_distance(
-        walls,
+        planes,
+        mesh.faces.neighbors,
+        unknowns,
         points,
         *tets_at,
         triangle_rows(triangles.reshape(-1, 9)),

@@ -13,12 +13,13 @@ import numpy as np
 
 from ...compiled import compiled
 from ..nearest import foot_on_triangle
-from ..visibility import beyond, stays_inside
+from ..tet_clipping import beyond
+from ..visibility import stays_inside
 from .heap_kernels import pop, push
 
 
 @compiled
-def _seen(planes, points, first_tet, tets_at, v, target, slack):
+def _seen(planes, neighbors, tets, points, first_tet, tets_at, v, target, slack):
     """Whether the segment from vertex v to a target in the mesh lies in the mesh."""
     x, y, z = points[v]
     u, w, t = target
@@ -26,13 +27,13 @@ def _seen(planes, points, first_tet, tets_at, v, target, slack):
     for i in range(first_tet[v], first_tet[v + 1]):  # the tet that the segment starts into
         worst = -np.inf
         for k in range(4):
-            if planes.tets[tets_at[i], k] != v:
+            if tets[tets_at[i], k] != v:
                 worst = max(worst, beyond(planes, tets_at[i], k, u, w, t))
         if worst < least:
             tet, least = tets_at[i], worst
     if least > slack:
         return False
-    return stays_inside(planes, tet, x, y, z, u, w, t, slack)
+    return stays_inside(planes, neighbors, tet, x, y, z, u, w, t, slack)
 
 
 @compiled
@@ -55,14 +56,15 @@ def _length(point, x, y, z):
 
 @compiled
 def any_angle_distance(
-    planes, points, first_tet, tets_at, rows, corners, first_triangle, triangles_at, owners, nearest, slack, queue
-):
+    planes, neighbors, tets, points, first_tet, tets_at,
+    rows, corners, first_triangle, triangles_at, owners, nearest, slack, queue,
+):  # fmt: skip
     """Distance of every vertex from triangles in the mesh.
 
     Parameters
     ----------
-    planes : FacePlanes
-        The mesh.
+    planes, neighbors, tets : Planes, (m, 4) int, (m, 4) int
+        The faces of the mesh, the tet beyond each, and the vertices of each tet.
     points : (n, 3) float
         Its vertices, relative to the centre of the mesh, as the planes are.
     first_tet : (n + 1,) int
@@ -103,11 +105,11 @@ def any_angle_distance(
         if nearest[v] >= 0:
             x, y, z = points[v]
             square, _, feet[v, 0], feet[v, 1], feet[v, 2] = foot_on_triangle(rows, nearest[v], x, y, z)
-            if _seen(planes, points, first_tet, tets_at, v, feet[v], slack):
+            if _seen(planes, neighbors, tets, points, first_tet, tets_at, v, feet[v], slack):
                 distance[v], known[v] = np.sqrt(square), True
     for i in range(len(rows)):  # a triangle in a tet is visible from the tet's corners, if not the nearest to them
         for k in range(4):
-            v = planes.tets[owners[i], k]
+            v = tets[owners[i], k]
             if owners[i] >= 0 and not known[v] and nearest[v] >= 0:
                 x, y, z = points[v]
                 square, _, a, b, c = foot_on_triangle(rows, i, x, y, z)
@@ -121,7 +123,7 @@ def any_angle_distance(
             hidden += 1
             for i in range(first_tet[v], first_tet[v + 1]):
                 for k in range(4):
-                    u = planes.tets[tets_at[i], k]
+                    u = tets[tets_at[i], k]
                     if known[u]:
                         push(queue, u, distance[u])
     done = np.zeros(n, dtype=np.bool_)
@@ -130,7 +132,7 @@ def any_angle_distance(
         done[u] = True
         for i in range(first_tet[u], first_tet[u + 1]):
             for k in range(4):
-                v = planes.tets[tets_at[i], k]
+                v = tets[tets_at[i], k]
                 if known[v] or done[v] or nearest[v] < 0:
                     continue
                 x, y, z = points[v]
@@ -143,7 +145,7 @@ def any_angle_distance(
                 length += _length(target, x, y, z)
                 if length >= distance[v]:
                     continue
-                if not _seen(planes, points, first_tet, tets_at, v, target, slack):
+                if not _seen(planes, neighbors, tets, points, first_tet, tets_at, v, target, slack):
                     via, near, foot, length = u, nearest[u], feet[u], distance[u] + _length(points[u], x, y, z)
                 if length < distance[v]:
                     distance[v], bend[v], nearest[v] = length, via, near

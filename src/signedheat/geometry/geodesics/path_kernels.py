@@ -18,9 +18,9 @@ whose lengths differ by 1e-16, the same one is always found. Any number from 1e-
 
 
 @compiled
-def middle(corners, h):
+def middle(faces, h):
     """Midpoint of a halfedge, in the layout of its face."""
-    return 0.5 * (corners[h // 3, h % 3] + corners[h // 3, (h % 3 + 1) % 3])
+    return 0.5 * (faces.positions[h // 3, h % 3] + faces.positions[h // 3, (h % 3 + 1) % 3])
 
 
 @compiled
@@ -30,19 +30,18 @@ def toll(e: int) -> float:
 
 
 @compiled
-def find_sleeve(corners, edge_of, begin, sides, starts, start_points, ends, end_points, cost, leave, enter, queue):
+def find_sleeve(faces, starts, start_points, ends, end_points, cost, leave, enter, queue):
     """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
 
     Returns the halfedges through which all faces but the last are left, and those through which all but the first are
     entered; empty if there is no path. `cost`, `leave`, `enter` and `queue` are work space, restored before returning.
     """
-    touched = [np.int64(0)]
+    edge_of, touched = faces.edges.ravel(), [np.int64(0)]
     touched.pop()
     for s in range(len(starts)):
         for k in range(3):
-            h = 3 * starts[s] + k
-            e = edge_of[h]
-            d = abs(middle(corners, h) - start_points[s]) * toll(e)
+            h, e = 3 * starts[s] + k, edge_of[3 * starts[s] + k]
+            d = abs(middle(faces, h) - start_points[s]) * toll(e)
             if d < cost[e]:
                 cost[e], leave[e], enter[e] = d, h, -1
                 touched.append(e)
@@ -53,18 +52,18 @@ def find_sleeve(corners, edge_of, begin, sides, starts, start_points, ends, end_
         d = cost[e]
         if d >= best:
             break
-        for k in range(begin[e], begin[e + 1]):
-            h = sides[k]
+        for k in range(faces.first_halfedge[e], faces.first_halfedge[e + 1]):
+            h = faces.halfedges[k]
             if h == leave[e]:
                 continue
-            here = middle(corners, h)
+            here = middle(faces, h)
             for s in range(len(ends)):
                 if ends[s] == h // 3 and d + abs(here - end_points[s]) < best:
                     best, last = d + abs(here - end_points[s]), h
             for turn in range(1, 3):
                 out = h - h % 3 + (h + turn) % 3
                 to = edge_of[out]
-                there = d + abs(middle(corners, out) - here) * toll(to)
+                there = d + abs(middle(faces, out) - here) * toll(to)
                 if there < cost[to]:
                     cost[to], leave[to], enter[to] = there, out, h
                     touched.append(to)
@@ -75,8 +74,9 @@ def find_sleeve(corners, edge_of, begin, sides, starts, start_points, ends, end_
     left, entered = np.empty(n, np.int64), np.empty(n, np.int64)
     while n > 0:
         n -= 1
-        entered[n], left[n] = last, leave[edge_of[last]]
-        last = enter[edge_of[last]]
+        e = edge_of[last]
+        entered[n], left[n] = last, leave[e]
+        last = enter[e]
     for e in touched:
         cost[e], queue.places[e] = np.inf, -1
     queue.size[0] = 0
@@ -84,29 +84,32 @@ def find_sleeve(corners, edge_of, begin, sides, starts, start_points, ends, end_
 
 
 @compiled
-def unfold(corners, forward, left, entered):
-    """Unfold a sleeve into the plane of its first face: tails and heads of the halfedges left, and the last face.
+def unfold(faces, left, entered):
+    """Unfold a sleeve into the plane of its first face: tail and head of each halfedge left, and the last face.
 
     Also whether each face, the last one included, is turned over in that plane.
     """
-    n = len(left)
-    tails, heads = np.empty(n, np.complex128), np.empty(n, np.complex128)
-    over = np.zeros(n + 1, np.bool_)
-    placed = corners[left[0] // 3].copy()
-    for i in range(n):
-        k = left[i] % 3
-        tails[i], heads[i] = placed[k], placed[(k + 1) % 3]
-        face, side = entered[i] // 3, entered[i] % 3
-        same = forward[left[i]] == forward[entered[i]]
-        a, b = (tails[i], heads[i]) if same else (heads[i], tails[i])
-        over[i + 1] = over[i] != same
-        base = corners[face, (side + 1) % 3] - corners[face, side]
-        apex = corners[face, (side + 2) % 3] - corners[face, side]
-        ratio = apex / base if abs(base) > 0 else 0j
-        if over[i + 1]:
-            ratio = np.conj(ratio)
-        placed[side], placed[(side + 1) % 3], placed[(side + 2) % 3] = a, b, a + ratio * (b - a)
-    return tails, heads, over, placed
+    portals, over = np.empty((len(left), 2), np.complex128), np.zeros(len(left) + 1, np.int64)
+    placed = faces.positions[left[0] // 3].copy()
+    for i in range(len(left)):
+        k, face, side = left[i] % 3, entered[i] // 3, entered[i] % 3
+        portals[i, 0], portals[i, 1] = placed[k], placed[(k + 1) % 3]
+        same = np.int64(faces.forward[left[i] // 3, k] == faces.forward[face, side])
+        over[i + 1] = over[i] ^ same
+        a, b = portals[i, 1 - same], portals[i, same]
+        placed[side], placed[(side + 1) % 3] = a, b
+        placed[(side + 2) % 3] = on_base(
+            faces.positions[face], side, over[i + 1], faces.positions[face, (side + 2) % 3], a, b
+        )
+    return portals, over, placed
+
+
+@compiled
+def on_base(corners: NDArray[np.complex128], side: int, over: int, point: complex, a: complex, b: complex) -> complex:
+    """Where a point of a face is if a side of the face is from a to b, and the face perhaps turned over."""
+    base = corners[(side + 1) % 3] - corners[side]
+    ratio = (point - corners[side]) / base if abs(base) > 0 else 0j
+    return a + (np.conj(ratio) if over else ratio) * (b - a)
 
 
 @compiled
@@ -116,77 +119,60 @@ def turns(a: complex, b: complex) -> float:
 
 
 @compiled
-def funnel(tails, heads, over, start, end):
+def funnel(portals, over, start, end):
     """Shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
 
-    Returns the portals at which the path bends, whether it bends at their left end (1) or right (0), and its length.
+    Returns the portals at which the path bends, whether it bends at their tail (0) or head (1), and its length.
     """
-    n = len(tails)
-    bends, to_left = [np.int64(0)], [np.int64(0)]
+    bends, ends = [np.int64(0)], [np.int64(0)]
     bends.pop()
-    to_left.pop()
-    apex = left = right = start
-    at_left = at_right = -1
-    total = 0.0
-    i = 0
-    while i <= n:
-        if i == n:
-            l = r = end
-        elif over[i]:
-            l, r = tails[i], heads[i]
-        else:
-            l, r = heads[i], tails[i]
-        if turns(right - apex, r - apex) >= 0:
-            if apex == right or turns(left - apex, r - apex) < 0:
-                if i < n:
-                    right, at_right = r, i
-            else:
-                bends.append(at_left)
-                to_left.append(1)
-                total += abs(left - apex)
-                apex = right = left
-                i = at_right = at_left
-                i += 1
+    ends.pop()
+    rims, at = np.full(2, start), np.full(2, -1)  # of the funnel, right and left, and the portals they come from
+    apex, total, i = start, 0.0, 0
+    while i <= len(portals):
+        for side in range(2):
+            other, sign = 1 - side, 1.0 - 2.0 * side
+            place = portals[i, side ^ over[i]] if i < len(portals) else end
+            if sign * turns(rims[side] - apex, place - apex) < 0:
                 continue
-        if turns(left - apex, l - apex) <= 0:
-            if apex == left or turns(right - apex, l - apex) > 0:
-                if i < n:
-                    left, at_left = l, i
-            else:
-                bends.append(at_right)
-                to_left.append(0)
-                total += abs(right - apex)
-                apex = left = right
-                i = at_left = at_right
-                i += 1
+            if apex == rims[side] or sign * turns(rims[other] - apex, place - apex) < 0:
+                if i < len(portals):
+                    rims[side], at[side] = place, i
                 continue
+            i = at[other]
+            bends.append(i)
+            ends.append(other ^ over[i])
+            total += abs(rims[other] - apex)
+            apex = rims[side] = rims[other]
+            at[side] = i
+            break
         i += 1
-    return bends, to_left, total + abs(end - apex)
+    return bends, ends, total + abs(end - apex)
 
 
 @compiled
-def other_way(edge_of, forward, begin, sides, left, entered, tails, heads, bend, point):
+def other_way(faces, left, entered, portals, bend, point):
     """The sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
     first = last = bend
-    while first > 0 and (tails[first - 1] == point or heads[first - 1] == point):
+    while first > 0 and (portals[first - 1, 0] == point or portals[first - 1, 1] == point):
         first -= 1
-    while last + 1 < len(left) and (tails[last + 1] == point or heads[last + 1] == point):
+    while last + 1 < len(left) and (portals[last + 1, 0] == point or portals[last + 1, 1] == point):
         last += 1
-    goal, at_tail = entered[last] // 3, tails[first] == point
+    goal, at_tail = entered[last] // 3, portals[first, 0] == point
     # walk around the vertex in all directions, breadth first: halfedges through which faces are left, and entered
     out, into, before = [turned(left[first], at_tail)], [left[first]], [np.int64(-1)]
     tail_there = [np.int64(not at_tail)]
     k = 0
     while k < len(out):
         h = out[k]
-        e = edge_of[h]
-        for c in range(begin[e], begin[e + 1]):
-            across = sides[c]
+        e = faces.edges[h // 3, h % 3]
+        for across in faces.halfedges[faces.first_halfedge[e] : faces.first_halfedge[e + 1]]:
             if across // 3 == h // 3 or is_among(into, across, 0, len(into)) or is_among(left, across, first, last + 1):
                 continue
             if across // 3 == goal:
                 return spliced(left, entered, first, last, out, into, before, k, across)
-            at_tail = (tail_there[k] == 1) == (forward[h] == forward[across])
+            same = faces.forward[h // 3, h % 3] == faces.forward[across // 3, across % 3]
+            at_tail = (tail_there[k] == 1) == same
             out.append(turned(across, at_tail))
             into.append(across)
             before.append(k)
@@ -238,76 +224,57 @@ def point_in(faces: NDArray[np.int64], points: NDArray[np.complex128], face: int
 
 
 @compiled
-def straighten(corners, edge_of, forward, begin_at, sides, left, entered, starts, start_points, ends, end_points):
+def path_in(faces, left, entered, starts, start_points, ends, end_points):
+    """The shortest path in a sleeve: its portals, its two ends, the bends as `funnel` returns them, and its length."""
+    portals, over, placed = unfold(faces, left, entered)
+    last = entered[-1] // 3
+    begin, end = point_in(starts, start_points, left[0] // 3), point_in(ends, end_points, last)
+    end = on_base(faces.positions[last], 0, over[-1], end, placed[0], placed[1])
+    bends, at, length = funnel(portals, over, begin, end)
+    return portals, begin, end, bends, at, length
+
+
+@compiled
+def straighten(faces, left, entered, starts, start_points, ends, end_points):
     """The shortest path in a sleeve, improved as long as passing a vertex on its other side makes it shorter.
 
     Returns the halfedges crossed and the fraction along each.
     """
-    tails, heads, over, placed = unfold(corners, forward, left, entered)
-    begin = point_in(starts, start_points, left[0] // 3)
-    end = locate_end(corners, entered, placed, over, ends, end_points)
-    bends, to_left, length = funnel(tails, heads, over, begin, end)
+    portals, begin, end, bends, at, length = path_in(faces, left, entered, starts, start_points, ends, end_points)
     k = 0
     while k < len(bends):
-        i = bends[k]
-        point = heads[i] if (to_left[k] == 1) != over[i] else tails[i]
-        try_left, try_entered = other_way(edge_of, forward, begin_at, sides, left, entered, tails, heads, i, point)
+        point = portals[bends[k], at[k]]
+        try_left, try_entered = other_way(faces, left, entered, portals, bends[k], point)
         k += 1
         if len(try_left) == 0:
             continue
-        t, h, o, p = unfold(corners, forward, try_left, try_entered)
-        b = point_in(starts, start_points, try_left[0] // 3)
-        f = locate_end(corners, try_entered, p, o, ends, end_points)
-        try_bends, try_to_left, shorter = funnel(t, h, o, b, f)
-        if shorter < length * (1 - 1e-12):
-            left, entered, tails, heads, over, begin, end = try_left, try_entered, t, h, o, b, f
-            bends, to_left, length = try_bends, try_to_left, shorter
-            k = 0
+        found = path_in(faces, try_left, try_entered, starts, start_points, ends, end_points)
+        if found[5] < length * (1 - 1e-12):
+            left, entered, k = try_left, try_entered, 0
+            portals, begin, end, bends, at, length = found
     fractions = np.empty(len(left))
     here, k = begin, 0
     for i in range(len(left)):
         if k < len(bends) and bends[k] == i:
-            fractions[i] = 1.0 if (to_left[k] == 1) != over[i] else 0.0
-            here = heads[i] if (to_left[k] == 1) != over[i] else tails[i]
+            fractions[i], here = at[k], portals[i, at[k]]
             k += 1
             continue
-        if k == len(bends):
-            there = end
-        else:
-            j = bends[k]
-            there = heads[j] if (to_left[k] == 1) != over[j] else tails[j]
-        along, span = there - here, heads[i] - tails[i]
+        there = portals[bends[k], at[k]] if k < len(bends) else end
+        along, span, away = there - here, portals[i, 1] - portals[i, 0], here - portals[i, 0]
         across = turns(along, span)
-        if across != 0:
-            fractions[i] = turns(along, here - tails[i]) / across
-        else:
-            fractions[i] = (np.conj(span) * (here - tails[i])).real / max(abs(span) ** 2, 1e-300)
-        fractions[i] = min(max(fractions[i], 0.0), 1.0)
+        share = (
+            turns(along, away) / across if across != 0 else (np.conj(span) * away).real / max(abs(span) ** 2, 1e-300)
+        )
+        fractions[i] = min(max(share, 0.0), 1.0)
     return left, fractions
 
 
 @compiled
-def locate_end(corners, entered, placed, over, ends, end_points):
-    """The end of a path, unfolded into the plane of its sleeve's first face."""
-    face = entered[-1] // 3
-    point = point_in(ends, end_points, face)
-    q = corners[face]
-    base = q[1] - q[0]
-    ratio = (point - q[0]) / base if abs(base) > 0 else 0j
-    if over[-1]:
-        ratio = np.conj(ratio)
-    return placed[0] + ratio * (placed[1] - placed[0])
-
-
-@compiled
-def shortest_lines(
-    corners, edge_of, forward, begin, around, queue, starts, start_points, start_at, ends, end_points, end_at
-):
+def shortest_lines(faces, queue, starts, start_points, start_at, ends, end_points, end_at):
     """Shortest paths for many pairs of points: halfedges crossed, fractions along them, their number for each pair.
 
     The faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` has its position in
-    the layout of each; likewise for ends; `begin` and `around` are the halfedges of each edge, `queue` is an empty one
-    of edges. The number is −1 where there is no path.
+    the layout of each; likewise for ends; `queue` is an empty one of edges. The number is −1 where there is no path.
     """
     n_edges = len(queue.places)
     cost = np.full(n_edges, np.inf)
@@ -317,31 +284,13 @@ def shortest_lines(
     sides.pop()
     fractions.pop()
     for job in range(len(counts)):
-        first_faces, first_points = (
-            starts[start_at[job] : start_at[job + 1]],
-            start_points[start_at[job] : start_at[job + 1]],
-        )
-        last_faces, last_points = ends[end_at[job] : end_at[job + 1]], end_points[end_at[job] : end_at[job + 1]]
-        left, entered = find_sleeve(
-            corners,
-            edge_of,
-            begin,
-            around,
-            first_faces,
-            first_points,
-            last_faces,
-            last_points,
-            cost,
-            leave,
-            enter,
-            queue,
-        )
+        some, others = slice(start_at[job], start_at[job + 1]), slice(end_at[job], end_at[job + 1])
+        places = starts[some], start_points[some], ends[others], end_points[others]
+        left, entered = find_sleeve(faces, *places, cost, leave, enter, queue)
         if len(left) == 0:
             counts[job] = -1
             continue
-        crossed, where = straighten(
-            corners, edge_of, forward, begin, around, left, entered, first_faces, first_points, last_faces, last_points
-        )
+        crossed, where = straighten(faces, left, entered, *places)
         counts[job] = len(crossed)
         for k in range(len(crossed)):
             sides.append(crossed[k])

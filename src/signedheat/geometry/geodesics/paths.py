@@ -20,6 +20,7 @@ from ..surface_points import (
     shared_faces,
 )
 from .heap_kernels import Queue
+from .initial_windows import Faces
 from .path_kernels import shortest_lines
 
 
@@ -98,11 +99,8 @@ def geodesic_paths(
         If a start and its end are not connected.
     """
     starts, ends = faces_at(triangles, start), faces_at(triangles, end)
-    edges = triangles.edges
-    sides, fractions, counts = shortest_lines(
-        triangles.corner_positions, edges.face_edges.ravel(), edges.forward.ravel(), *edges.halfedges,
-        Queue.empty(triangles.n_edges), *starts, *ends,
-    )  # fmt: skip
+    queue = Queue.empty(triangles.n_edges)
+    sides, fractions, counts = shortest_lines(Faces.of(triangles), queue, *starts, *ends)
     located = locate_points(triangles, sides // 3, barycentric_on_sides(sides % 3, fractions), name)
     blocked = np.flatnonzero(counts < 0)
     if not len(blocked):

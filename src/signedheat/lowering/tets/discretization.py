@@ -16,7 +16,7 @@ from ...cache import LastUsed
 from ...discretization import DiffusesEach, discretize
 from ...domains.tet_mesh import TetMesh
 from ...geometry.tet_clipping import Planes
-from ...geometry.visibility import GRAZING, FacePlanes, tet_neighbors, visible
+from ...geometry.visibility import GRAZING, visible
 from ...linear import upper_triangle
 from ...linear.incomplete_cholesky import from_first
 from ...linear.restarts import Stage
@@ -127,8 +127,8 @@ class TetDiscretization(DiffusesEach):
         means, gradients, factors = self._in_tets(heat.solve(loads))
         with np.errstate(divide="ignore"):
             heights = np.log(np.maximum(means[:, 3], 0)) + factors
-        neighbors = tet_neighbors(self.mesh.faces)
-        return bend_around_corners(means[:, :3], -gradients, heights, neighbors, self._straight(source, neighbors))
+        neighbors = self.mesh.faces.neighbors
+        return bend_around_corners(means[:, :3], -gradients, heights, neighbors, self._straight(source))
 
     def _heat_system(self, time: float) -> HeatSystem:
         """M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
@@ -153,14 +153,12 @@ class TetDiscretization(DiffusesEach):
             gradients[known], factors[known] = slopes, factor
         return means, gradients, factors
 
-    def _straight(self, source: TetSource, neighbors: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _straight(self, source: TetSource) -> NDArray[np.bool_]:
         """(m,) tets that the source reaches along a straight line."""
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
         ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
-        mesh, slack = self.mesh, GRAZING * self.spacing
-        walls = FacePlanes(mesh.tets, neighbors, mesh.faces.tet_faces, planes.normals, planes.offsets, planes.signs)
-        return np.asarray(visible(walls, *ends, slack))
+        return np.asarray(visible(planes, self.mesh.faces.neighbors, *ends, GRAZING * self.spacing))
 
     @cached_property
     def _laplacian(self) -> sparse.csr_matrix:
