@@ -18,7 +18,7 @@ import numpy as np
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
+from signedheat.curves.piecewise import memory_estimate as piecewise_estimate
 from signedheat.geometry.surfels import count_surfels
 from signedheat.lowering.grid.discretization import bytes_of_area
 from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate

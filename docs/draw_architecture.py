@@ -17,7 +17,7 @@ FLOORS = [
         "#f3d9c1",
     ),
     (
-        "signed_distance morphology solids curves orientation sharpening tets extensions",
+        "signed_distance morphology solids curves orientation sharpening tets",
         "complete a shape, orient curves, measure exactly; jumps, morphology, tets",
         "#f7e6d0",
     ),

@@ -33,7 +33,7 @@ FLOORS = [
     {"method", "extrapolation"},
     {"fields"},
     {"solver"},
-    {"extensions", "curves", "orientation", "sharpening", "solids", "tets", "signed_distance"} | {"morphology"},
+    {"curves", "orientation", "sharpening", "solids", "tets", "signed_distance"} | {"morphology"},
     {"io", "torch"},
     {"view"},
     {"batches"},

@@ -16,7 +16,7 @@ import signedheat as sh
 from refusals import refused
 from shapes.tet_cases import boxes
 from signedheat import memory, samples
-from signedheat.extensions.piecewise import memory_estimate as piecewise_estimate
+from signedheat.curves.piecewise import memory_estimate as piecewise_estimate
 from signedheat.lowering.grid.discretization import bytes_of_area, fitting_spacing, memory_estimate
 from signedheat.lowering.surface import intrinsic
 from signedheat.memory import available_memory

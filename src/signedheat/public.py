@@ -4,6 +4,7 @@ from . import batches, errors, io, morphology, results, torch, view  # noqa: F40
 from .constraints import EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.close import close_curves
 from .curves.orientation import curve_orientation
+from .curves.piecewise import piecewise_distance
 from .domains.common_subdivision import common_subdivision
 from .domains.curves import Curve, SurfacePoints
 from .domains.digital_surface import DigitalSurface
@@ -17,7 +18,6 @@ from .domains.polyline import Polyline
 from .domains.tet_mesh import TetMesh
 from .domains.transforms import transform
 from .domains.triangle_mesh import TriangleMesh
-from .extensions.piecewise import piecewise_distance
 from .extrapolation import Extrapolated
 from .fields.grid_field import GridField
 from .fields.piecewise_field import PiecewiseField

@@ -23,7 +23,7 @@ PUBLIC_MODULES = (
     "method",
     "solver",
     "domains/",
-    "extensions/",
+    "curves/",
     "fields/",
     "io/",
 )

@@ -14,9 +14,9 @@ from ..domains.kinds import ShapeLike
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, SignedHeatError
-from ..extensions.figures import describe, shape_figures, told
 from ..fields.grid_field import GridField
 from ..io.bands import BAND_FORMATS
+from ..io.figures import describe, shape_figures, told
 from ..io.files import told_apart
 from ..io.shapes import read, save
 from ..lowering.area_elements import bounds_around

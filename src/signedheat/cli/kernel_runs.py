@@ -8,6 +8,7 @@ import numpy as np
 
 from .. import samples
 from ..curves.close import close_curves
+from ..curves.piecewise import piecewise_distance
 from ..domains.common_subdivision import common_subdivision
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid
@@ -15,7 +16,6 @@ from ..domains.inspection import inspect
 from ..domains.intrinsic_triangulation import intrinsic_delaunay
 from ..domains.point_cloud import PointCloud
 from ..domains.polyline import Polyline
-from ..extensions.piecewise import piecewise_distance
 from ..orientation.meshes import orientation
 from ..sharpening.methods import Convex, Geodesic
 from ..sharpening.sharpen import sharpen

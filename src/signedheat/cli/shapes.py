@@ -24,8 +24,6 @@ from ..domains.tet_mesh import TetMesh
 from ..domains.transforms import transform
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError
-from ..extensions.figures import describe as describe
-from ..extensions.figures import told
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..io import (
@@ -41,6 +39,8 @@ from ..io import (
     write_polylines,
 )
 from ..io.fields import CONFIDENCE
+from ..io.figures import describe as describe
+from ..io.figures import told
 from ..io.files import contents, extension, told_apart
 from ..io.labels import NIFTI, LabelImage, format_of, read_labels
 from ..io.surface_fields import VALUE_FORMATS, save_with_values

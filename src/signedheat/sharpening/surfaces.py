@@ -15,7 +15,6 @@ from ..discretization import SourceTerm, discretize
 from ..domains.curves import Curve, CurvesAndPoints, SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..errors import GeometryError, SourceError, UnsupportedTypeError
-from ..extensions.curve_sharpening import FALSE_ZERO_WIDTH, ToCurves, told, without_false_zeros
 from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import interpolation_at
 from ..geometry.geodesics.exact import distance_to_segments, distance_to_zero_line
@@ -27,6 +26,7 @@ from ..progress import Progress
 from ..solver import as_list
 from .methods import straight_distance
 from .sharpen import Method, sharpen_field, sharpened
+from .to_curves import FALSE_ZERO_WIDTH, ToCurves, told, without_false_zeros
 
 
 @sharpen_field.register

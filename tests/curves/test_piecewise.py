@@ -7,11 +7,11 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from signedheat.curves.cut_lines import unforked
+from signedheat.curves.jumps import JumpProblem, minimize_exactly, minimize_fast
+from signedheat.curves.piecewise_slopes import smoothed
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
-from signedheat.extensions.cut_lines import unforked
-from signedheat.extensions.jump_solvers import JumpProblem, minimize_exactly, minimize_fast
-from signedheat.extensions.piecewise_slopes import smoothed
 from signedheat.fields.piecewise_field import chains
 from signedheat.geometry.face_pairs import face_pairs
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh

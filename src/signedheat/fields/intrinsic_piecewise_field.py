@@ -13,9 +13,9 @@ from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
-from ..fields.piecewise_field import PiecewiseField
-from ..fields.vertex_field import VertexField
 from ..geometry.surface_points import barycentric_in
+from .piecewise_field import PiecewiseField
+from .vertex_field import VertexField
 
 
 class IntrinsicPiecewiseField(PiecewiseField):

@@ -25,6 +25,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number, positive_number
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
+from ..fields.intrinsic_piecewise_field import IntrinsicPiecewiseField
 from ..fields.piecewise_field import PiecewiseField
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.face_pairs import FacePairs, face_pairs
@@ -38,9 +39,8 @@ from ..method import diffuse, normalize
 from ..progress import Progress, Stopwatch
 from ..solver import as_list
 from .cut_lines import fewest_lines, high_jumps, typical_size
-from .intrinsic_piecewise import IntrinsicPiecewiseField
 from .jump_concentration import concentrated
-from .jump_solvers import JumpProblem, JumpSolution, minimize_exactly, minimize_fast
+from .jumps import JumpProblem, JumpSolution, minimize_exactly, minimize_fast
 from .piecewise_slopes import integration_error, is_continuous, on_lines
 
 SMOOTHING = 10.0

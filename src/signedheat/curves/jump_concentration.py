@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .jump_solvers import JumpProblem, minimize_fast
+from .jumps import JumpProblem, minimize_fast
 
 HEIGHT = 3.0
 """s, in sides of a typical triangle: jumps below it cost as before. What is higher is a cut (`cut_lines.FAR`)."""
