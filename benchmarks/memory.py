@@ -41,7 +41,6 @@ SIZES = {
     "tets": (20, 28, 36),
     "intrinsic": (70, 140, 200),
     "piecewise": (50, 100, 200),
-    "piecewise, exact": (40, 60, 80),
     "φ alone, a ball": (96, 160, 256),
     "φ alone, 8 balls": (96, 160, 256),
     "φ alone, 64 balls": (96, 160, 256),
@@ -114,11 +113,11 @@ def count_refined(size: int) -> int:
     return sh.intrinsic_delaunay(triangulated(size, (1.0, 1.0, 0.3)), refine=True).n_faces
 
 
-def piecewise(size: int, exact: bool = False) -> tuple[Callable[[], object], float]:
+def piecewise(size: int) -> tuple[Callable[[], object], float]:
     """Half of the equator, which bounds nothing."""
     mesh = triangulated(size)
     half = mesh.path(size // 2 * 2 * size + np.arange(size))
-    return lambda: sh.piecewise_distance(mesh, half, exact=exact), piecewise_estimate(mesh.n_faces, exact)
+    return lambda: sh.piecewise_distance(mesh, half), piecewise_estimate(mesh.n_faces)
 
 
 def phi_alone(balls: int, size: int) -> tuple[Callable[[], object], float]:
@@ -171,7 +170,6 @@ CASES = {
     "noisy soups": partial(solid, lambda: samples.soup(samples.sphere(5), 0.02), True),
     "intrinsic": refined,
     "piecewise": piecewise,
-    "piecewise, exact": partial(piecewise, exact=True),
 }
 
 

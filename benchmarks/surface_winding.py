@@ -15,7 +15,8 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 import signedheat as sh
-from signedheat.curves.jumps import JumpProblem, minimize_exactly
+from shapes.jump_program import minimize_exactly
+from signedheat.curves.jumps import JumpProblem
 from signedheat.discretization import discretize
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
 from signedheat.operators.cotan import cotan_matrix

@@ -189,17 +189,16 @@ def test_what_does_not_fit_is_refused_and_what_would_is_named(name, monkeypatch)
     assert any(letter.isdigit() for letter in caught.value.remedy)
 
 
-@pytest.mark.parametrize("exact", [False, True])
-def test_piecewise_fields_that_do_not_fit_name_a_number_of_triangles_that_does(exact, monkeypatch):
+def test_piecewise_fields_that_do_not_fit_name_a_number_of_triangles_that_does(monkeypatch):
     half = BALL.path([0, int(BALL.edges.vertices[BALL.edges.vertices[:, 0] == 0][0, 1])])
-    free = memory.libraries() + int(piecewise_estimate(BALL.n_faces // 2, exact))
+    free = memory.libraries() + int(piecewise_estimate(BALL.n_faces // 2))
     for surface in (BALL, sh.PolygonMesh(BALL.vertices, BALL.faces), sh.intrinsic_delaunay(BALL)):
         monkeypatch.setattr(memory, "_free", lambda: free)
         with refused(sh.errors.MemoryLimitError) as caught:
-            sh.piecewise_distance(surface, half, exact=exact)
+            sh.piecewise_distance(surface, half)
         fitting = int(caught.value.remedy.split()[3].replace(",", ""))
         room = (free - memory.libraries()) / memory.ROOM
-        assert piecewise_estimate(fitting, exact) <= room < piecewise_estimate(fitting + 1, exact)
+        assert piecewise_estimate(fitting) <= room < piecewise_estimate(fitting + 1)
 
 
 @pytest.mark.parametrize("free", [200e6, 400e6])

@@ -230,12 +230,9 @@ def check_piecewise(given: Subject) -> str:
     random = given.random
     domain = surface(random)
     sources = [source(random, domain) for _ in range(random.integers(1, 3))]
-    exact = chance(random, 0.2)
     smoothing = random.choice([None, 0.1, 10.0, 1000.0])
     slack = random.choice([0.0, 0.1])
-    phi, warned = announced(
-        lambda: sh.piecewise_distance(domain, sources, exact=exact, smoothing=smoothing, slack=slack)
-    )
+    phi, warned = announced(lambda: sh.piecewise_distance(domain, sources, smoothing=smoothing, slack=slack))
     judge(phi.values, warned, length_of_edges(embedded(domain)))
     for cut in phi.cut:
         judge(cut.points, False, np.inf, "cut")
@@ -245,7 +242,7 @@ def check_piecewise(given: Subject) -> str:
             raise Wrong("the cut forks")
         if (np.abs(phi.jumps)[~phi.is_cut] > 0).any():
             raise Wrong("jumps off the cut")
-    return "exact" if exact else "fast"
+    return "distance"
 
 
 def check_triangulation(given: Subject) -> str:

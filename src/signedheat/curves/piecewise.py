@@ -39,8 +39,7 @@ from ..method import diffuse, normalize
 from ..progress import Progress, Stopwatch
 from ..solver import as_list
 from .cut_lines import fewest_lines, high_jumps, typical_size
-from .jump_concentration import concentrated
-from .jumps import JumpProblem, JumpSolution, minimize_exactly, minimize_fast
+from .jumps import JumpProblem, JumpSolution, concentrated, minimize
 from .piecewise_slopes import integration_error, is_continuous, on_lines
 
 SMOOTHING = 10.0
@@ -55,8 +54,6 @@ SOURCE_WEIGHT = 100.0
 BYTES = {"pardiso": (2600, 0), "cholmod": (1150, 150), "superlu": (700, 242)}
 """Peak for each triangle, and what every doubling of their number adds, by back end; measured, but for CHOLMOD, of
 which it is taken to need what distance does, with three factors."""
-BYTES_IF_EXACT, EXACT_BASE = 2800, 20_000_000
-"""What the linear program adds for each triangle, and once."""
 
 
 def piecewise_distance(
@@ -64,7 +61,6 @@ def piecewise_distance(
     sources: CurvesAndPoints,
     *,
     diffusion: float = 1.0,
-    exact: bool = False,
     slack: float = 0.1,
     intrinsic: bool | Literal["auto"] = "auto",
     smoothing: float | None = SMOOTHING,
@@ -92,10 +88,6 @@ def piecewise_distance(
         field is then ``intrinsic_delaunay(surface, keep=sources)``, which can also be passed as the domain.
     diffusion : float
         τ in ``t = τ h²``.
-    exact : bool
-        Solve the linear program exactly, in roughly quadratic time (20 thousand faces: seconds); otherwise stop when
-        the objective is certified to be within 0.2 % of the optimum (300 thousand faces: minutes), or within 15 % if φ
-        has no cut: what is left are jumps smaller than the triangles. Jumps of the exact solution are not gathered.
     slack : float
         Rise of the objective, relative to the least, that is allowed for gathering jumps; 0 takes the optimum's lines.
     intrinsic : "auto", True or False
@@ -110,7 +102,9 @@ def piecewise_distance(
     Returns
     -------
     PiecewiseField
-        Its median over the source is zero. ``diagnostics.note(Jumps)`` has the objective, the least one with a lower
+        Its median over the source is zero. The objective is certified to be within 0.2 % of the least (300 thousand
+        faces: minutes), or within 15 % if φ has no cut: what is left then are jumps smaller than the triangles.
+        ``diagnostics.note(Jumps)`` has the objective, the least one with a lower
         bound of it, and the size of the jumps: see `diagnostics.Jumps`. If the triangles are so large or thin that φ
         has hardly the slope that it should, there is an `InexactWarning`.
 
@@ -150,7 +144,7 @@ def piecewise_distance(
     slack = finite_number(slack, "slack", least=0)
     with stopwatch("prepare"):
         diffusion = positive_number(diffusion, "diffusion")
-        domain, discretization = _retriangulated(domain, listed, intrinsic, exact)
+        domain, discretization = _retriangulated(domain, listed, intrinsic)
     with stopwatch("diffuse"):
         discretization, groups = discretization.adapt(listed)
         triangles = discretization.triangles
@@ -162,17 +156,14 @@ def piecewise_distance(
         slopes = corner_slopes(triangles, directions)
         problem = jump_problem(triangles, pairs, slopes, guarded_edges(triangles, parts))
         continuous = partial(is_continuous, triangles, pairs, slopes, directions)
-        if exact:
-            solution = minimize_exactly(problem)
-        else:
-            solution = minimize_fast(problem, progress=part_of(progress, 0.4, 0.6, "integrate"), enough=continuous)
+        solution = minimize(problem, progress=part_of(progress, 0.4, 0.6, "integrate"), enough=continuous)
         jumping = solution.constants
         values = slopes + jumping[:, None]
     with stopwatch("cut"):
         cut = high_jumps(triangles, pairs, values)
         if smoothing is not None:
             candidates = [jumping]
-            if not exact and not continuous(jumping):
+            if not continuous(jumping):
                 inner = part_of(progress, 0.6, 0.7, "cut")
                 gathered = concentrated(problem, jumping, typical_size(triangles), inner)
                 limit = (1.0 + slack) * solution.objective
@@ -218,27 +209,25 @@ def jumps_of(phi: PiecewiseField, solution: JumpSolution, objective: float, erro
     )
 
 
-def memory_estimate(n_triangles: int, exact: bool) -> float:
+def memory_estimate(n_triangles: int) -> float:
     """Bytes that a field on so many triangles takes at the most, besides libraries.
 
     Examples
     --------
-    >>> memory_estimate(1_000_000, exact=True) > memory_estimate(1_000_000, exact=False) > 2e9
+    >>> memory_estimate(1_000_000) > 2e9
     True
     """
     each, per_doubling = BYTES[chosen_backend()]
-    fast = n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
-    return fast + (EXACT_BASE + BYTES_IF_EXACT * n_triangles if exact else 0.0)
+    return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
 
 
 def _retriangulated(
     domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation,
     sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]],
     intrinsic: bool | Literal["auto"],
-    exact: bool,
 ) -> tuple[TriangleMesh | PolygonMesh | IntrinsicTriangulation, SurfaceDiscretization]:
     """The domain, or the intrinsic triangulation of it that bad triangles or unoriented curves ask for."""
-    discretization = _lowered(domain, exact)
+    discretization = _lowered(domain)
     if isinstance(domain, IntrinsicTriangulation):
         return domain, conforming(discretization, sources)
     fits = conforms(discretization, sources)
@@ -248,7 +237,7 @@ def _retriangulated(
         try:
             for keep in ways:
                 refined = intrinsic_delaunay(domain, keep, refine=True, angle=angle, coarsest=coarsest)
-                if conforms(surface := _lowered(refined, exact), sources):
+                if conforms(surface := _lowered(refined), sources):
                     return refined, surface
         except GeometryError:  # faces too thin
             if intrinsic is True:
@@ -258,7 +247,7 @@ def _retriangulated(
     if fits:
         return domain, discretization
     domain = intrinsic_delaunay(domain.triangulation, keep=sources)
-    return domain, conforming(_lowered(domain, exact), sources)
+    return domain, conforming(_lowered(domain), sources)
 
 
 def _field(
@@ -272,14 +261,14 @@ def _field(
     return PiecewiseField(domain, domain.triangulation, values, triangles, cut)
 
 
-def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation, exact: bool) -> SurfaceDiscretization:
+def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation) -> SurfaceDiscretization:
     """The discretisation, if there is memory for the field; factors are made for one diffusion time only."""
     n = len(domain.corners) if isinstance(domain, PolygonMesh) else domain.n_faces
     refuse_beyond_memory(
         f"piecewise distance on {n:,} triangles",
         n,
-        partial(memory_estimate, exact=exact),
-        lambda number: f"use at most {number:,} triangles" + (", or exact=False" if exact else ""),
+        memory_estimate,
+        lambda number: f"use at most {number:,} triangles",
     )
     if isinstance(domain, IntrinsicTriangulation):
         return lowered(domain)
