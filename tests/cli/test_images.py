@@ -7,7 +7,7 @@ import pytest
 
 import signedheat as sh
 from signedheat.cli import main
-from signedheat.io.nrrd_files import write_image
+from signedheat.io.images import write_nrrd
 
 CENTER, RADIUS = np.array([12.0, 10.0, 8.0]), 6.0
 TURN = np.array([[np.cos(0.4), -np.sin(0.4), 0], [np.sin(0.4), np.cos(0.4), 0], [0, 0, 1]]) * [-1, 1, 1]
@@ -21,7 +21,7 @@ def mask(tmp_path):
     labels[np.linalg.norm(np.moveaxis(np.indices(labels.shape), 0, -1) - CENTER, axis=-1) < RADIUS] = 3
     labels[0, 0, 0] = 1
     path = tmp_path / "mask.nrrd"
-    write_image(path, labels, TURN, ORIGIN, "left-posterior-superior")
+    write_nrrd(path, labels, TURN, ORIGIN, "left-posterior-superior")
     return path
 
 

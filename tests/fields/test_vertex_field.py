@@ -8,7 +8,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from shapes.surface_cases import band, flipped, positions, sphere, square
-from signedheat.io.surface_fields import load_vertex_field
+from signedheat.io.fields import load_vertex_field
 
 
 def field_on_sphere(subdivisions=4):

@@ -20,7 +20,7 @@ import signedheat as sh
 from fuzz.frame import Wrong, family
 from fuzz.mutations import damaged
 from signedheat import samples
-from signedheat.io.obj import read_obj_lines
+from signedheat.io.meshes import read_obj_lines
 
 Files = dict[str, bytes]
 """Contents by name; the first is the one that is read."""

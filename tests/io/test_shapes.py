@@ -94,7 +94,7 @@ def test_obj_with_all_it_may_hold(tmp_path):
     )
     mesh = sh.read(tmp_path / "a.obj")
     assert [p.tolist() for p in mesh.polygons] == [[0, 1, 2], [0, 2, 3], [0, 1, 2, 3]]
-    from signedheat.io.obj import read_obj_lines
+    from signedheat.io.meshes import read_obj_lines
 
     vertices, lines = read_obj_lines(tmp_path / "a.obj")
     assert len(vertices) == 4

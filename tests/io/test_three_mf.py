@@ -9,7 +9,7 @@ import pytest
 import signedheat as sh
 from signedheat import samples
 from signedheat.cli import main
-from signedheat.io.three_mf import unit_of
+from signedheat.io.scenes import unit_of
 
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 PRODUCTION = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"

@@ -15,7 +15,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, SignedHeatError
 from ..fields.grid_field import GridField
-from ..io.bands import BAND_FORMATS
+from ..io.fields import BAND_FORMATS
 from ..io.figures import describe, shape_figures, told
 from ..io.files import told_apart
 from ..io.shapes import read, save

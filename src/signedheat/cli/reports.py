@@ -21,9 +21,9 @@ from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import EDGE, FACE, VERTEX, locate_points
 from ..io import read, read_curves, read_polylines
 from ..io.files import extension
-from ..io.labels import LabelImage
-from ..io.obj import read_obj_lines
-from ..io.three_mf import unit_of
+from ..io.meshes import read_obj_lines
+from ..io.scenes import unit_of
+from ..io.voxels import LabelImage
 from ..lowering.area_elements import bounds_around
 from ..lowering.grid.discretization import fitting_spacing, memory_estimate
 from ..memory import available_memory

@@ -38,13 +38,13 @@ from ..io import (
     save,
     write_polylines,
 )
-from ..io.fields import CONFIDENCE
+from ..io.fields import VALUE_FORMATS, save_with_values
 from ..io.figures import describe as describe
 from ..io.figures import told
 from ..io.files import contents, extension, told_apart
-from ..io.labels import NIFTI, LabelImage, format_of, read_labels
-from ..io.surface_fields import VALUE_FORMATS, save_with_values
-from ..io.three_mf import METRES, unit_of
+from ..io.images import CONFIDENCE, NIFTI
+from ..io.scenes import METRES, unit_of
+from ..io.voxels import LabelImage, read_labels
 from ..lowering.area_elements import bounds_around
 from ..lowering.tets.discretization import memory_estimate
 from ..memory import refuse_beyond_memory
@@ -265,14 +265,14 @@ def section_of(field: TetField) -> GridField:
 
 def field_or_image(path: str) -> Any:
     """A field, or the image that a file holds whose axes are not x, y, z; None for formats of neither."""
-    if format_of(path) in NIFTI:
+    if extension(path) in NIFTI:
         return read_labels(path)
-    if format_of(path) not in FIELD_FORMATS:
+    if extension(path) not in FIELD_FORMATS:
         return None
     try:
         return load_field(path)
     except FileFormatError as error:
-        if format_of(path) == ".nrrd":
+        if extension(path) == ".nrrd":
             try:
                 return read_labels(path)
             except FileFormatError:
@@ -282,7 +282,7 @@ def field_or_image(path: str) -> Any:
 
 def image_of(arguments: Namespace) -> LabelImage | None:
     """The image of labels that the command is about, if it is about one."""
-    if format_of(arguments.shape) not in IMAGES:
+    if extension(arguments.shape) not in IMAGES:
         return None
     image = read_labels(arguments.shape)
     if image.labels.size and arguments.label is None and image.labels.dtype == bool:

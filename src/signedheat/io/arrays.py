@@ -13,7 +13,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from .files import PathLike, contents, damaged, ensure_fits, reading
+from .files import PathLike, contents, damaged, ensure_fits, reading, replacing
 
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
@@ -25,17 +25,32 @@ def read_npy(path: PathLike) -> NDArray[Any]:
         return _array(io.BytesIO(data), len(data), path)
 
 
-def read_npz(path: PathLike, wanted: Collection[str]) -> dict[str, NDArray[Any]]:
-    """Those of the wanted arrays of a ``.npz`` file that are there."""
+def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = ()) -> dict[str, NDArray[Any]]:
+    """Those of the wanted arrays of a ``.npz`` file that are there, and all that are needed.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing or damaged, or one that is needed is not there.
+    """
     data = contents(path)
     with reading(path), ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename: info for info in archive.infolist()}
         found = {}
-        for name in wanted:
+        for name in (*needed, *wanted):
             if info := members.get(f"{name}.npy"):
                 with archive.open(info) as file:
                     found[name] = _array(file, info.file_size, path)
+            elif name in needed:
+                raise FileFormatError(f"it has no {name}", remedy="check that it is the right file", element=name)
         return found
+
+
+def write_npz(path: PathLike, **arrays: Any) -> None:
+    """Write arrays, but for those that are None; an existing file survives a failure."""
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        kept: dict[str, Any] = {name: np.asarray(values) for name, values in arrays.items() if values is not None}
+        np.savez(file, **kept)
 
 
 def names_in_npz(path: PathLike) -> set[str]:

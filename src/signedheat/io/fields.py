@@ -1,43 +1,53 @@
-"""Reading and writing of fields on grids, exact to the last bit: values, origin, spacing, order of axes."""
+"""Fields to files and back, exact to the last bit: on grids, in bands, on surfaces and on tets."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..domains.display import NAME
+from ..domains.foreign import SurfaceShape, faces_of, points_of
 from ..domains.grid import Grid
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.tet_mesh import TetMesh
+from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
 from ..fields.files import save_field as save_any_field
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
-from ..fields.vertex_field import VertexField
+from ..fields.vertex_field import VertexField, on_simple_surface
+from ..lowering.grid.discretization import refuse_beyond_memory
+from ..operators.grid.blocks import SIDE, Blocks
 from ..packages import require
-from .arrays import read_npy, read_npz
-from .bands import BAND_FORMATS, BAND_WRITERS, is_band_field, load_band_field
-from .files import PathLike, contents, ensure_writable, extension, reading, replacing, unknown_extension
-from .nrrd_files import read_image, write_image
-from .surface_fields import is_vertex_field, load_vertex_field, save_vertex_field
-from .tets import TET_FIELD_FORMATS, load_tet_field, save_tet_field
+from .arrays import names_in_npz, read_npz, write_npz
+from .files import PathLike, contents, damaged, ensure_writable, extension, format_for, reading, replacing
+from .images import CONFIDENCE, read_image, write_nrrd
+from .ply import ply_of, read_ply, read_ply_values
+from .tets import TET_FIELD_FORMATS, load_cells, store_cells
 from .vdb import write_vdb
-from .vdb_reader import read_vdb_image
-from .vtk_xml import read_vti_with, write_vti
-
-_NEEDED = {".nrrd": ("nrrd", "NRRD files")}
+from .vtk_xml import read_vtp, read_vtp_values, vtp_of, write_vti
 
 CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
     "values[i, j, k] at origin + (i, j, k) * spacing, axes x, y, z, in the units of the shape"
 )
-CONFIDENCE = "confidence"
-
-Parts = tuple[Any, ...]
-"""Values, origin, spacing; then the mask and the confidence, or None, as far as the format has them."""
+OF_BANDS = (
+    "signed distance, negative inside; values[n, i, j, k] at origin + (8 * places[n] + (i, j, k)) * spacing, axes "
+    "x, y, z, in the units of the shape; elsewhere coarse_values[i, j, k] at origin + (i, j, k) * coarse_spacing"
+)
+CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
+BYTES_PER_NODE = 20.0
+"""Of bands written whole: values, their copy in the order of the file, and what is written."""
+_NEEDED = {".nrrd": ("nrrd", "NRRD files")}
+_DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
+"""Numbers of axes that a format supports; the others support any number."""
 
 
 @save_any_field.provide
@@ -45,9 +55,12 @@ def _(field: object, path: PathLike) -> None:
     if isinstance(field, GridField):
         save_field(field, path)
     elif isinstance(field, TetField):
-        save_tet_field(field, path)
+        format_for(path, dict.fromkeys(TET_FIELD_FORMATS), "a field on tets")
+        store_cells(field.mesh.to_meshio({NAME: field.values}), path)
     elif isinstance(field, VertexField):
-        save_vertex_field(field, path)
+        write = format_for(path, _VERTEX_WRITERS, "a field on a surface")
+        with replacing(path) as temporary:
+            write(on_simple_surface(field), temporary)
     else:
         raise FileFormatError(f"a {type(field).__name__} is no field", remedy="pass what a solver returned", path=path)
 
@@ -77,10 +90,11 @@ def save_field(field: GridField, path: PathLike) -> None:
             f"the field has {field.grid.dimension} axes, too many or few", remedy="save it as .npz", path=path
         )
     ensure_field_writable(path, in_band=field.blocks is not None)
-    write = BAND_WRITERS[extension(path)] if field.blocks is not None else _FORMATS[extension(path)][0]
+    write = (_GRID_WRITERS if field.blocks is None else _BAND_WRITERS)[extension(path)]
     if extension(path) == ".npy":
+        about = {"origin": field.grid.origin.tolist(), "spacing": field.grid.spacing.tolist(), "convention": CONVENTION}
         with replacing(Path(path).with_suffix(".json")) as beside, replacing(path) as temporary:
-            beside.write_text(json.dumps(_description(field.grid), indent=1) + "\n")
+            beside.write_text(json.dumps(about, indent=1) + "\n")
             write(field, temporary)
     else:
         with replacing(path) as temporary:
@@ -97,7 +111,7 @@ def ensure_field_writable(path: PathLike, in_band: bool = False) -> None:
     MissingPackageError
         If the format needs a package that is not installed.
     """
-    ensure_writable(path, BAND_FORMATS if in_band else _FORMATS, "a field in a band" if in_band else "a field")
+    ensure_writable(path, BAND_FORMATS if in_band else FIELD_FORMATS, "a field in a band" if in_band else "a field")
     if extension(path) in _NEEDED:
         require(*_NEEDED[extension(path)])
 
@@ -132,54 +146,87 @@ def load_field(path: PathLike) -> Field:
     True
     """
     if extension(path) in TET_FIELD_FORMATS:
-        return load_tet_field(path)
-    if is_vertex_field(path):
+        return _load_tet_field(path)
+    names = names_in_npz(path) if extension(path) == ".npz" else set()
+    if extension(path) in _VALUES or {"values", "vertices"} <= names:
         return load_vertex_field(path)
-    if is_band_field(path):
-        return load_band_field(path)
-    if extension(path) not in _FORMATS:
-        raise unknown_extension(path, _FORMATS, "a field")
-    _, read = _FORMATS[extension(path)]
+    if "coarse_values" in names:
+        return _load_band(path)
+    image = read_image(path, FIELD_FORMATS, "a field")
+    if extension(path) == ".npy":
+        contents(Path(path).with_suffix(".json"))  # which says where the values are
     with reading(path):
-        return _field_of(read(path), path)
+        if image.values.dtype == bool:
+            raise FileFormatError("the values are no real numbers but bool: it holds no field")
+        grid = _made(Grid, image.origin, image.spacing, image.values.shape, image.mask)
+        field: GridField = _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence)
+        return field
 
 
-def _field_of(parts: Parts, path: PathLike) -> GridField:
-    values, origin, spacing, mask, confidence = (*parts, None, None)[:5]
+def _made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
+    """A grid or a field of what a file holds; what is wrong with it is wrong with the file."""
     try:
-        if not np.issubdtype(values.dtype, np.number) or np.iscomplexobj(values):
-            raise FileFormatError(f"the values are no real numbers but {values.dtype}: it holds no field", path=path)
-        grid = Grid(origin, spacing, values.shape, mask)
-        return GridField(grid, np.ascontiguousarray(values), confidence=confidence)
+        return kind(*parts, **options)
     except GeometryError as error:
-        raise FileFormatError(error.cause, remedy=error.remedy, element=error.element, path=path) from error
+        raise FileFormatError(error.cause, remedy=error.remedy, element=error.element) from error
 
 
-def _description(grid: Grid) -> dict[str, Any]:
-    return {"origin": grid.origin.tolist(), "spacing": grid.spacing.tolist(), "convention": CONVENTION}
+def load_vertex_field(path: PathLike) -> VertexField:
+    """A surface with φ at its vertices: what `VertexField.save` wrote, except as ``.obj``."""
+    with reading(path):
+        if extension(path) in _VALUES:
+            read_shape, read_values = _VALUES[extension(path)]
+            values = read_values(path, NAME)
+            if values is None:
+                raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, and no field")
+            return VertexField(read_shape(path), values)
+        arrays = read_npz(path, ("faces", "offsets", "normals"), needed=("vertices", "values"))
+        vertices, values = arrays["vertices"], arrays["values"]
+        if "offsets" in arrays:
+            domain: SurfaceShape = PolygonMesh(vertices, np.split(arrays["faces"], arrays["offsets"][1:-1]))
+        elif "faces" in arrays:
+            domain = TriangleMesh(vertices, arrays["faces"])
+        else:
+            domain = PointCloud(vertices, arrays.get("normals"))
+        if values.shape != (len(vertices),):
+            raise damaged(f"{values.shape} values for {len(vertices)} vertices: the file is damaged")
+        return VertexField(domain, values)
+
+
+def _load_tet_field(path: PathLike) -> TetField:
+    with reading(path):
+        cells = load_cells(path)
+        if NAME not in cells.point_data:
+            raise FileFormatError(f"it has no point data '{NAME}': it was not written as a field")
+        values = np.asarray(cells.point_data[NAME], dtype=np.float64)
+        field: TetField = _made(TetField, _made(TetMesh.from_meshio, cells), values)
+        return field
+
+
+def _load_band(path: PathLike) -> GridField:
+    needed = ("places", "values", "origin", "spacing", "shape", "width", "coarse_values", "coarse_spacing")
+    with reading(path):
+        found = read_npz(path, (CONFIDENCE,), needed)
+        grid = _made(Grid, found["origin"], found["spacing"], found["shape"])
+        far = found["coarse_values"]
+        coarse = _made(GridField, _made(Grid, found["origin"], found["coarse_spacing"], far.shape), far)
+        blocks = Blocks.of(found["places"], grid.shape)
+        if not np.array_equal(blocks.places, found["places"]):
+            raise damaged("its blocks are not in order", element="places")
+        options = {"blocks": blocks, "coarse": coarse, "width": float(found["width"])}
+        field: GridField = _made(GridField, grid, found["values"], confidence=found.get(CONFIDENCE), **options)
+        return field
 
 
 def _write_npz(field: GridField, path: Path) -> None:
-    optional: dict[str, Any] = {"mask": field.grid.mask, CONFIDENCE: field.confidence}
-    with path.open("wb") as file:
-        np.savez(
-            file,
-            values=field.values,
-            origin=field.grid.origin,
-            spacing=field.grid.spacing,
-            convention=np.array(CONVENTION),
-            **{name: values for name, values in optional.items() if values is not None},
-        )
-
-
-def _read_npz(path: PathLike) -> Parts:
-    found = read_npz(path, ("values", "origin", "spacing", "mask", CONFIDENCE))
-    lacking = [name for name in ("values", "origin", "spacing") if name not in found]
-    if lacking:
-        raise FileFormatError(
-            f"it has no {lacking[0]}: a field has values, origin and spacing", element=lacking[0], path=path
-        )
-    return found["values"], found["origin"], found["spacing"], found.get("mask"), found.get(CONFIDENCE)
+    """Of a band its blocks, and the coarse field around them."""
+    arrays: dict[str, Any] = {"values": field.values, "origin": field.grid.origin, "spacing": field.grid.spacing}
+    arrays |= {"mask": field.grid.mask, CONFIDENCE: field.confidence, "convention": CONVENTION}
+    if field.blocks is not None:
+        arrays |= {"places": field.blocks.places, "shape": field.grid.shape, "width": field.width}
+        arrays |= {"coarse_values": field.whole.values, "coarse_spacing": field.whole.grid.spacing}
+        arrays["convention"] = OF_BANDS
+    write_npz(path, **arrays)
 
 
 def _write_npy(field: GridField, path: Path) -> None:
@@ -187,47 +234,86 @@ def _write_npy(field: GridField, path: Path) -> None:
         np.save(file, field.values, allow_pickle=False)
 
 
-def _read_npy(path: PathLike) -> Parts:
-    values, beside = read_npy(path), Path(path).with_suffix(".json")
-    text = contents(beside)
-    with reading(beside):
-        about = json.loads(text)
-        return values, np.array(about["origin"], dtype=np.float64), np.array(about["spacing"], dtype=np.float64)
-
-
 def _write_vti(field: GridField, path: Path) -> None:
+    """Of a band all nodes of its grid, for ParaView and solvers."""
+    grid, convention = field.grid, CONVENTION
+    values: NDArray[np.floating] = field.values
     others = {} if field.confidence is None else {CONFIDENCE: field.confidence}
-    path.write_bytes(write_vti(field.values, field.grid.origin, field.grid.spacing, NAME, CONVENTION, others))
-
-
-def _read_vti(path: PathLike) -> Parts:
-    values, origin, spacing, confidence = read_vti_with(path, CONFIDENCE)
-    return values, origin, spacing, None, confidence
+    if field.blocks is not None:
+        refuse_beyond_memory(grid, BYTES_PER_NODE, 0.0)
+        values, convention, others = whole_values(field), CLIPPED, {}
+    path.write_bytes(write_vti(values, grid.origin, grid.spacing, NAME, convention, others))
 
 
 def _write_nrrd(field: GridField, path: Path) -> None:
     axes = np.diag(field.grid.spacing)
-    write_image(path, field.values, axes, field.grid.origin, content=NAME, convention=CONVENTION)
+    write_nrrd(path, field.values, axes, field.grid.origin, content=NAME, convention=CONVENTION)
 
 
-def _read_nrrd(path: PathLike) -> Parts:
-    values, header = read_image(path)
-    directions = np.atleast_2d(header.get("space directions", np.diag(header.get("spacings", np.ones(values.ndim)))))
-    spacing = np.diag(directions) if directions.shape == (values.ndim, values.ndim) else np.zeros(values.ndim)
-    if not np.array_equal(directions, np.diag(spacing)):
-        raise FileFormatError("its axes are not x, y, z", remedy="resample the image along them", path=path)
-    return values, np.asarray(header.get("space origin", np.zeros(values.ndim))), spacing
+def whole_values(field: GridField) -> NDArray[np.float32]:
+    """Values of a band at all nodes of its grid; beyond it, plus or minus its half width."""
+    assert field.blocks is not None
+    grid, width = field.grid, np.float32(field.width)
+    counts = -(-np.array(grid.shape) // SIDE)
+    places = np.argwhere(np.ones(counts, dtype=bool))
+    rows = field.blocks.rows(places)
+    middles = np.minimum(places[rows < 0] * SIDE + 0.5 * (SIDE - 1), np.array(grid.shape) - 1)
+    parts = np.full((len(places), SIDE, SIDE, SIDE), width, dtype=np.float32)
+    parts[rows < 0] *= np.where(field(grid.origin + middles * grid.spacing) < 0, -1, 1)[:, None, None, None]
+    parts[rows >= 0] = np.clip(field.values[rows[rows >= 0]], -width, width)
+    a, b, c = counts
+    whole = parts.reshape(a, b, c, SIDE, SIDE, SIDE).transpose(0, 3, 1, 4, 2, 5).reshape(a * SIDE, b * SIDE, c * SIDE)
+    return np.ascontiguousarray(whole[tuple(slice(0, n) for n in grid.shape)])
 
 
-_FORMATS: dict[str, tuple[Callable[[GridField, Path], None], Callable[[PathLike], Parts]]] = {
-    ".npy": (_write_npy, _read_npy),
-    ".npz": (_write_npz, _read_npz),
-    ".nrrd": (_write_nrrd, _read_nrrd),
-    ".vdb": (write_vdb, read_vdb_image),
-    ".vti": (_write_vti, _read_vti),
+def save_with_values(shape: SurfaceShape, path: PathLike, name: str, values: NDArray[np.floating]) -> None:
+    """Write a surface with a named value at each vertex, in a format of `VALUE_FORMATS`."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(VALUE_FORMATS[extension(path)](shape, {name: values}))
+
+
+def _write_vertex_npz(field: VertexField[SurfaceShape], path: Path) -> None:
+    domain = field.domain
+    arrays: dict[str, Any] = {"values": field.values, "vertices": points_of(domain)}
+    if isinstance(domain, TriangleMesh):
+        arrays["faces"] = domain.faces
+    elif isinstance(domain, PolygonMesh):
+        arrays |= {"faces": domain.corners, "offsets": domain.offsets}
+    else:
+        arrays["normals"] = domain.normals
+    write_npz(path, **arrays)
+
+
+def _write_vertex_obj(field: VertexField[SurfaceShape], path: Path) -> None:
+    """φ is the first texture coordinate, in the units of the surface."""
+    corners, counts = faces_of(field.domain)
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points_of(field.domain).tolist()]
+    lines += [f"vt {value!r} 0" for value in field.values.tolist()]
+    words = [f"{v}/{v}" for v in (corners + 1).tolist()]
+    ends = np.cumsum(counts).tolist()
+    lines += ["f " + " ".join(words[end - count : end]) for end, count in zip(ends, counts.tolist(), strict=True)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+VALUE_FORMATS: dict[str, Callable[[SurfaceShape, Mapping[str, NDArray[np.floating]]], bytes]] = {
+    ".ply": ply_of,
+    ".vtp": vtp_of,
 }
-
-_DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
-"""Numbers of axes that a format supports; the others support any number."""
-
-FIELD_FORMATS = frozenset(_FORMATS)
+"""Formats of surfaces with values at their vertices."""
+_VALUES = {".ply": (read_ply, read_ply_values), ".vtp": (read_vtp, read_vtp_values)}
+_VERTEX_WRITERS: dict[str, Callable[[VertexField[SurfaceShape], Path], object]] = {
+    ".npz": _write_vertex_npz,
+    ".obj": _write_vertex_obj,
+    ".ply": lambda field, path: path.write_bytes(ply_of(field.domain, {NAME: field.values})),
+    ".vtp": lambda field, path: path.write_bytes(vtp_of(field.domain, {NAME: field.values})),
+}
+_GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
+    ".npy": _write_npy,
+    ".npz": _write_npz,
+    ".nrrd": _write_nrrd,
+    ".vdb": write_vdb,
+    ".vti": _write_vti,
+}
+_BAND_WRITERS = {ending: _GRID_WRITERS[ending] for ending in (".npz", ".vdb", ".vti")}
+FIELD_FORMATS, BAND_FORMATS = frozenset(_GRID_WRITERS), frozenset(_BAND_WRITERS)
+VERTEX_FIELD_FORMATS = frozenset(_VERTEX_WRITERS)

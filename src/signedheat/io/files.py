@@ -14,7 +14,7 @@ import stat
 import tempfile
 import threading
 import warnings
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, suppress
 from io import StringIO
 from pathlib import Path
@@ -39,8 +39,16 @@ READERS = f"{__package__}.", f"{PACKAGE}parallel", f"{PACKAGE}packages"
 
 
 def extension(path: PathLike) -> str:
-    """The extension of a file name in lower case, with the dot: ``".stl"``."""
-    return Path(path).suffix.lower()
+    """The extension of a file name in lower case, with the dot: ``".stl"``; of packed files both, ``".nii.gz"``."""
+    suffixes = [suffix.lower() for suffix in Path(path).suffixes[-2:]]
+    return "".join(suffixes if suffixes[-1:] == [".gz"] else suffixes[-1:])
+
+
+def format_for(path: PathLike, formats: Mapping[str, T], purpose: str) -> T:
+    """What a table of formats has for the extension of a file; `FileFormatError` if that is not in it."""
+    if extension(path) not in formats:
+        raise unknown_extension(path, formats, purpose)
+    return formats[extension(path)]
 
 
 def told_apart(numbers: Sequence[float]) -> list[str]:
@@ -68,6 +76,13 @@ def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> F
     ending = extension(path)
     cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
     return FileFormatError(f"{cause} for {purpose}", remedy=f"use one of {' '.join(sorted(known))}", path=path)
+
+
+def refuse_kind(thing: object, path: PathLike, holds: str, instead: str) -> FileFormatError:
+    """The error for a format that does not support a kind of shape."""
+    return FileFormatError(
+        f"{extension(path)} files hold {holds}, not a {type(thing).__name__}", remedy=f"save it as {instead}", path=path
+    )
 
 
 @contextmanager

@@ -1,17 +1,21 @@
-"""PLY, binary and text: meshes, triangle strips, oriented points."""
+"""PLY, binary and text: meshes, triangle strips, oriented points, values at vertices; meshes larger than memory."""
 
 from __future__ import annotations
 
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.foreign import SurfaceShape, assemble, faces_of, points_of
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import SurfaceShape, assemble, faces_of, points_of
-from .files import PathLike, contents, damaged, numbers
+from ..fields.files import save_parts
+from .files import PathLike, contents, damaged, ensure_writable, numbers, replacing
 
 _TYPES = {
     name: code
@@ -29,6 +33,9 @@ _TYPES = {
 }
 _INTEGERS = {name: code for name, code in _TYPES.items() if code[0] != "f"}
 """What lists can be counted by."""
+_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
+_ROOM = 12
+"""Digits kept free for the number of vertices, and of faces, of a mesh that is written part by part."""
 
 
 @dataclass
@@ -74,21 +81,93 @@ def read_ply_values(path: PathLike, name: str) -> NDArray[np.float64] | None:
 
 
 def write_ply(shape: SurfaceShape, path: PathLike) -> bytes:
-    """Binary PLY in double precision."""
-    names, columns = ["x", "y", "z"], [points_of(shape)]
+    """Binary PLY in double precision; normals and areas of points are properties of the vertices."""
+    values: dict[str, NDArray[np.floating]] = {}
     if isinstance(shape, PointCloud) and shape.normals is not None:
-        names, columns = [*names, "nx", "ny", "nz"], [*columns, shape.normals]
+        values = dict(zip(("nx", "ny", "nz"), shape.normals.T, strict=True))
     if isinstance(shape, PointCloud) and shape.areas is not None:
-        names, columns = [*names, "area"], [*columns, shape.areas[:, None]]
-    vertices = np.hstack(columns).astype("<f8")
-    corners, counts = faces_of(shape)
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
-    header += [f"property double {name}" for name in names]
-    if len(counts):
-        header += [f"element face {len(counts)}", "property list int int vertex_indices"]
-    starts = np.cumsum(counts) - counts
-    listed = np.insert(corners, starts, counts).astype("<i4")
-    return ("\n".join([*header, "end_header"]) + "\n").encode() + vertices.tobytes() + listed.tobytes()
+        values["area"] = shape.areas
+    return ply_of(shape, values)
+
+
+def ply_of(
+    shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]], colors: NDArray[np.uint8] | None = None
+) -> bytes:
+    """Binary PLY in double precision, with named values at each vertex, and its colour."""
+    (corners, counts), names, channels = faces_of(shape), ["x", "y", "z", *values], 0 if colors is None else 3
+    columns = np.column_stack([points_of(shape), *values.values()])
+    table = np.zeros(len(columns), dtype=[("numbers", "<f8", len(names)), ("color", "u1", channels)])
+    table["numbers"] = columns
+    if colors is not None:
+        table["color"] = colors
+    listed = np.insert(corners, np.cumsum(counts) - counts, counts).astype("<i4")
+    header = _header_of(len(table), names, len(counts), channels=("red", "green", "blue")[:channels])
+    return header + table.tobytes() + listed.tobytes()
+
+
+def _header_of(
+    n_vertices: int,
+    names: Sequence[str],
+    n_faces: int,
+    channels: Sequence[str] = (),
+    count_type: str = "int",
+    comment: str | None = None,
+) -> bytes:
+    """The header of binary PLY with doubles and colours at the vertices, and faces if there are some."""
+    lines = ["ply", "format binary_little_endian 1.0", *([] if comment is None else [f"comment {comment}"])]
+    lines += [f"element vertex {n_vertices}", *(f"property double {name}" for name in names)]
+    lines += [f"property uchar {channel}" for channel in channels]
+    if n_faces or comment is not None:
+        lines += [f"element face {n_faces}", f"property list {count_type} int vertex_indices"]
+    return ("\n".join([*lines, "end_header"]) + "\n").encode()
+
+
+@save_parts.provide
+def write_parts(parts: Iterator[tuple[NDArray[np.float64], NDArray[np.int64]]], path: PathLike) -> tuple[int, int]:
+    """Write triangles that are more than fit into memory to a binary PLY file as they come, in double precision.
+
+    Parameters
+    ----------
+    parts : iterable of (n, 3) float and (m, 3) int
+        Vertices, and faces, which count the vertices of all parts before.
+    path : str or path
+        The file, ``.ply``. An existing one survives a failure.
+
+    Returns
+    -------
+    vertices, faces : int
+        How many there were.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is another one, or the file cannot be written.
+    """
+    ensure_writable(path, {".ply"}, "a mesh part by part")
+    n_vertices = n_faces = 0
+
+    def header() -> bytes:
+        """Of the same length whatever the numbers: a comment takes what they leave."""
+        free = " " * (2 * _ROOM - len(str(n_vertices)) - len(str(n_faces)))
+        return _header_of(n_vertices, "xyz", n_faces, count_type="uchar", comment=f"signedheat{free}")
+
+    with (
+        replacing(path) as temporary,
+        open(temporary, "wb") as file,
+        tempfile.TemporaryFile(dir=temporary.parent) as faces,
+    ):
+        file.write(header())
+        for vertices, triangles in parts:
+            file.write(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
+            rows = np.empty(len(triangles), dtype=_FACE)
+            rows["count"], rows["corners"] = 3, triangles
+            faces.write(rows.tobytes())
+            n_vertices, n_faces = n_vertices + len(vertices), n_faces + len(triangles)
+        faces.seek(0)
+        shutil.copyfileobj(faces, file, 1 << 24)
+        file.seek(0)
+        file.write(header())
+    return n_vertices, n_faces
 
 
 def _tables(path: PathLike) -> dict[str, dict[str, Any]]:

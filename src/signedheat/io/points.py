@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.foreign import SurfaceShape
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import SurfaceShape, refuse
-from .files import PathLike, contents, text
+from .files import PathLike, contents, refuse_kind, text
 
 SEPARATORS = str.maketrans(",;", "  ")
 NUMBERS = {"F": "f", "I": "i", "U": "u"}
@@ -79,7 +79,7 @@ def read_xyz(path: PathLike) -> PointCloud:
 def write_xyz(shape: SurfaceShape, path: PathLike) -> bytes:
     """One line per point."""
     if not isinstance(shape, PointCloud):
-        raise refuse(shape, path, "points", ".obj or .ply")
+        raise refuse_kind(shape, path, "points", ".obj or .ply")
     table = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
     return "".join(" ".join(map(repr, row)) + "\n" for row in table.tolist()).encode()
 

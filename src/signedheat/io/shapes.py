@@ -6,23 +6,18 @@ from collections.abc import Callable
 
 from ..domains.digital_surface import DigitalSurface
 from ..domains.exchange import save_shape
-from ..domains.foreign import ForeignShape, as_shape
+from ..domains.foreign import ForeignShape, SurfaceShape, as_shape
 from ..domains.kinds import Shape
 from ..domains.tet_mesh import TetMesh
 from ..memory import refuse_beyond_memory
-from .elements import SurfaceShape
-from .files import PathLike, extension, reading, replacing, unknown_extension
-from .glb import read_glb
-from .obj import read_obj, write_obj, write_pc
-from .off import read_off, write_off
+from .files import PathLike, format_for, reading, replacing
+from .meshes import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
 from .ply import read_ply, write_ply
 from .points import read_pcd, read_xyz, write_xyz
 from .scans import read_e57, read_las
-from .step import step_mesh
-from .stl import read_stl, write_stl
+from .scenes import read_3mf, read_glb, step_mesh
 from .tets import TET_FORMATS, read_tets, write_tets
-from .three_mf import read_3mf
-from .volumes import read_volume
+from .voxels import read_volume
 from .vtk_xml import read_vtp, write_vtp
 
 READERS: dict[str, Callable[[PathLike], Shape]] = {
@@ -101,11 +96,9 @@ def read(path: PathLike) -> Shape:
     ...     sh.read(f"{folder}/one.ply")
     TriangleMesh(3 vertices, 1 faces)
     """
-    reader = READERS.get(extension(path))
-    if reader is None:
-        raise unknown_extension(path, READERS, "a shape")
+    read_shape = format_for(path, READERS, "a shape")
     with reading(path):
-        shape = reader(path)
+        shape = read_shape(path)
         faces = getattr(shape, "n_faces", 0) or len(getattr(shape, "corners", ()))
         if faces >= MANY:
             refuse_beyond_memory(
@@ -140,13 +133,11 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
     shape = as_shape(shape)
     if isinstance(shape, TetMesh):
         return write_tets(shape, path)
-    writer = WRITERS.get(extension(path))
-    if writer is None:
-        raise unknown_extension(path, WRITERS, "a shape")
+    write = format_for(path, WRITERS, "a shape")
     if isinstance(shape, DigitalSurface):
         shape = shape.squares
     with replacing(path) as temporary:
-        temporary.write_bytes(writer(shape, path))
+        temporary.write_bytes(write(shape, path))
 
 
 @save_shape.provide

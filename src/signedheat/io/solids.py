@@ -1,4 +1,4 @@
-"""Reading and writing of solids: NumPy archives of what was completed, so that nothing is decided again."""
+"""NumPy archives of solids, so that nothing is decided again, and of samples to learn from."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from typing import Any
 import numpy as np
 
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import FileFormatError, GeometryError
+from ..errors import FileFormatError, GeometryError, SignedHeatError
 from ..solids.files import save_solid
+from ..solids.sampling import Layout, Samples, save_samples
 from ..solids.solid import Solid
 from ..solids.winding import Windings
-from .arrays import read_npz
-from .files import PathLike, ensure_writable, replacing
+from .arrays import read_npz, write_npz
+from .fields import CONVENTION
+from .files import PathLike, ensure_writable, format_for
 
 VERSION = 1
 """Of the archive: what a later one writes is refused."""
-SOLID_FORMATS = frozenset([".npz"])
+SOLID_FORMATS = SAMPLE_FORMATS = frozenset({".npz"})
 _NEEDED = ("triangles", "origins", "confidence", "bounding", "closing")
 _SOURCE = ("source_vertices", "source_faces")
 
@@ -28,18 +30,16 @@ def _(solid: object, path: PathLike) -> None:
     source: dict[str, Any] = {}
     if solid.source is not None:
         source = dict(zip(_SOURCE, (solid.source.vertices, solid.source.faces), strict=True))
-    closing = solid.windings.triangles
-    with replacing(path) as temporary, temporary.open("wb") as file:
-        np.savez(
-            file,
-            solid_version=np.array(VERSION),
-            triangles=solid.triangles,
-            origins=solid.origins,
-            confidence=solid.confidence,
-            bounding=solid.bounding,
-            closing=closing,
-            **source,
-        )
+    write_npz(
+        path,
+        solid_version=VERSION,
+        triangles=solid.triangles,
+        origins=solid.origins,
+        confidence=solid.confidence,
+        bounding=solid.bounding,
+        closing=solid.windings.triangles,
+        **source,
+    )
 
 
 def load(path: PathLike) -> Solid:
@@ -71,19 +71,13 @@ def load(path: PathLike) -> Solid:
     >>> bool(again.distance([[0.1, 0.2, 0.3]]) == solid.distance([[0.1, 0.2, 0.3]]))
     True
     """
-    found = read_npz(path, ("solid_version", *_NEEDED, *_SOURCE))
-    version = int(found["solid_version"]) if "solid_version" in found and not found["solid_version"].shape else 0
-    if not 0 < version <= VERSION:
-        raise FileFormatError(
-            f"a later version wrote it ({version})" if version else "it has no solid",
-            remedy="install a later version of signedheat"
-            if version
-            else "read fields by `load_field`, shapes by `read`",
-            path=path,
-        )
-    lacking = [name for name in _NEEDED if name not in found]
-    if lacking:
-        raise FileFormatError(f"it has no {lacking[0]}", remedy="write it again", element=lacking[0], path=path)
+    version = read_npz(path, ("solid_version",)).get("solid_version", np.zeros(1))
+    if version.shape or int(version) <= 0:
+        raise FileFormatError("it has no solid", remedy="read fields by `load_field`, shapes by `read`", path=path)
+    if int(version) > VERSION:
+        cause, remedy = f"a later version wrote it ({int(version)})", "install a later version of signedheat"
+        raise FileFormatError(cause, remedy=remedy, path=path)
+    found = read_npz(path, _SOURCE, _NEEDED)
     triangles, closing = found["triangles"], found["closing"]
     n = len(triangles)
     alike = triangles.shape == (n, 3, 3) and closing.shape == (len(closing), 3, 3) and n > 0
@@ -105,4 +99,25 @@ def load(path: PathLike) -> Solid:
         found["bounding"].astype(np.bool_),
         Windings(closing.astype(np.float64)),
         source,
+    )
+
+
+@save_samples.provide
+def _(samples: object, path: PathLike, layout: Layout) -> None:
+    format_for(path, dict.fromkeys(SAMPLE_FORMATS), "samples")
+    if not isinstance(samples, Samples):
+        raise SignedHeatError(f"a {type(samples).__name__} is no set of samples", remedy="pass what `sample` returned")
+    if layout == "deepsdf":  # (k, 4) in single precision: x, y, z and distance of the points outside and inside
+        rows = np.column_stack([samples.points, samples.distances]).astype(np.float32)
+        return write_npz(path, pos=rows[samples.distances >= 0], neg=rows[samples.distances < 0])
+    write_npz(
+        path,
+        points=samples.points,
+        distances=samples.distances,
+        gradients=samples.gradients,
+        near=samples.near,
+        completed=samples.completed,
+        center=samples.center,
+        radius=samples.radius,
+        convention=CONVENTION.partition(";")[0],
     )

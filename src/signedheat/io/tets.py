@@ -13,17 +13,14 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..domains.display import NAME
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
-from ..fields.tet_field import TetField
 from ..packages import require
-from .files import PathLike, contents, extension, parsed_by_others, reading, replacing, unknown_extension, writing
-from .vtu import read_vtu
+from .files import PathLike, contents, extension, format_for, parsed_by_others, replacing, writing
+from .vtk_xml import read_vtu
 
 MODULES = {
     ".mesh": "medit",
@@ -52,7 +49,7 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
     GeometryError
         If it has neither tets nor faces.
     """
-    mesh = _load(path)
+    mesh = load_cells(path)
     kinds = {block.type for block in mesh.cells}
     if "tetra" in kinds:
         return TetMesh.from_meshio(mesh)
@@ -64,38 +61,11 @@ def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
 
 def write_tets(mesh: TetMesh, path: PathLike) -> None:
     """Write a tet mesh, in the format given by the extension."""
-    _store(mesh.to_meshio(), path)
+    store_cells(mesh.to_meshio(), path)
 
 
-def save_tet_field(field: TetField, path: PathLike) -> None:
-    """Write mesh and values; see `TetField.save`."""
-    if extension(path) not in TET_FIELD_FORMATS:
-        raise unknown_extension(path, TET_FIELD_FORMATS, "a field on tets")
-    _store(field.mesh.to_meshio({NAME: field.values}), path)
-
-
-def load_tet_field(path: PathLike) -> TetField:
-    """Read what `save_tet_field` wrote.
-
-    Raises
-    ------
-    FileFormatError
-        If the file is missing or damaged, or has no tets with such values.
-    """
-    if extension(path) not in TET_FIELD_FORMATS:
-        raise unknown_extension(path, TET_FIELD_FORMATS, "a field on tets")
-    with reading(path):
-        mesh = _load(path)
-        if NAME not in mesh.point_data:
-            raise FileFormatError(f"it has no point data '{NAME}': it was not written as a field", path=path)
-        values = np.asarray(mesh.point_data[NAME], dtype=np.float64)
-        try:
-            return TetField(TetMesh.from_meshio(mesh), values)
-        except GeometryError as error:
-            raise FileFormatError(error.cause, remedy=error.remedy, element=error.element, path=path) from error
-
-
-def _load(path: PathLike) -> Any:
+def load_cells(path: PathLike) -> Any:
+    """Points, cells and values at the points, as a `meshio.Mesh` has them."""
     if extension(path) == ".vtu":
         return read_vtu(path, (NAME,))
     module, files = _module(path), _files(path)
@@ -105,7 +75,8 @@ def _load(path: PathLike) -> Any:
     return parsed_by_others(lambda: module.read(str(path)), sum(len(contents(file)) for file in files))
 
 
-def _store(mesh: Any, path: PathLike) -> None:
+def store_cells(mesh: Any, path: PathLike) -> None:
+    """Write a `meshio.Mesh`."""
     module = _module(path)
     with writing(path), tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), redirect_stderr(StringIO()):
         warnings.simplefilter("ignore")
@@ -123,7 +94,4 @@ def _files(path: PathLike) -> list[Path]:
 
 
 def _module(path: PathLike) -> Any:
-    name = MODULES.get(extension(path))
-    if name is None:
-        raise unknown_extension(path, MODULES, "a tet mesh")
-    return require(f"meshio.{name}", "tet meshes")
+    return require(f"meshio.{format_for(path, MODULES, 'a tet mesh')}", "tet meshes")

@@ -1,4 +1,4 @@
-"""VTK's XML files: image data (``.vti``) and polygonal data (``.vtp``).
+"""VTK's XML files: image data (``.vti``), polygonal data (``.vtp``) and cells (``.vtu``, which are only read).
 
 Written with appended raw data, as VTK does by default; read in every encoding that VTK writes. The only library that
 reads all of these, VTK itself, takes more than half a gigabyte installed.
@@ -11,7 +11,7 @@ import binascii
 import math
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
@@ -20,9 +20,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.foreign import SurfaceShape, assemble, faces_of, points_of
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .elements import SurfaceShape, assemble, faces_of, points_of
 from .files import PathLike, contents, damaged, ensure_fits, numbers, unpacked
 
 _TYPES = {
@@ -38,6 +38,19 @@ _TYPES = {
     "Float64": "f8",
 }
 _NAMES = {code: name for name, code in _TYPES.items()}
+KINDS = {
+    1: "vertex",
+    3: "line",
+    5: "triangle",
+    7: "polygon",
+    9: "quad",
+    10: "tetra",
+    12: "hexahedron",
+    13: "wedge",
+    14: "pyramid",
+    24: "tetra10",
+}
+"""Names of VTK's types of cells, as meshio has them."""
 
 
 def write_vti(
@@ -65,15 +78,10 @@ def write_vti(
     return writer.file("ImageData", body)
 
 
-def read_vti(path: PathLike) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
-    """Values (first scalar array), origin and spacing of image data."""
-    return read_vti_with(path, "")[:3]
-
-
-def read_vti_with(
-    path: PathLike, other: str
+def read_vti(
+    path: PathLike, other: str = ""
 ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64], NDArray[Any] | None]:
-    """The same, and a further array of this name, if there is one."""
+    """Values (first scalar array), origin and spacing of image data; the array named `other`, if there is one."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
     extent = numbers(image.get("WholeExtent", "").split() if image is not None else [], "extent", int)
@@ -113,23 +121,29 @@ def read_vti_with(
 
 def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:
     """Polygons, or points with normals as point data."""
-    points, (corners, counts) = points_of(shape), faces_of(shape)
-    writer = _Writer()
-    xyz = writer.array("Points", points)
+    values: dict[str, NDArray[np.floating]] = {}
     if isinstance(shape, PointCloud):
-        group, sizes = "Verts", f'NumberOfVerts="{len(points)}" NumberOfPolys="0"'
-        corners, counts = np.arange(len(points)), np.ones(len(points), dtype=np.int64)
         columns = {"Normals": shape.normals, "area": shape.areas}
-        arrays = [writer.array(name, values) for name, values in columns.items() if values is not None]
-        data = "<PointData>" + "".join(arrays) + "</PointData>"
-    else:
-        group, sizes, data = "Polys", f'NumberOfVerts="0" NumberOfPolys="{len(counts)}"', ""
+        values = {name: column for name, column in columns.items() if column is not None}
+    return vtp_of(shape, values, scalars=None)
+
+
+def vtp_of(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]], scalars: str | None = "") -> bytes:
+    """Polygons or points with named values at each vertex; ParaView shows `scalars`, by default the first of them."""
+    points, (corners, counts) = points_of(shape), faces_of(shape)
+    group = "Polys" if len(counts) else "Verts"
+    if not len(counts):
+        corners, counts = np.arange(len(points)), np.ones(len(points), dtype=np.int64)
+    writer = _Writer()
+    arrays = "".join(writer.array(name, column) for name, column in values.items())
+    shown = "" if scalars is None else f' Scalars="{scalars or next(iter(values))}"'
+    data = f"<PointData{shown}>{arrays}</PointData>" if values else ""
+    xyz = f"<Points>{writer.array('Points', points)}</Points>"
     ends = np.cumsum(counts)
     cells = f"<{group}>{writer.array('connectivity', corners)}{writer.array('offsets', ends)}</{group}>"
-    piece = (
-        f'<Piece NumberOfPoints="{len(points)}" {sizes} NumberOfLines="0" NumberOfStrips="0">'
-        f"{data}<Points>{xyz}</Points>{cells}</Piece>"
-    )
+    sizes = {"Verts": 0, "Polys": 0, "Lines": 0, "Strips": 0, group: len(counts)}
+    numbered = " ".join(f'NumberOf{name}="{number}"' for name, number in sizes.items())
+    piece = f'<Piece NumberOfPoints="{len(points)}" {numbered}>{data}{xyz}{cells}</Piece>'
     return writer.file("PolyData", f"<PolyData>{piece}</PolyData>")
 
 
@@ -180,6 +194,59 @@ def read_vtp_values(path: PathLike, name: str) -> NDArray[np.float64] | None:
             return None
         found.append(arrays.of(element, arrays.count(piece, "NumberOfPoints")))
     return np.concatenate(found).astype(np.float64) if found else None
+
+
+@dataclass(frozen=True)
+class Block:
+    """Cells of one kind, as rows of point ids."""
+
+    type: str
+    data: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Points, cells and values at the points, under the names that they have in a `meshio.Mesh`."""
+
+    points: NDArray[np.float64]
+    cells: list[Block]
+    point_data: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+
+def read_vtu(path: PathLike, names: tuple[str, ...] = ()) -> Cells:
+    """Points, cells, and those point data that are named."""
+    root, arrays = parse(path, "UnstructuredGrid")
+    pieces = root.findall("UnstructuredGrid/Piece")
+    if len(pieces) != 1:
+        raise FileFormatError(f"it has {len(pieces)} pieces", remedy="write it anew as one", path=path)
+    [piece] = pieces
+    n_points, n_cells = arrays.count(piece, "NumberOfPoints"), arrays.count(piece, "NumberOfCells")
+    element = piece.find("Points/DataArray")
+    if element is None or not n_points:
+        raise FileFormatError("there are no points: the file holds no shape", path=path)
+    points = arrays.of(element, 3 * n_points).astype(np.float64).reshape(-1, 3)
+    columns = {element.get("Name"): element for element in piece.iterfind("Cells/DataArray")}
+    if not {"connectivity", "offsets", "types"} <= columns.keys():
+        raise FileFormatError("its cells have no connectivity, offsets and types", path=path)
+    ends = arrays.of(columns["offsets"], n_cells).astype(np.int64)
+    kinds = arrays.of(columns["types"], n_cells).astype(np.int64)
+    starts = np.concatenate([[0], ends])[:-1]
+    if (ends < starts).any():
+        raise FileFormatError("its offsets decrease: it is damaged", remedy="write it again", path=path)
+    corners = arrays.of(columns["connectivity"], int(ends[-1]) if n_cells else 0).astype(np.int64)
+    blocks = []
+    for kind in np.unique(kinds).tolist():
+        chosen = np.flatnonzero(kinds == kind)
+        counts = (ends - starts)[chosen]
+        for count in np.unique(counts).tolist():
+            rows = starts[chosen[counts == count]]
+            blocks.append(Block(KINDS.get(kind, f"type {kind}"), corners[rows[:, None] + np.arange(count)]))
+    data = {
+        name: arrays.of(element, n_points)
+        for element in piece.iterfind("PointData/DataArray")
+        if (name := element.get("Name")) in names
+    }
+    return Cells(points, blocks, data)
 
 
 def _words(values: Any) -> str:

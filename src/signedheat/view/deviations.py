@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable, extension, replacing
-from ..io.surface_fields import ply_of
+from ..io.ply import ply_of
 from ..solids.deviation import Deviation, save_deviation
 from .colors import INSIDE_TO_OUTSIDE
 from .figures import PICTURE_FORMATS, new_figure, write_figure
@@ -24,7 +24,7 @@ def _(found: object, path: PathLike) -> None:
         return _draw(found, path)
     with replacing(path) as temporary:
         if extension(path) == ".ply":
-            temporary.write_bytes(ply_of(found.scan, "deviation", found.distances, colors(found.distances, found)))
+            temporary.write_bytes(ply_of(found.scan, {"deviation": found.distances}, colors(found.distances, found)))
         else:
             rows, names = np.column_stack([found.points, found.distances, found.nearest]), "x,y,z,deviation"
             np.savetxt(temporary, rows, "%.9g", ",", header=f"{names},nearest_x,nearest_y,nearest_z", comments="")

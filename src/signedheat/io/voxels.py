@@ -1,16 +1,13 @@
-"""Images of labels, as segmentation makes them, with their place in the world: turned and mirrored axes included."""
+"""Voxels from images: digital surfaces, grids with walls, and labels with their place in the world."""
 
 from __future__ import annotations
 
 import gzip
-import io
-import zlib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..domains.digital_surface import DigitalSurface
 from ..domains.display import NAME
@@ -20,30 +17,15 @@ from ..domains.transforms import transform
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
 from ..fields.grid_field import GridField
-from ..packages import lazy_module, require
-from .arrays import read_npy
+from ..packages import require
 from .fields import CONVENTION, ensure_field_writable, save_field
-from .files import (
-    PathLike,
-    contents,
-    ensure_fits,
-    ensure_writable,
-    extension,
-    reading,
-    replacing,
-    unknown_extension,
-    unpacked,
-)
-from .nrrd_files import read_image, write_image
-from .vtk_xml import read_vti
+from .files import PathLike, ensure_writable, extension, reading, replacing
+from .images import NIBABEL, NIFTI, PICTURES, nibabel, read_image, write_nrrd
 
 Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 
-NIBABEL = ("nibabel", "NIfTI files")
-nibabel = lazy_module(*NIBABEL)
-
-NIFTI = (".nii", ".nii.gz")
-LABEL_FORMATS = frozenset({".npy", ".nrrd", ".vti", *NIFTI})
+VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
+LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
 SQUARE = 1e-4
 """Cosine between axes up to which they are at right angles: NIfTI files keep them in single precision."""
 AXES = {
@@ -52,7 +34,6 @@ AXES = {
     "left-anterior-superior": (-1, 1, 1),
 }
 """Signs that turn the axes of a space, as NRRD files name it, into those of NIfTI files."""
-SHORT = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,18 +131,18 @@ class LabelImage:
         self.ensure_writable(path)
         first = self.matrix[:3, :3] @ field.grid.origin + self.origin
         axes = self.axes * (field.grid.spacing / self.spacing)
-        if format_of(path) in NIFTI:
+        if extension(path) in NIFTI:
             with replacing(path) as temporary:
                 temporary.write_bytes(self._nifti(field, axes, first, path))
-        elif format_of(path) == ".nrrd":
+        elif extension(path) == ".nrrd":
             with replacing(path) as temporary:
-                write_image(temporary, field.values, axes, first, self.space, content=NAME, convention=CONVENTION)
+                write_nrrd(temporary, field.values, axes, first, self.space, content=NAME, convention=CONVENTION)
         else:
             save_field(GridField(Grid(first, field.grid.spacing, field.grid.shape), field.values), path)
 
     def ensure_writable(self, path: PathLike) -> None:
         """Check before a long computation that a field can be written."""
-        if format_of(path) in NIFTI:
+        if extension(path) in NIFTI:
             require(*NIBABEL)
             ensure_writable(path, {extension(path)}, "a field")
             if self.space is not None and self.space not in AXES:
@@ -170,7 +151,7 @@ class LabelImage:
                 )
             return
         ensure_field_writable(path)
-        if format_of(path) != ".nrrd" and not np.array_equal(self.axes, np.diag(self.spacing)):
+        if extension(path) != ".nrrd" and not np.array_equal(self.axes, np.diag(self.spacing)):
             raise FileFormatError(
                 "the axes of the image are turned, for which this format has no place",
                 remedy="write a .nrrd or .nii file",
@@ -183,13 +164,7 @@ class LabelImage:
         signs = AXES[self.space] if self.space is not None else (1, 1, 1)
         image = nibabel.Nifti1Image(field.values, np.diag([*signs, 1]) @ affine)
         packed: bytes = image.to_bytes()
-        return gzip.compress(packed, mtime=0) if format_of(path) == ".nii.gz" else packed
-
-
-def format_of(path: PathLike) -> str:
-    """The extension, with both parts of ``.nii.gz``."""
-    name = Path(path).name.lower()
-    return ".nii.gz" if name.endswith(".nii.gz") else extension(path)
+        return gzip.compress(packed, mtime=0) if extension(path) == ".nii.gz" else packed
 
 
 def read_labels(path: PathLike) -> LabelImage:
@@ -220,83 +195,105 @@ def read_labels(path: PathLike) -> LabelImage:
     ...     read_labels(f"{folder}/labels.npy").surface(3).n_polygons
     14
     """
-    if format_of(path) not in LABEL_FORMATS:
-        raise unknown_extension(path, LABEL_FORMATS, "labels")
+    image = read_image(path, LABEL_FORMATS, "labels")
     with reading(path):
-        labels, axes, origin, space = _read(path)
-        if labels.ndim != 3 or labels.dtype.kind not in "biuf":
-            raise FileFormatError(f"the image has {labels.ndim} axes of {labels.dtype}, not 3 of numbers", path=path)
-        if axes.shape != (3, 3) or origin.shape != (3,):
-            raise FileFormatError("its axes or its origin are not those of space", remedy="write it again", path=path)
-        lengths = np.linalg.norm(axes, axis=0)
-        if not (np.isfinite(axes).all() and (lengths > 0).all() and np.isfinite(origin).all()):
-            raise FileFormatError("its axes have no directions", remedy="write it again", path=path)
-        cosines = (axes / lengths).T @ (axes / lengths) - np.eye(3)
+        if image.values.ndim != 3:
+            raise FileFormatError(f"the image has {image.values.ndim} axes, not 3")
+        if image.axes.shape != (3, 3) or image.origin.shape != (3,):
+            raise FileFormatError("its axes or its origin are not those of space", remedy="write it again")
+        lengths = np.linalg.norm(image.axes, axis=0)
+        if not (np.isfinite(image.axes).all() and (lengths > 0).all() and np.isfinite(image.origin).all()):
+            raise FileFormatError("its axes have no directions", remedy="write it again")
+        cosines = (image.axes / lengths).T @ (image.axes / lengths) - np.eye(3)
         if np.abs(cosines).max() > SQUARE:
             raise FileFormatError(
                 f"its axes are not at right angles, but off by {np.degrees(np.arcsin(np.abs(cosines).max())):.3g}°",
                 remedy="resample the image along right angles",
-                path=path,
             )
-        return LabelImage(labels, axes, origin, space)
+        return LabelImage(image.values, image.axes, image.origin, image.space)
 
 
-Parts = tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64], str | None]
-"""Labels, steps along the axes in columns, origin, space."""
+def read_volume(path: PathLike, level: float | None = None, radius: float | None = None) -> DigitalSurface:
+    """Read a set of voxels from an image, as a digital surface.
+
+    Parameters
+    ----------
+    path : str or path
+        ``.npy`` (voxels of size 1, or with origin and spacing in a ``.json`` of the same name), ``.nrrd`` or ``.vti``.
+    level : float, optional
+        Voxels with larger values are inside. Without it the image must have booleans, or zeros and ones.
+    radius : float, optional
+        Passed to `DigitalSurface`.
+
+    Returns
+    -------
+    DigitalSurface
+        The boundary of the voxels.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown format, truncated or damaged.
+    GeometryError
+        If the image is not a set of voxels.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(f"{folder}/one.npy", np.ones((1, 1, 1), dtype=bool))
+    ...     read_volume(f"{folder}/one.npy").n_vertices
+    8
+    """
+    image = read_image(path, VOLUME_FORMATS, "a volume")
+    with reading(path):
+        if image.values.ndim != 3:
+            raise FileFormatError(f"the image has {image.values.ndim} axes, and a volume has 3")
+        inside = image.values if level is None else image.values > level
+        return DigitalSurface(inside, image.spacing, image.origin, radius)
 
 
-def _read(path: PathLike) -> Parts:
-    kind = format_of(path)
-    if kind in NIFTI:
-        return _read_nifti(path)
-    if kind == ".nrrd":
-        return _read_nrrd(path)
-    if kind == ".vti":
-        values, origin, spacing = read_vti(path)[:3]
-        return values, np.diag(np.asarray(spacing, dtype=np.float64)), np.asarray(origin, dtype=np.float64), None
-    values = read_npy(path)
-    return values, np.eye(values.ndim), np.zeros(values.ndim), None
+def read_mask(
+    path: PathLike, level: float = 0.5, origin: ArrayLike | None = None, spacing: ArrayLike | None = None
+) -> Grid:
+    """Read a grid with walls from an image: every voxel or pixel becomes a node, solid or free.
 
+    Parameters
+    ----------
+    path : str or path
+        ``.npy``, ``.nrrd`` or ``.vti`` in the plane or in space, as for `read_volume`; pictures (``.png``, ``.bmp``,
+        ``.tif``), whose first node is the lower left pixel, with y pointing up.
+    level : float
+        Voxels with larger values are solid. In pictures, pixels darker than this are, with 0 black and 1 white.
+    origin, spacing : (d,) float, optional
+        Position of the first node, and distance between nodes, instead of those in the file; for pictures by default 0
+        and 1.
 
-def _read_nrrd(path: PathLike) -> Parts:
-    values, header = read_image(path)
-    n = values.ndim
-    spacings = np.nan_to_num(np.asarray(header.get("spacings", np.ones(n)), dtype=np.float64), nan=1.0)
-    rows = np.asarray(header.get("space directions", np.diag(spacings)), dtype=np.float64)
-    origin = np.asarray(header.get("space origin", np.zeros(n)), dtype=np.float64)
-    space = header.get("space")
-    return values, rows.T, origin, SHORT.get(str(space), str(space).lower()) if space is not None else None
+    Returns
+    -------
+    Grid
+        With solid nodes.
 
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of unknown format, truncated or damaged.
+    GeometryError
+        If all nodes are solid, or origin or spacing are invalid.
 
-def _read_nifti(path: PathLike) -> Parts:
-    data = contents(path)
-    require(*NIBABEL)
-    packed = data[:2] == b"\x1f\x8b"
-    head = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), 540) if packed else data[:540]
-    second = 540 in (int.from_bytes(head[:4], "little"), int.from_bytes(head[:4], "big"))
-    kind = nibabel.Nifti2Image if second else nibabel.Nifti1Image
-    logger = nibabel.imageglobals.logger
-    was, logger.disabled = logger.disabled, True  # what it mends in headers it would tell on standard error
-    try:
-        return _parts_of_nifti(kind, head, data, packed, path)
-    finally:
-        logger.disabled = was
-
-
-def _parts_of_nifti(kind: Any, head: bytes, data: bytes, packed: bool, path: PathLike) -> Parts:
-    header = kind.header_class.from_fileobj(io.BytesIO(head), check=False)
-    size = int(header["vox_offset"]) + int(np.prod(header.get_data_shape())) * header.get_data_dtype().itemsize
-    ensure_fits(size, path)
-    if packed:
-        data = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), size)
-    if len(data) < size:
-        raise FileFormatError(f"it announces {size} bytes, and {len(data)} are there: it is truncated", path=path)
-    image = kind.from_bytes(data)
-    values = np.asarray(image.dataobj)
-    while values.ndim > 3 and values.shape[-1] == 1:
-        values = values[..., 0]
-    affine = np.asarray(image.affine, dtype=np.float64)
-    return values, affine[:3, :3], affine[:3, 3], "right-anterior-superior"
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(f"{folder}/wall.npy", np.array([[0, 0, 0], [0, 1, 1]]))
+    ...     read_mask(f"{folder}/wall.npy", spacing=0.5)
+    Grid(origin=[0, 0], spacing=0.5, shape=(2, 3), 2 solid nodes)
+    """
+    image = read_image(path, (*VOLUME_FORMATS, *PICTURES), "a mask")
+    with reading(path):
+        solid = image.values < level if extension(path) in PICTURES else image.values > level
+        first = image.origin if origin is None else origin
+        return Grid(first, image.spacing if spacing is None else spacing, solid.shape, solid)
 
 
 def _listed(labels: NDArray[Any]) -> str:

@@ -1,0 +1,282 @@
+"""Images: values on a lattice, and where that lies; all formats of fields on grids, voxels, labels and masks.
+
+NRRD headers are parsed by pynrrd and NIfTI by nibabel; data are read here, so that no more is read or unpacked than a
+header announces. Pictures are read by Pillow.
+"""
+
+from __future__ import annotations
+
+import bz2
+import io
+import json
+import math
+import warnings
+import zlib
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError
+from ..packages import lazy_module, require
+from .arrays import read_npy, read_npz
+from .files import (
+    PathLike,
+    contents,
+    contents_beside,
+    damaged,
+    ensure_fits,
+    format_for,
+    numbers,
+    reading,
+    unpacked,
+    with_messages,
+)
+from .vdb_reader import read_vdb_image
+from .vtk_xml import read_vti
+
+NIBABEL = ("nibabel", "NIfTI files")
+nibabel = lazy_module(*NIBABEL)
+nrrd = lazy_module("nrrd", "NRRD files")
+Pillow = lazy_module("PIL.Image", "pictures as masks")
+
+CONFIDENCE = "confidence"
+NIFTI = (".nii", ".nii.gz")
+PICTURES = (".bmp", ".png", ".tif", ".tiff")
+SHORT = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
+"""Spaces by their short names in NRRD files."""
+MOST_PACKED = 1 << 14
+"""Bytes that a byte of a picture may stand for: pages without a mark, line by line, some thousands."""
+_CODES = {
+    name: code
+    for names, code in (
+        ("signed char,int8,int8_t", "i1"),
+        ("uchar,unsigned char,uint8,uint8_t", "u1"),
+        ("short,short int,signed short,signed short int,int16,int16_t", "i2"),
+        ("ushort,unsigned short,unsigned short int,uint16,uint16_t", "u2"),
+        ("int,signed int,int32,int32_t", "i4"),
+        ("uint,unsigned int,uint32,uint32_t", "u4"),
+        ("longlong,long long,long long int,signed long long,signed long long int,int64,int64_t", "i8"),
+        ("ulonglong,unsigned long long,unsigned long long int,uint64,uint64_t", "u8"),
+        ("float", "f4"),
+        ("double", "f8"),
+    )
+    for name in names.split(",")
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Values on a lattice of d axes, and where it lies.
+
+    Attributes
+    ----------
+    values : (n₁, …, n_d) number
+        One for each place, indexed [x, y, z].
+    axes : (d, d) float
+        The step from one place to the next along each axis of the image, in columns.
+    origin : (d,) float
+        The first place.
+    space : str, optional
+        What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
+    mask, confidence : (n₁, …, n_d), optional
+        What a field has besides its values.
+    """
+
+    values: NDArray[Any]
+    axes: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    space: str | None = None
+    mask: NDArray[Any] | None = None
+    confidence: NDArray[Any] | None = None
+
+    @property
+    def spacing(self) -> NDArray[np.float64]:
+        """(d,) distance between places, of an image along x, y, z; raises `FileFormatError` where it is turned."""
+        spacing = np.diag(self.axes) if self.axes.ndim == 2 else np.zeros(self.values.ndim)
+        if not np.array_equal(self.axes, np.diag(spacing)):
+            raise FileFormatError("its axes are not x, y, z", remedy="resample the image along them")
+        return spacing
+
+
+def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
+    """An image of real numbers, in one of some formats.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is missing, of another format, truncated or damaged, or has no real numbers.
+    MemoryLimitError
+        If it announces more than fits into memory.
+    """
+    read = format_for(path, {ending: READERS[ending] for ending in formats}, purpose)
+    with reading(path):
+        image = read(path)
+        if image.values.dtype.kind not in "biuf":
+            raise FileFormatError(f"the values are no real numbers but {image.values.dtype}: it holds no image")
+        return image
+
+
+def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> Image:
+    """An image along x, y, z."""
+    steps = np.asarray(spacing, dtype=np.float64)
+    steps = np.full(values.ndim, steps) if steps.ndim == 0 else steps
+    return Image(values, np.diag(steps), np.asarray(origin, dtype=np.float64), **others)
+
+
+def _read_npy(path: PathLike) -> Image:
+    """An array; origin and spacing from the ``.json`` of the same name, if there is one."""
+    values, beside = read_npy(path), Path(path).with_suffix(".json")
+    if not beside.exists():
+        return _aligned(values, np.zeros(values.ndim), np.ones(values.ndim))
+    text = contents(beside)
+    with reading(beside):
+        about = json.loads(text)
+        return _aligned(values, about["origin"], about["spacing"])
+
+
+def _read_npz(path: PathLike) -> Image:
+    found = read_npz(path, ("mask", CONFIDENCE), needed=("values", "origin", "spacing"))
+    return _aligned(found.pop("values"), found.pop("origin"), found.pop("spacing"), **found)
+
+
+def _read_vti(path: PathLike) -> Image:
+    values, origin, spacing, confidence = read_vti(path, CONFIDENCE)
+    return _aligned(values, origin, spacing, confidence=confidence)
+
+
+def _read_nrrd(path: PathLike) -> Image:
+    """A file that the header names must lie in the same folder or below it."""
+    data = contents(path)
+    file = io.BytesIO(data)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about fields that nobody needs
+        header = dict(nrrd.read_header(file))
+    rest = data[file.tell() :]
+    beside = header.get("data file", header.get("datafile"))
+    if beside is not None:
+        if beside.startswith("LIST") or "%" in beside:
+            raise FileFormatError("its data are in several files", remedy="save it as one")
+        rest = contents_beside(path, beside)
+    sizes = [int(n) for n in header["sizes"]]
+    code = _CODES.get(header["type"])
+    if code is None or len(sizes) != header["dimension"] or min(sizes, default=0) < 1:
+        raise damaged(f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} make no image")
+    dtype = np.dtype(code).newbyteorder(">" if header.get("endian") == "big" else "<")
+    for _ in range(header.get("line skip") or header.get("lineskip") or 0):
+        rest = rest.partition(b"\n")[2]
+        if not rest:
+            break
+    values = _nrrd_values(rest, header, math.prod(sizes), dtype, path).reshape(sizes, order="F")
+    spacings = np.nan_to_num(np.asarray(header.get("spacings", np.ones(values.ndim)), dtype=np.float64), nan=1.0)
+    steps = np.atleast_2d(np.asarray(header.get("space directions", np.diag(spacings)), dtype=np.float64))
+    origin = np.asarray(header.get("space origin", np.zeros(values.ndim)), dtype=np.float64)
+    space = header.get("space")
+    return Image(values, steps.T, origin, None if space is None else SHORT.get(str(space), str(space).lower()))
+
+
+def _nrrd_values(data: bytes, header: dict[str, Any], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
+    """The values in a row; they are `count`."""
+    encoding, size = str(header["encoding"]).lower(), count * dtype.itemsize
+    skip = header.get("byte skip", header.get("byteskip", 0))
+    if encoding in ("ascii", "text", "txt"):
+        words = data[max(skip, 0) :].split()
+        if len(words) < count:
+            raise _truncated(len(words), count)
+        return numbers(words[:count], "values").astype(dtype.newbyteorder("="))
+    ensure_fits(size, path)
+    if encoding in ("gzip", "gz"):
+        data = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), size + max(skip, 0))
+    elif encoding in ("bzip2", "bz2"):
+        data = unpacked(data, bz2.BZ2Decompressor(), size + max(skip, 0))
+    elif encoding != "raw":
+        raise FileFormatError(f"packed by '{encoding}'", remedy="save it as raw or gzip")
+    start = len(data) - size if skip == -1 else max(skip, 0)
+    if start < 0 or len(data) - start < size:
+        raise _truncated(max(len(data) - start, 0), size)
+    return np.frombuffer(data, dtype, count, start).astype(dtype.newbyteorder("="))
+
+
+def _truncated(there: int, announced: int) -> FileFormatError:
+    return damaged(f"it announces {announced}, and {there} are there: it is truncated")
+
+
+def write_nrrd(
+    path: PathLike,
+    values: NDArray[Any],
+    axes: NDArray[np.float64],
+    origin: NDArray[np.float64],
+    space: str | None = None,
+    **keys: str,
+) -> None:
+    """Write values, indexed [x, y, z]; the columns of `axes` are the steps along x, y, z. `keys` go into the header."""
+    header = {
+        **({"space dimension": values.ndim} if space is None else {"space": space}),
+        "space directions": axes.T,
+        "space origin": origin,
+        "kinds": ["domain"] * values.ndim,
+        "encoding": "raw",
+        **keys,
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd 1.1 dates its files by a function that will go
+        nrrd.write(str(path), values, header, index_order="F")
+
+
+def _read_nifti(path: PathLike) -> Image:
+    data = contents(path)
+    require(*NIBABEL)
+    packed = data[:2] == b"\x1f\x8b"
+    head = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), 540) if packed else data[:540]
+    second = 540 in (int.from_bytes(head[:4], "little"), int.from_bytes(head[:4], "big"))
+    kind = nibabel.Nifti2Image if second else nibabel.Nifti1Image
+    logger = nibabel.imageglobals.logger
+    was, logger.disabled = logger.disabled, True  # what it mends in headers it would write to standard error
+    try:
+        header = kind.header_class.from_fileobj(io.BytesIO(head), check=False)
+        size = int(header["vox_offset"]) + int(np.prod(header.get_data_shape())) * header.get_data_dtype().itemsize
+        ensure_fits(size, path)
+        if packed:
+            data = unpacked(data, zlib.decompressobj(zlib.MAX_WBITS | 16), size)
+        if len(data) < size:
+            raise _truncated(len(data), size)
+        image = kind.from_bytes(data)
+        values, affine = np.asarray(image.dataobj), np.asarray(image.affine, dtype=np.float64)
+    finally:
+        logger.disabled = was
+    while values.ndim > 3 and values.shape[-1] == 1:
+        values = values[..., 0]
+    return Image(values, affine[:3, :3], affine[:3, 3], "right-anterior-superior")
+
+
+def _read_picture(path: PathLike) -> Image:
+    """Brightness from 0 to 1; the first pixel is the lower left one. Transparent pixels count as white."""
+    data = contents(path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about pictures that are large: they are compared with the memory
+        opened = Pillow.open(io.BytesIO(data))
+        n_pixels = opened.width * opened.height
+        covered = sum((right - left) * (upper - lower) for _, (left, lower, right, upper), *_ in opened.tile)
+        if covered < n_pixels or n_pixels > 8 * MOST_PACKED * len(data):  # parts, or bytes in whatever packing
+            raise damaged(f"it announces {opened.width} × {opened.height} pixels, and has fewer")
+        ensure_fits(16 * n_pixels, path)
+        picture, messages = with_messages(lambda: opened.convert("RGBA"))
+    if messages.strip() and opened.format == "TIFF":  # libtiff goes on after errors, with what it makes of the rest
+        raise damaged(f"it is damaged ({messages.splitlines()[0]:.200})")
+    white = Pillow.new("RGBA", picture.size, "white")
+    brightness = np.asarray(Pillow.alpha_composite(white, picture).convert("L")) / 255
+    return _aligned(brightness[::-1].T, np.zeros(2), np.ones(2))
+
+
+READERS: dict[str, Callable[[PathLike], Image]] = {
+    ".npy": _read_npy,
+    ".npz": _read_npz,
+    ".nrrd": _read_nrrd,
+    ".vdb": lambda path: _aligned(*read_vdb_image(path)),
+    ".vti": _read_vti,
+    **dict.fromkeys(NIFTI, _read_nifti),
+    **dict.fromkeys(PICTURES, _read_picture),
+}

@@ -1,0 +1,219 @@
+"""Meshes and points as text and in STL: Wavefront OBJ (``.obj``, and ``.pc`` of the published demo), OFF, STL."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.foreign import SurfaceShape, assemble, points_of
+from ..domains.point_cloud import PointCloud
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import FileFormatError
+from ..geometry.welding import distinct_rows
+from .files import PathLike, contents, damaged, ensure_fits, numbers, reading, refuse_kind, text
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+BYTES = 400
+"""Measured: what each line of an OBJ file takes while it is read."""
+_HEADER = 84  # of STL, in bytes: 80 of comment, 4 that count the facets
+
+
+def read_stl(path: PathLike) -> TriangleMesh:
+    """All facets of an STL file, of all its solids; stored normals are ignored.
+
+    Corners with exactly the same coordinates become one vertex: STL has no other way to express that facets meet.
+    """
+    data = contents(path)
+    announced = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else 0
+    is_text = data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:1000].lower()
+    if is_text and len(data) != _HEADER + 50 * announced:
+        corners = _text_corners(data)
+    elif len(data) < _HEADER + 50 * announced or len(data) < _HEADER:
+        raise FileFormatError(
+            f"{announced} facets need {_HEADER + 50 * announced} bytes, the file has {len(data)}: it "
+            "is truncated, or no STL file"
+        )
+    else:
+        corners = np.frombuffer(data, _FACET, announced, _HEADER)["corners"].astype(np.float32)
+    return _indexed(corners.reshape(-1, 3))
+
+
+def write_stl(shape: SurfaceShape, path: PathLike) -> bytes:
+    """Binary STL, in single precision."""
+    if not isinstance(shape, TriangleMesh):
+        kinds = ".ply or .xyz" if isinstance(shape, PointCloud) else ".obj, .ply, .off or .vtp"
+        raise refuse_kind(shape, path, "triangles", kinds)
+    facets = np.zeros(shape.n_faces, dtype=_FACET)
+    facets["corners"] = shape.vertices[shape.faces]
+    if not np.isfinite(facets["corners"]).all():
+        raise FileFormatError(
+            "coordinates are too large for the single precision of STL", remedy="save it as .ply", path=path
+        )
+    lengths = np.maximum(2 * shape.face_areas, np.finfo(float).tiny)
+    facets["normal"] = 2 * shape.face_area_vectors / lengths[:, None]
+    result: bytes = b"signedheat".ljust(80) + np.uint32(shape.n_faces).astype("<u4").tobytes() + facets.tobytes()
+    return result
+
+
+def _text_corners(data: bytes) -> NDArray[np.float64]:
+    words = data.lower().split()
+    if words.count(b"solid") and b"endsolid" not in words[-40:]:
+        raise damaged("the last solid has no end: the file is truncated")
+    at = [k for k, word in enumerate(words) if word == b"vertex"]
+    if len(at) % 3 or (at and at[-1] + 3 >= len(words)):
+        raise damaged("a facet has fewer than 3 vertices: the file is truncated or damaged")
+    return numbers([words[k + 1 : k + 4] for k in at], "vertices").reshape(-1, 3)
+
+
+def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
+    if not len(corners):
+        return TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))
+    corners = corners + corners.dtype.type(0)  # adding zero turns −0 into 0
+    ids, firsts = distinct_rows(corners.view(f"u{corners.itemsize}"))
+    return TriangleMesh(corners[firsts].astype(np.float64), ids.reshape(-1, 3))
+
+
+def face_lists(shape: SurfaceShape) -> Sequence[Sequence[int]]:
+    """Corners of each face, as lists; empty for point clouds."""
+    if isinstance(shape, TriangleMesh):
+        result: Sequence[Sequence[int]] = shape.faces.tolist()
+        return result
+    return [] if isinstance(shape, PointCloud) else [polygon.tolist() for polygon in shape.polygons]
+
+
+def read_obj(path: PathLike) -> SurfaceShape:
+    """The faces of an OBJ file, or its points if it has none; texture coordinates and normals of faces are ignored."""
+    lines = _lines_by_keyword(path)
+    vertices = _coordinates(lines.get("v", []), "vertices")
+    if "f" in lines:
+        corners, counts = _elements(lines["f"], len(vertices))
+        return assemble(vertices, corners, counts)
+    if "l" in lines:
+        raise FileFormatError(
+            f"there are {len(lines['l'])} line elements and no face",
+            remedy="read them with sh.io.read_curves(path, mesh)",
+        )
+    normals = _coordinates(lines["vn"], "normals") if "vn" in lines else None
+    return PointCloud(vertices, normals)
+
+
+def read_obj_lines(path: PathLike) -> tuple[NDArray[np.float64], list[NDArray[np.int64]]]:
+    """The ``l`` elements of an OBJ file: all vertices, and the vertex ids along each line, from 0."""
+    with reading(path):
+        lines = _lines_by_keyword(path)
+        vertices = _coordinates(lines.get("v", []), "vertices")
+        corners, counts = _elements(lines.get("l", []), len(vertices))
+        return vertices, np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else []
+
+
+def write_obj(shape: SurfaceShape, path: PathLike) -> bytes:
+    """OBJ text; points become ``v`` lines, with ``vn`` lines if they have normals."""
+    rows = ["v {!r} {!r} {!r}".format(*p) for p in points_of(shape).tolist()]
+    if isinstance(shape, PointCloud) and shape.normals is not None:
+        rows += ["vn {!r} {!r} {!r}".format(*n) for n in shape.normals.tolist()]
+    rows += ["f " + " ".join([str(i + 1) for i in face]) for face in face_lists(shape)]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def write_pc(shape: SurfaceShape, path: PathLike) -> bytes:
+    """Oriented points, as OBJ text."""
+    if not isinstance(shape, PointCloud):
+        raise refuse_kind(shape, path, "points", ".obj or .ply")
+    return write_obj(shape, path)
+
+
+def _lines_by_keyword(path: PathLike) -> dict[str, list[list[str]]]:
+    lines: dict[str, list[list[str]]] = {"v": [], "vn": [], "f": [], "l": []}
+    content = text(path)
+    ensure_fits(BYTES * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
+    for line in re.sub(r"\\[ \t]*\r?\n", " ", content).splitlines():
+        words = line.partition("#")[0].split()
+        if words and words[0] in lines:
+            lines[words[0]].append(words[1:])
+    if not lines["v"]:
+        raise FileFormatError("there is no line 'v x y z': this holds no shape in OBJ format")
+    return {keyword: rest for keyword, rest in lines.items() if rest}
+
+
+def _coordinates(rows: list[list[str]], what: str) -> NDArray[np.float64]:
+    """(n, 3) numbers, three from each line; further ones (weights, colours) are ignored."""
+    short = next((k for k, row in enumerate(rows) if len(row) < 3), None)
+    if short is not None:
+        cause = f"number {short} of the {what} has {len(rows[short])} coordinates instead of 3: it may be truncated"
+        raise damaged(cause, element=f"number {short}")
+    return numbers([row[:3] for row in rows], what).reshape(-1, 3)
+
+
+def _elements(words: list[list[str]], n_vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertex ids from 0 of all elements, and their number in each; ``v/vt/vn`` means v, and −1 the last vertex."""
+    counts = np.array([len(element) for element in words], dtype=np.int64)
+    flat = [word for element in words for word in element]
+    if any("/" in word for word in flat):
+        flat = [word.partition("/")[0] for word in flat]
+    ids = numbers(flat, "vertex ids", int)
+    if (ids == 0).any():
+        raise damaged("a face names vertex 0, but OBJ counts from 1: the file is damaged")
+    return np.where(ids > 0, ids - 1, ids + n_vertices), counts
+
+
+def read_off(path: PathLike) -> SurfaceShape:
+    """The faces of an OFF file (also COFF, NOFF, STOFF, …), or its points if it has none."""
+    rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].split())]
+    kind = rows[0][0].upper() if rows else ""
+    if not kind.endswith("OFF") or "BINARY" in [word.upper() for word in rows[0]]:
+        raise FileFormatError("it does not begin with OFF as text: this is no file that can be read as OFF")
+    rows[0] = rows[0][1:]
+    rows = rows if rows[0] else rows[1:]
+    if not rows or len(rows[0]) < 2:
+        raise damaged("the numbers of vertices and faces are missing: it may be truncated")
+    n_vertices, n_faces = numbers(rows[0][:2], "counts", int).tolist()
+    if n_vertices < 0 or n_faces < 0:
+        raise damaged(f"{n_vertices} vertices and {n_faces} faces are announced: the file is damaged")
+    lines = iter(rows[1:])
+    vertex_rows = list(islice(_records(lines, lambda row: 3), n_vertices))
+    face_rows = list(islice(_records(lines, lambda row: 1 + _corner_count(row[0])), n_faces))
+    if len(vertex_rows) < n_vertices or len(face_rows) < n_faces:
+        raise damaged(
+            f"{n_vertices} vertices and {n_faces} faces are announced, {len(vertex_rows)} and "
+            f"{len(face_rows)} are there: the file is truncated"
+        )
+    if any(len(row) < 3 for row in vertex_rows):
+        raise damaged("a vertex has fewer than 3 coordinates: it may be truncated")
+    vertices = numbers([row[:3] for row in vertex_rows], "vertices").reshape(-1, 3)
+    if not n_faces:
+        has_normals = "N" in kind[:-3] and all(len(row) >= 6 for row in vertex_rows)
+        return PointCloud(vertices, numbers([r[3:6] for r in vertex_rows], "normals") if has_normals else None)
+    counts = numbers([row[0] for row in face_rows], "numbers of corners", int)
+    if any(len(row) <= count for row, count in zip(face_rows, counts.tolist(), strict=True)):
+        raise damaged("a face has fewer corners than it says: it may be truncated")
+    corners = [word for row, count in zip(face_rows, counts.tolist(), strict=True) for word in row[1 : 1 + count]]
+    return assemble(vertices, numbers(corners, "vertex ids", int), np.asarray(counts))
+
+
+def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
+    """Lines joined until each holds as many words as its beginning asks for; more words on its last line stay."""
+    for row in lines:
+        wanted = length(row)
+        while len(row) < wanted and (more := next(lines, None)) is not None:
+            row += more
+        yield row
+
+
+def _corner_count(word: str) -> int:
+    """Number of corners of a face; 0 for what is no number, which is refused later."""
+    return int(word) if word.isdecimal() and len(word) < 19 else 0
+
+
+def write_off(shape: SurfaceShape, path: PathLike) -> bytes:
+    """OFF text; oriented points as NOFF."""
+    points, faces = points_of(shape), face_lists(shape)
+    normals = shape.normals if isinstance(shape, PointCloud) else None
+    columns = points if normals is None else np.hstack([points, normals])
+    rows = ["OFF" if normals is None else "NOFF", f"{len(points)} {len(faces)} 0"]
+    rows += [" ".join(map(repr, row)) for row in columns.tolist()]
+    rows += [" ".join(map(str, [len(face), *face])) for face in faces]
+    return ("\n".join(rows) + "\n").encode()
