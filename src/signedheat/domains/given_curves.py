@@ -7,7 +7,6 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..diagnostics import WithoutLength
 from ..errors import SourceError
@@ -52,34 +51,24 @@ def curve_of_elements(triangles: Triangles, points: Sequence[tuple[int, Sequence
     SourceError
         If there is no such element.
     """
-    edges, owners = _edges_in_order(triangles.faces)
-    first_face = np.full(triangles.n_vertices, -1)
-    first_face[triangles.faces[::-1]] = np.arange(triangles.n_faces)[::-1, None]
+    starts, halfedges = triangles.edges.halfedges
+    first_corner = np.full(triangles.n_vertices, -1)
+    first_corner[triangles.faces.ravel()[::-1]] = np.arange(triangles.faces.size)[::-1]
     faces, weights = np.zeros(len(points), dtype=np.int64), np.zeros((len(points), 3))
     for k, (element, given) in enumerate(points):
         kind, count = (
-            ("vertex", triangles.n_vertices), ("edge", len(edges)), ("face", triangles.n_faces)
+            ("vertex", triangles.n_vertices), ("edge", len(starts) - 1), ("face", triangles.n_faces)
         )[min(len(given), 2)]  # fmt: skip
-        if not 0 <= element < count or (kind == "vertex" and first_face[element] < 0):
+        if not 0 <= element < count or (kind == "vertex" and first_corner[element] < 0):
             raise SourceError(f"point {k} of a curve is on {kind} {element}, which is none", element=f"point {k}")
-        if kind == "vertex":
-            faces[k] = first_face[element]
-            weights[k] = (triangles.faces[faces[k]] == element).astype(float)
-        elif kind == "edge":
-            faces[k], side = divmod(int(owners[element]), 3)
-            weights[k, [side, (side + 1) % 3]] = 1 - given[0], given[0]
-        else:
+        if kind == "face":
             faces[k] = element
             weights[k] = (*given[:2], 1 - given[0] - given[1])
+            continue
+        halfedge, share = (first_corner[element], 0.0) if kind == "vertex" else (halfedges[starts[element]], given[0])
+        faces[k], side = divmod(int(halfedge), 3)
+        weights[k, [side, (side + 1) % 3]] = 1 - share, share
     return Curve(faces, weights) if len(points) > 1 else SurfacePoints(faces, weights)
-
-
-def _edges_in_order(faces: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Edges as first found along the sides of faces; and the side, 3 face + corner, where that was."""
-    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    _, owners = np.unique(np.sort(sides, axis=1), axis=0, return_index=True)
-    owners.sort()
-    return sides[owners], owners
 
 
 def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], WithoutLength | None]:

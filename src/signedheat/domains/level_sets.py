@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import SourceError
 from ..geometry.meshes import Triangles
 from ..geometry.polylines import assemble_polylines, leaving
-from ..geometry.surface_points import SNAP, barycentric_on_sides
+from ..geometry.surface_points import SNAP, barycentric_on_edges, crossed_sides
 from .curves import Curve
 
 SAME = 1e-6
@@ -32,13 +32,8 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
             f"a level set needs one value per vertex: {mesh.n_vertices}, not an array {values.shape}", element="values"
         )
     values = snapped(values, edges.vertices, level)
-    above = values >= level
-    known = np.isfinite(values)[faces].all(axis=1)
-    count = above[faces].sum(axis=1)
-    crossed = np.flatnonzero(known & (count > 0) & (count < 3))
-    odd = np.where(count[crossed] == 1, above[faces[crossed]].argmax(axis=1), above[faces[crossed]].argmin(axis=1))
-    sides = np.stack([odd, (odd + 2) % 3], axis=1)
-    sides[count[crossed] == 2] = sides[count[crossed] == 2, ::-1]
+    known = np.asarray(np.isfinite(values)[faces].all(axis=1))
+    crossed, sides = crossed_sides((values >= level)[faces], known)
     on_edges = edges.face_edges[crossed[:, None], sides]
 
     tail, head = (values[edges.vertices[:, k]] for k in (0, 1))
@@ -53,7 +48,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
         face = crossed[order]
         if not closed:
             face, first = np.append(face, face[-1]), np.append(first, last)
-        weights = on_sides(mesh, face, first, along)
+        weights = barycentric_on_edges(edges, face, first, along[edges.face_edges[face, first]])
         own = None if normals is None else normals[order]
         curves.append(Curve(face, weights, closed=closed, normals=own))
     return without_repeats(mesh, curves)
@@ -102,15 +97,6 @@ def snapped(values: NDArray[np.float64], ends: NDArray[np.int64], level: float) 
     steepest = np.zeros(len(values))
     np.maximum.at(steepest, ends, steps[:, None])
     return np.where(np.abs(values - level) <= SNAP * steepest, level, values)
-
-
-def on_sides(
-    mesh: Triangles, faces: NDArray[np.int64], sides: NDArray[np.int64], along: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(k, 3) barycentric coordinates of points on sides of faces, given by fractions along their edges."""
-    fraction = along[mesh.edges.face_edges[faces, sides]]
-    fraction = np.where(mesh.edges.forward[faces, sides], fraction, 1 - fraction)
-    return barycentric_on_sides(sides, fraction)
 
 
 def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:

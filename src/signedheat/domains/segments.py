@@ -13,7 +13,7 @@ from ..errors import SourceError
 from ..geometry.curve_segments import CurveSegments, carried_left, given_directions
 from ..geometry.geodesics.paths import join
 from ..geometry.intrinsic_mesh import IntrinsicMesh
-from ..geometry.surface_points import barycentric_in, locate_points, shared_faces, unique_points
+from ..geometry.surface_points import barycentric_in, edges_between, locate_points, shared_faces, unique_points
 from .curves import Curve, CurveOrPoints, SurfacePoints
 
 Positions: TypeAlias = NDArray[np.float64] | None
@@ -104,18 +104,10 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
             element=name,
         )
 
-    empty = (at_start == 0) & (at_end == 0)
-    sides = (empty.argmax(axis=1) + 1) % 3
-    along = empty.any(axis=1)
-    edges = np.where(along, triangles.edges.face_edges[faces, sides], -1)
-    faces, edges, sides, steps, along, ends, segment = (
-        a[keep] for a in (faces, edges, sides, steps, along, ends, segment)
-    )
-    vectors = 1j * steps
-    forward = np.where(triangles.edges.forward[faces, sides], 1, -1)
-    of_edge = triangles.edge_vectors[faces, sides]
-    ahead = np.sign((np.conj(of_edge) * steps).real) * forward
-    vectors = np.where(along, 1j * ahead * np.abs(steps), vectors)
+    edges, sides = edges_between(triangles, faces, at_start, at_end)
+    faces, edges, sides, steps, ends, segment = (a[keep] for a in (faces, edges, sides, steps, ends, segment))
+    ahead = np.sign((np.conj(triangles.edge_directions[faces, sides]) * steps).real)
+    vectors = 1j * np.where(edges < 0, steps, ahead * np.abs(steps))
     if source.normals is None and not triangles.is_consistently_oriented:
         vectors = vectors * carried_left(triangles, faces, edges, np.abs(steps))
     elif source.normals is not None and source.oriented:

@@ -112,6 +112,19 @@ def members_of(
     return which, members[np.repeat(begin - np.cumsum(count) + count, count) + np.arange(len(which))]
 
 
+def sums_of(values: NDArray[np.float64], groups: NDArray[np.integer], n: int) -> NDArray[np.float64]:
+    """(n, ...) sums of the rows of (k, ...) values in each of n groups.
+
+    Examples
+    --------
+    >>> sums_of(np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]), np.array([2, 0, 2]), 3).tolist()
+    [[3.0, 4.0], [0.0, 0.0], [6.0, 8.0]]
+    """
+    columns = values.reshape(len(values), int(np.prod(values.shape[1:]))).T
+    sums = np.stack([np.bincount(groups, column, n) for column in columns], axis=1)
+    return np.asarray(sums.reshape(n, *values.shape[1:]))
+
+
 @compiled
 def _grouped(groups: NDArray[np.int64], n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     starts = np.zeros(n + 1, dtype=np.int64)

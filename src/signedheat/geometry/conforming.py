@@ -6,7 +6,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from .edges import edge_keys
+from .edges import edge_table
+from .welding import welded
 
 MOST_ROUNDS = 64
 """Times that faces are divided: each halves the number of points on an edge."""
@@ -61,22 +62,15 @@ def conforming(
 
 def _welded(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices, and triangles between them that have three different ones."""
-    places, which = np.unique(points, axis=0, return_inverse=True)
-    pairs = scipy.spatial.cKDTree(places).query_pairs(tolerance, output_type="ndarray")
-    links = scipy.sparse.coo_array((np.ones(len(pairs)), pairs.T), shape=(len(places),) * 2)
-    count, groups = scipy.sparse.csgraph.connected_components(links, directed=False)
-    vertices = np.empty((count, 3))
-    vertices[groups[::-1]] = places[::-1]
-    faces = groups[which.ravel()].astype(np.int64).reshape(-1, 3)
-    return vertices, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    used, numbers = np.unique(welded(points, tolerance), return_inverse=True)
+    faces = numbers.reshape(-1, 3)
+    return points[used], faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
 
 def _open_sides(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Sides of faces, three times the face plus the corner where each begins, along edges that do not cancel."""
-    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    _, edge = np.unique(edge_keys(tails, heads), return_inverse=True)
-    balance = np.bincount(edge, np.where(tails < heads, 1, -1))
-    return np.flatnonzero(balance[edge] != 0)
+    table = edge_table(faces)
+    return np.flatnonzero(table.balance[table.face_edges.ravel()] != 0)
 
 
 def _points_on_edges(

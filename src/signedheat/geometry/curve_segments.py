@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +16,7 @@ from .directions import unit
 from .face_pairs import face_pairs
 from .intrinsic_mesh import IntrinsicMesh
 from .signed_graph import Links, signs_of
-from .surface_points import EDGE, VERTEX, LocatedPoints, incident_faces
+from .surface_points import EDGE, VERTEX, LocatedPoints, concatenated, incident_faces, unique_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,49 @@ class CurveSegments:
     def is_conforming(self) -> bool:
         """Whether the triangles can represent it as they are: all but unoriented curves that cross faces."""
         return self.oriented or bool((self.nodes.kinds[self.ends] == VERTEX).all() and (self.edges >= 0).all())
+
+
+@dataclass(frozen=True, eq=False)
+class MergedSources:
+    """The segments of several sources in one list, with points that coincide counted once."""
+
+    nodes: LocatedPoints
+    ends: NDArray[np.int64]
+    faces: NDArray[np.int64]
+    edges: NDArray[np.int64]
+    vectors: NDArray[np.complex128]
+    owners: NDArray[np.int64]
+    samples: list[NDArray[np.int64]]
+
+    @classmethod
+    def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
+        """Merge sources; `samples` has the nodes of each."""
+        located = concatenated([p.nodes for p in parts])
+        first, who = unique_points(located)
+        offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
+        return cls(
+            located[first],
+            np.concatenate([who[p.ends + o] for p, o in zip(parts, offsets, strict=False)]),
+            np.concatenate([p.faces for p in parts]),
+            np.concatenate([p.edges for p in parts]),
+            np.concatenate([p.vectors for p in parts]),
+            np.repeat(np.arange(len(parts)), [len(p.ends) for p in parts]),
+            [who[a:b] for a, b in pairwise(offsets)],
+        )
+
+    def parts(self, oriented: Sequence[bool]) -> list[CurveSegments]:
+        """The sources, each by itself again."""
+        order = np.argsort(self.owners, kind="stable")
+        bounds = np.searchsorted(self.owners[order], np.arange(len(oriented) + 1))
+        each = zip(pairwise(bounds), self.samples, oriented, strict=True)
+        return [self._part(order[begin:end], old, has_sides) for (begin, end), old, has_sides in each]
+
+    def _part(self, mine: NDArray[np.int64], old: NDArray[np.int64], oriented: bool) -> CurveSegments:
+        """The source that has some of the pieces; its old nodes come first."""
+        nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
+        known, first = np.unique(nodes, return_index=True)
+        ends = first[np.searchsorted(known, self.ends[mine])]
+        return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
 
 
 def given_directions(

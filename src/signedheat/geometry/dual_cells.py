@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
+from .components import connected_components
 
 AROUND = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 """β and γ of an edge in the four cells around it, counter-clockwise as seen from the end of the edge."""
@@ -122,7 +122,7 @@ def dual_cells(
     """
     places, edges, rows, sides = cells_around(nodes, axes, shape)
     ways = np.zeros((len(places), 6), dtype=np.bool_)
-    labels = _pieces(edges, ways)
+    pieces = _pieces(edges, ways)
     crossed = _crossed_faces(edges)
     cells, faces = np.nonzero(crossed == 4)
     if len(cells):
@@ -136,15 +136,15 @@ def dual_cells(
         way = inside(middles) == corner[order[:, 0]]
         while True:
             ways[cells[order], faces[order]] = way[:, None]
-            labels = _pieces(edges, ways)
-            around = labels[cells[:, None], _face_edges(faces)]
+            pieces = _pieces(edges, ways)
+            around = pieces[cells[:, None], _face_edges(faces)]
             one = (around == around[:, :1]).all(axis=1)[order].all(axis=1)
             if not one.any():
                 break
             way[one] ^= True
-    starts = np.concatenate([[0], np.cumsum(labels.max(axis=1) + 1)])
-    pieces = np.where(labels >= 0, labels + starts[:-1, None], -1)
-    owners = np.repeat(np.arange(len(places)), np.diff(starts))
+    owners = np.empty(int(pieces.max(initial=-1)) + 1, dtype=np.int64)
+    at, side = np.nonzero(edges >= 0)
+    owners[pieces[at, side]] = at
     return DualCells(places, edges, pieces, owners, pieces[rows, sides])
 
 
@@ -167,44 +167,21 @@ def _crossed_faces(edges: NDArray[np.int64]) -> NDArray[np.int64]:
     return crossed
 
 
-@compiled
 def _pieces(edges: NDArray[np.int64], ways: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(c, 12) number of the piece in its cell to which each crossed edge belongs; −1 for others.
+    """(c, 12) number of the piece to which each crossed edge of each cell belongs, cell after cell; −1 for others.
 
     Of a face with four crossed edges, numbered around it from the first corner, way 0 links the first with the last and
     the second with the third; way 1 the first two and the last two.
     """
+    crossed, around = edges >= 0, _face_edges(np.arange(6))
+    of_faces = crossed[:, around]
+    cells, faces, one = np.nonzero(of_faces)
+    way = np.where(ways[cells, faces], one ^ 1, 3 - one)
+    other = np.where(of_faces[cells, faces].all(axis=1), way, of_faces[cells, faces].argmax(axis=1))
+    numbers = np.cumsum(crossed).reshape(edges.shape) - 1
+    links = (numbers[cells, around[faces, each]] for each in (one, other))
     result = np.full(edges.shape, -1, dtype=np.int64)
-    around, names = np.empty(4, dtype=np.int64), np.empty(12, dtype=np.int64)
-    for i in range(len(edges)):
-        labels = result[i]
-        for k in range(12):
-            if edges[i, k] >= 0:
-                labels[k] = k
-        for face in range(6):
-            axis, side = face // 2, face % 2
-            b, c = 4 * ((axis + 1) % 3), 4 * ((axis + 2) % 3) + 2 * side
-            around[0], around[1], around[2], around[3] = b + side, c + 1, b + 2 + side, c
-            first, crossed = -1, 0
-            for k in range(4):
-                if edges[i, around[k]] >= 0:
-                    first = around[k] if first < 0 else first
-                    crossed += 1
-            for k in range(4):
-                if edges[i, around[k]] < 0:
-                    continue
-                other = first if crossed < 4 else around[k ^ 1] if ways[i, face] else around[3 - k]
-                low, high = min(labels[around[k]], labels[other]), max(labels[around[k]], labels[other])
-                for m in range(12):
-                    if labels[m] == high:
-                        labels[m] = low
-        count = 0
-        for k in range(12):
-            if labels[k] == k:
-                names[k] = count
-                count += 1
-            if labels[k] >= 0:
-                labels[k] = names[labels[k]]
+    result[crossed] = connected_components(int(crossed.sum()), *links)
     return result
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .box_tree import morton_codes
-from .components import by_first_use, connected_components, grouped
+from .components import by_first_use, connected_components, grouped, sums_of
 from .directions import unit
 from .edges import EdgeTable, edge_table
 from .nearest import triangle_rows
@@ -156,8 +156,8 @@ class FaceFeatures:
         cosines = np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)) / -products
         angles = np.arccos(np.clip(cosines, -1.0, 1.0)).ravel()
         thrice = np.repeat(face_normals, 3, axis=0)
-        edge_normals = _sums(table.face_edges.ravel(), thrice, len(table.vertices))
-        vertex_normals = _sums(faces.ravel(), angles[:, None] * thrice, len(vertices))
+        edge_normals = sums_of(thrice, table.face_edges.ravel(), len(table.vertices))
+        vertex_normals = sums_of(angles[:, None] * thrice, faces.ravel(), len(vertices))
 
         edge_regular = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
         mates = np.where(edge_regular[table.face_edges].ravel(), table.mates, -1)
@@ -201,8 +201,3 @@ def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
         copies[crowded] = True
         copies[crowded[first]] = False
     return copies
-
-
-def _sums(at: NDArray[np.integer], vectors: NDArray[np.float64], n: int) -> NDArray[np.float64]:
-    """(n, 3) sums of (k, 3) vectors at each of n places."""
-    return np.stack([np.bincount(at, column, n) for column in vectors.T], axis=1)

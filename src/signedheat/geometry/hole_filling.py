@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .components import connected_components, grouped, members_of
+from .components import grouped, members_of
 from .ear_clipping import cut_into_ears
 from .edges import edge_table
 
@@ -38,13 +38,14 @@ def hole_fillings(
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
     following = next_around_gap(points, normals, tails, heads)
-    linked = np.flatnonzero(following >= 0)
-    loops = connected_components(len(tails), linked, following[linked])
-    short = np.bincount(loops, minlength=1)[loops] <= MOST_SIDES if len(tails) else np.empty(0, dtype=bool)
-    known = {_pair(i, j) for i, j in edges.vertices[_touching(edges.vertices, tails[short])].tolist()}
+    at_boundary = np.zeros(len(points), dtype=bool)
+    at_boundary[tails] = True
+    known = {_pair(i, j) for i, j in edges.vertices[at_boundary[edges.vertices].all(axis=1)].tolist()}
     fillings: list[tuple[int, int, int]] = []
-    for first in np.unique(loops[short], return_index=True)[1]:
-        loop = _loop_from(int(np.flatnonzero(short)[first]), following)
+    passed = np.zeros(len(tails), dtype=bool)
+    for start in range(len(tails)):
+        loop = [] if passed[start] else _loop_from(start, following)
+        passed[loop] = True
         if loop:
             fillings += _ears(points, normals, tails[loop[::-1]].tolist(), known)
     return np.array(fillings, dtype=np.int64).reshape(-1, 3)
@@ -67,13 +68,6 @@ def next_around_gap(
     following = np.full(len(tails), -1, dtype=np.int64)
     following[arriving[order[::-1]]] = onward[order[::-1]]  # the first in order is written last
     return following
-
-
-def _touching(edges: NDArray[np.int64], vertices: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(e,) edges whose two ends are both among the vertices."""
-    marked = np.zeros(int(edges.max(initial=0)) + 1, dtype=bool)
-    marked[vertices] = True
-    return marked[edges].all(axis=1)
 
 
 def _loop_from(start: int, following: NDArray[np.int64]) -> list[int]:

@@ -8,7 +8,6 @@ result is a mesh with at most two faces at every edge.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,16 +15,16 @@ import scipy
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..parallel import n_threads
-from .components import connected_components
+from ..parallel import in_chunks
+from .components import connected_components, sums_of
 from .edges import edge_table
 from .hole_filling import hole_fillings
 from .signed_graph import Links, signs_of
+from .welding import distinct_rows
 
 GIVEN = 1.0
 """Weight of a given normal, beside that of a neighbour in the same plane, of which there are six."""
 _CHUNK = 65536
-_ROWS = 4096  # for a thread at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,14 +89,12 @@ def tangent_planes(
     """
     k = min(n_neighbors, len(points) - 1)
     tree = scipy.spatial.cKDTree(points)
-    axes = np.empty((len(points), 3, 3))
-    neighbors = np.empty((len(points), k), dtype=np.int64)
-    reach = np.empty(len(points))
-    for begin in range(0, len(points), _CHUNK):
-        chunk = slice(begin, begin + _CHUNK)
-        distances, near = tree.query(points[chunk], k=k + 1, workers=-1)
-        neighbors[chunk], reach[chunk] = near[:, 1:], distances[:, -1]
-        axes[chunk] = principal_axes(points[near] - points[chunk, None], distances)
+
+    def fitted(some: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+        distances, near = tree.query(some, k=k + 1)
+        return principal_axes(points[near] - some[:, None], distances), near[:, 1:], distances[:, -1]
+
+    axes, neighbors, reach = in_chunks(fitted, points)
     return axes, neighbors, reach
 
 
@@ -121,18 +118,15 @@ def proposed_triangles(
         x, y = (np.einsum("nki,ni->nk", offsets, axes[chunk, a]) for a in range(2))
         order = np.argsort(x * x + y * y, axis=1)
         x, y = np.take_along_axis(x, order, axis=1), np.take_along_axis(y, order, axis=1)
-        sides, counts = _fans(x, y, reach[chunk])
+        sides, counts = in_chunks(voronoi_fans, np.stack([x, y], axis=2) / reach[chunk, None, None])
         column = np.arange(sides.shape[1])
         following = np.where(column + 1 < counts[:, None], np.roll(sides, -1, axis=1), sides[:, :1])
         row, at = np.nonzero((column < counts[:, None]) & (sides >= 0) & (following >= 0))
         near = np.take_along_axis(neighbors[chunk], order, axis=1)
         triangles.append(np.stack([row + begin, near[row, sides[row, at]], near[row, following[row, at]]], axis=1))
     sorted_corners = np.sort(np.concatenate(triangles), axis=1)
-    order = np.lexsort(sorted_corners.T[::-1])
-    ranked = sorted_corners[order]
-    first = np.ones(len(ranked), dtype=bool)
-    first[1:] = (ranked[1:] != ranked[:-1]).any(axis=1)
-    return ranked[first], np.bincount(np.cumsum(first) - 1)
+    number, first = distinct_rows(sorted_corners)
+    return sorted_corners[first], np.bincount(number)
 
 
 def well_shaped_triangles(
@@ -196,7 +190,7 @@ def aligned(
         faces = facing(points, normals, faces)
         a, b, c = points[faces].transpose(1, 0, 2)
         size = np.bincount(parts)[:, None]
-        center = np.stack([np.bincount(parts, column) for column in points.T], axis=1) / size
+        center = sums_of(points, parts, len(size)) / size
         flux = (np.cross(b - a, c - a) * (a - center[parts[faces[:, 0]]])).sum(axis=1)
         preference = np.bincount(parts[faces[:, 0]], flux, int(parts.max()) + 1)
     return np.where(preference < 0, -1, 1)[parts] * signs
@@ -209,36 +203,22 @@ def facing(points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDA
     return np.where(against[:, None], faces[:, [0, 2, 1]], faces)
 
 
-def _fans(
-    x: NDArray[np.float64], y: NDArray[np.float64], reach: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """`voronoi_fans` of all rows, on all threads."""
-    rows = [slice(start, start + _ROWS) for start in range(0, len(x), _ROWS)]
-    with ThreadPoolExecutor(n_threads()) as pool:
-        parts = list(pool.map(lambda row: voronoi_fans(x[row], y[row], reach[row]), rows))
-    return np.concatenate([sides for sides, _ in parts]), np.concatenate([counts for _, counts in parts])
-
-
 MAX_SIDES = 64
 TOUCHING = 1e-7  # radians by which the sectors of two triangles at a corner may overlap
 
 
 @compiled
-def voronoi_fans(
-    x: NDArray[np.float64], y: NDArray[np.float64], reach: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def voronoi_fans(places: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Delaunay neighbours of the origin among the points of each row, counter-clockwise.
 
-    The Voronoi cell of the origin starts as a square and is cut by the bisectors of its neighbours, nearest first. Two
-    neighbours whose sides of the cell meet span a Delaunay triangle with the origin, and the corner between them is its
-    circumcentre: no circumradius exceeds the square's.
+    The Voronoi cell of the origin starts as a square, to ±1, and is cut by the bisectors of its neighbours, nearest
+    first. Two neighbours whose sides of the cell meet span a Delaunay triangle with the origin, and the corner between
+    them is its circumcentre: no circumradius exceeds the square's.
 
     Parameters
     ----------
-    x, y : (n, k) float
+    places : (n, k, 2) float
         Neighbours of each point in its own tangent plane, relative to the point, nearest first.
-    reach : (n,) float
-        Half the side of the square.
 
     Returns
     -------
@@ -247,7 +227,7 @@ def voronoi_fans(
     counts : (n,) int
         Number of sides.
     """
-    n, k = x.shape
+    n, k = places.shape[:2]
     neighbours = np.full((n, MAX_SIDES), -1, dtype=np.int64)
     counts = np.zeros(n, dtype=np.int64)
     for i in range(n):
@@ -255,14 +235,13 @@ def voronoi_fans(
         beyond = np.full(MAX_SIDES, -1, dtype=np.int64)
         new_corner = np.empty((MAX_SIDES, 2))
         new_beyond = np.empty(MAX_SIDES, dtype=np.int64)
-        r = reach[i]
-        corner[0, 0], corner[1, 0], corner[2, 0], corner[3, 0] = r, r, -r, -r
-        corner[0, 1], corner[1, 1], corner[2, 1], corner[3, 1] = -r, r, r, -r
-        m, farthest = 4, 2 * r * r
+        corner[0, 0], corner[1, 0], corner[2, 0], corner[3, 0] = 1.0, 1.0, -1.0, -1.0
+        corner[0, 1], corner[1, 1], corner[2, 1], corner[3, 1] = -1.0, 1.0, 1.0, -1.0
+        m, farthest = 4, 2.0
         for j in range(k):
-            px, py = x[i, j], y[i, j]
+            px, py = places[i, j]
             square = px * px + py * py
-            if square > 4 * farthest or square < 1e-24 * r * r:
+            if square > 4 * farthest or square < 1e-24:
                 continue
             half = 0.5 * square
             slack = 1e-9 * half  # a bisector that only touches a corner of the cell does not cut it

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import SourceError
 from .components import grouped, members_of
+from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 
 VERTEX, EDGE, FACE = 0, 1, 2
@@ -156,9 +157,31 @@ def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: 
     on_edge = kinds == EDGE
     rows, face = moved[on_edge], other[on_edge]
     side = (triangles.edges.face_edges[face] == elements[on_edge, None]).argmax(axis=1)
-    head = np.where(triangles.edges.forward[face, side], along[on_edge], 1 - along[on_edge])
-    weights[rows] = barycentric_on_sides(side, head)
+    weights[rows] = barycentric_on_edges(triangles.edges, face, side, along[on_edge])
     return weights
+
+
+def barycentric_on_edges(
+    edges: EdgeTable, faces: NDArray[np.int64], sides: NDArray[np.int64], along: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n, 3) barycentric coordinates, in faces, of points on a side of each at fractions along the edge there."""
+    return barycentric_on_sides(sides, np.where(edges.forward[faces, sides], along, 1 - along))
+
+
+def edges_between(
+    triangles: IntrinsicMesh, faces: NDArray[np.int64], starts: NDArray[np.float64], ends: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(n,) the edge along which a segment in a face runs, given by barycentric coordinates, or −1; and its side there.
+
+    Examples
+    --------
+    >>> one = IntrinsicMesh.from_lengths(np.array([[0, 1, 2]]), np.array([[4.0, 5.0, 3.0]]), 3)
+    >>> edges_between(one, np.array([0, 0]), np.eye(3)[[1, 1]], np.array([[0.0, 0.5, 0.5], [0.5, 0.2, 0.3]]))
+    (array([ 1, -1]), array([1, 1]))
+    """
+    empty = (starts == 0) & (ends == 0)
+    sides = (empty.argmax(axis=1) + 1) % 3
+    return np.where(empty.any(axis=1), triangles.edges.face_edges[faces, sides], -1), sides
 
 
 def barycentric_on_sides(sides: NDArray[np.int64], shares: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -173,6 +196,24 @@ def barycentric_on_sides(sides: NDArray[np.int64], shares: NDArray[np.float64]) 
     weights[row, sides] = 1 - shares
     weights[row, (sides + 1) % 3] = shares
     return weights
+
+
+def crossed_sides(above: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Faces that a level set crosses, and the (k, 2) sides at which it enters and leaves: what is above is to its left.
+
+    Parameters
+    ----------
+    above, chosen : (m, 3) bool, (m,) bool
+        Whether each corner of each face is above the level; faces that are looked at.
+
+    Examples
+    --------
+    >>> crossed_sides(np.array([[True, True, True], [False, True, False]]), np.array([True, True]))
+    (array([1]), array([[1, 0]]))
+    """
+    faces = np.flatnonzero(chosen & above.any(axis=1) & ~above.all(axis=1))
+    here, there = above[faces], np.roll(above[faces], -1, axis=1)
+    return faces, np.stack([(here & ~there).argmax(axis=1), (there & ~here).argmax(axis=1)], axis=1)
 
 
 def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints) -> NDArray[np.int64]:

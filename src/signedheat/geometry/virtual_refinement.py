@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .components import sums_of
 from .ear_clipping import cut_into_ears
 
 _SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its polygon's counts as turned over
@@ -78,7 +79,7 @@ def virtual_refinement(
     centers, weights = virtual_vertices(vertices, tails, heads, fan_of, len(fans))
 
     whole = area_vectors(vertices[tails], vertices[heads], centers[fan_of])
-    total = _sums(whole, fan_of, len(fans))
+    total = sums_of(whole, fan_of, len(fans))
     part = (whole * total[fan_of]).sum(axis=1)
     turned = np.zeros(len(fans), dtype=bool)
     turned[fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]]] = True
@@ -123,18 +124,18 @@ def virtual_vertices(
     equations for each polygon. Side k runs from vertex ``tails[k]`` to ``heads[k]`` of polygon ``polygons[k]``.
     """
     count = np.bincount(polygons, minlength=n_polygons)
-    mean = _sums(vertices[tails], polygons, n_polygons) / count[:, None]
+    mean = sums_of(vertices[tails], polygons, n_polygons) / count[:, None]
     a, b = vertices[tails] - mean[polygons], vertices[heads] - mean[polygons]
     side = b - a
-    normal_matrix = _sums(
+    normal_matrix = sums_of(
         (side * side).sum(axis=1)[:, None, None] * np.eye(3) - side[:, :, None] * side[:, None, :], polygons, n_polygons
     )
-    load = _sums(np.cross(side, np.cross(a, b)), polygons, n_polygons)
+    load = sums_of(np.cross(side, np.cross(a, b)), polygons, n_polygons)
     offset = _solve_symmetric(normal_matrix, load)
-    spread = _sums(a[:, :, None] * a[:, None, :], polygons, n_polygons)
+    spread = sums_of(a[:, :, None] * a[:, None, :], polygons, n_polygons)
     slope = _solve_symmetric(spread, offset)
     weights = 1.0 / count[polygons] + (a * slope[polygons]).sum(axis=1)
-    return mean + _sums(weights[:, None] * a, polygons, n_polygons), weights
+    return mean + sums_of(weights[:, None] * a, polygons, n_polygons), weights
 
 
 def area_vectors(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -157,13 +158,6 @@ def _without_repeats(
     before[offsets[:-1]] = corners[offsets[1:] - 1]
     differs = corners != before
     return corners[differs], polygons[differs]
-
-
-def _sums(values: NDArray[np.float64], groups: NDArray[np.int64], n_groups: int) -> NDArray[np.float64]:
-    """Sums over the rows of each group."""
-    flat = values.reshape(len(values), int(np.prod(values.shape[1:])))
-    columns = [np.bincount(groups, column, n_groups) for column in flat.T]
-    return np.stack(columns, axis=1).reshape(n_groups, *values.shape[1:])
 
 
 def _solve_symmetric(matrices: NDArray[np.float64], loads: NDArray[np.float64]) -> NDArray[np.float64]:

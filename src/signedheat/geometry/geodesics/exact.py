@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..intrinsic.conforming_refinement import FaceCutter, MergedSources, affected_elements, flip_new_faces
+from ..intrinsic.conforming_refinement import cut_along, flip_new_faces
 from ..intrinsic_mesh import IntrinsicMesh
 from .initial_windows import MADE, WANTED, Faces, Search
 from .propagation_kernels import ROUND, continue_search, start_search
@@ -222,10 +222,7 @@ def in_delaunay_triangles(
     parts = [as_curve(triangles, each) for each in placed]
     if any(part is None for part in parts):
         return None
-    finer, merged = triangles, MergedSources.of([part for part in parts if part is not None])
-    faces, edges = affected_elements(triangles, merged, [True] * len(parts))
-    if len(faces) or len(edges):
-        finer, merged, _ = FaceCutter(triangles, merged, faces, edges).assemble()
+    finer, merged, _, _ = cut_along(triangles, [part for part in parts if part is not None])
     flipped, merged = flip_new_faces(finer, merged, np.ones(finer.n_faces, dtype=bool))
     return flipped, [PlacedSegments.of(flipped, merged.parts([False] * len(parts)))]
 

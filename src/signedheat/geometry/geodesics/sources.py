@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..components import members_of
-from ..curve_segments import CurveSegments
+from ..curve_segments import CurveSegments, MergedSources
 from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import (
     EDGE,
@@ -23,8 +23,10 @@ from ..surface_points import (
     VERTEX,
     LocatedPoints,
     barycentric_in,
-    barycentric_on_sides,
+    barycentric_on_edges,
     concatenated,
+    crossed_sides,
+    edges_between,
     locate_points,
     unique_points,
 )
@@ -91,15 +93,9 @@ class PlacedSegments:
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> PlacedSegments:
         """Place the segments of curves that run as they like: across faces, along edges and through vertices."""
-        located = concatenated([part.nodes for part in parts])
-        first, who = unique_points(located)
-        offsets = np.cumsum([0] + [len(part.nodes) for part in parts[:-1]])
-        ends = who[np.concatenate([part.ends + offset for part, offset in zip(parts, offsets, strict=True)])]
-        faces, edges, vectors = (
-            np.concatenate([getattr(p, name) for p in parts]) for name in ("faces", "edges", "vectors")
-        )
-        oriented = np.concatenate([np.full(len(part.ends), part.oriented) for part in parts])
-        nodes = located[first]
+        merged = MergedSources.of(parts)
+        nodes, ends, faces, edges, vectors = merged.nodes, merged.ends, merged.faces, merged.edges, merged.vectors
+        oriented = np.array([part.oriented for part in parts])[merged.owners]
         placed = cls._inside(triangles, nodes, ends, faces, vectors, oriented, np.flatnonzero(edges < 0))
         beside = cls._beside(triangles, nodes, ends, edges, vectors, oriented, np.flatnonzero(edges >= 0))
         return cls(nodes, *(np.concatenate(both) for both in zip(placed, beside, strict=True)))
@@ -233,19 +229,13 @@ def zero_line(triangles: IntrinsicMesh, values: NDArray[np.float64], among: Mask
         Faces whose part of the zero set is wanted.
     """
     here = values[triangles.corner_vertices]
-    there = np.roll(here, -1, axis=1)
-    through = ((here < 0) & (there > 0)) | ((here > 0) & (there < 0))
-    faces = np.flatnonzero((through.sum(axis=1) == 2) & (True if among is None else among))
-    sides = np.stack([through[faces].argmax(axis=1), 2 - through[faces, ::-1].argmax(axis=1)], axis=1)
-    up = (here[faces, sides[:, 0]] < 0)[:, None]  # the first side goes up, so that the larger values are to the left
-    sides = np.where(up, sides[:, ::-1], sides)
+    faces, sides = crossed_sides(here > 0, ~np.isnan(here).any(axis=1) & (True if among is None else among))
     edges = triangles.edges.face_edges[faces[:, None], sides]
     used, first, ends = np.unique(edges, return_index=True, return_inverse=True)
     tail, head = values[triangles.edges.vertices[used]].T
     along = tail / (tail - head)
     at_face, at_side = faces[first // 2], sides.ravel()[first]
-    share = np.where(triangles.edges.forward[at_face, at_side], along, 1 - along)
-    weights = barycentric_on_sides(at_side, share)
+    weights = barycentric_on_edges(triangles.edges, at_face, at_side, along)
     ends = ends.reshape(-1, 2)
     flat = on_sides(triangles, np.repeat(faces, 2), sides.ravel(), along[ends].reshape(-1, 1))
     keep = np.flatnonzero(np.abs(np.diff(flat.reshape(-1, 2), axis=1)[:, 0]) > 0)
@@ -332,9 +322,7 @@ def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments 
     first, who = unique_points(located)
     joined = who[: 2 * len(faces)].reshape(2, -1).T
     steps = ((at[1] - at[0]) * corners).sum(axis=1)
-    empty = (at == 0).all(axis=0)
-    sides = triangles.edges.face_edges[faces, (empty.argmax(axis=1) + 1) % 3]
-    edges = np.where(empty.any(axis=1), sides, -1)
+    edges, _ = edges_between(triangles, faces, *at)
     normals = 1j * np.where(edges < 0, steps, np.abs(steps))  # in the layout of the face, or in the frame of the edge
     kept = (joined[:, 0] != joined[:, 1]) & (np.abs(steps) > 0)
     return CurveSegments(located[first], joined[kept], faces[kept], edges[kept], normals[kept], False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import breadth_first_order
 
 from ...errors import SourceError
 from ..constrained_triangulation import Triangulation, edges_of
-from ..curve_segments import CurveSegments
+from ..curve_segments import CurveSegments, MergedSources
 from ..edges import EdgeTable
 from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import (
@@ -23,10 +23,8 @@ from ..surface_points import (
     FACE,
     VERTEX,
     LocatedPoints,
-    barycentric_on_sides,
-    concatenated,
+    barycentric_on_edges,
     points_at_vertices,
-    unique_points,
 )
 from .delaunay import flip_all, glue, lay_out
 
@@ -56,54 +54,31 @@ def refine_to_conform(
     parts = [part for group in groups for part in group]
     if all(part.is_conforming for part in parts):
         return triangles, [list(group) for group in groups]
-    everything = MergedSources.of(parts)
-    cut_faces, split_edges = affected_elements(triangles, everything, [not part.is_conforming for part in parts])
-    finer, moved = flip_new_faces(*FaceCutter(triangles, everything, cut_faces, split_edges).assemble())
+    finer, moved, is_new, _ = cut_along(triangles, parts, [not part.is_conforming for part in parts])
+    finer, moved = flip_new_faces(finer, moved, is_new)
     pieces = iter(moved.parts([part.oriented for part in parts]))
     return finer, [[next(pieces) for _ in group] for group in groups]
 
 
-@dataclass(frozen=True, eq=False)
-class MergedSources:
-    """The segments of several sources in one list, with points that coincide counted once."""
+def cut_along(
+    triangles: IntrinsicMesh, parts: Sequence[CurveSegments], unfit: Sequence[bool] | None = None
+) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
+    """Cut faces along the segments of sources that are unfit, all by default, and of those that these entail.
 
-    nodes: LocatedPoints
-    ends: NDArray[np.int64]
-    faces: NDArray[np.int64]
-    edges: NDArray[np.int64]
-    vectors: NDArray[np.complex128]
-    owners: NDArray[np.int64]
-    samples: list[NDArray[np.int64]]
-
-    @classmethod
-    def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
-        """Merge sources; `samples` has the nodes of each."""
-        located = concatenated([p.nodes for p in parts])
-        first, who = unique_points(located)
-        offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
-        return cls(
-            located[first],
-            np.concatenate([who[p.ends + o] for p, o in zip(parts, offsets, strict=False)]),
-            np.concatenate([p.faces for p in parts]),
-            np.concatenate([p.edges for p in parts]),
-            np.concatenate([p.vectors for p in parts]),
-            np.repeat(np.arange(len(parts)), [len(p.ends) for p in parts]),
-            [who[a:b] for a, b in pairwise(offsets)],
-        )
-
-    def parts(self, oriented: Sequence[bool]) -> list[CurveSegments]:
-        """The sources, each by itself again."""
-        order = np.argsort(self.owners, kind="stable")
-        bounds = np.searchsorted(self.owners[order], np.arange(len(oriented) + 1))
-        each = zip(pairwise(bounds), self.samples, oriented, strict=True)
-        return [self._part(order[begin:end], old, has_sides) for (begin, end), old, has_sides in each]
-
-    def _part(self, mine: NDArray[np.int64], old: NDArray[np.int64], oriented: bool) -> CurveSegments:
-        """The source that has some of the pieces; its old nodes come first."""
-        nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
-        known, first = np.unique(nodes, return_index=True)
-        ends = first[np.searchsorted(known, self.ends[mine])]
-        return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
+    Returns
+    -------
+    triangles : IntrinsicMesh
+        After the cuts; the same where there are none.
+    merged : MergedSources
+        The sources on them.
+    is_new, parents : (m,) bool, (m,) int
+        Faces that are parts of others, and the face before the cuts that each is part of.
+    """
+    merged = MergedSources.of(parts)
+    faces, edges = affected_elements(triangles, merged, [True] * len(parts) if unfit is None else unfit)
+    if not len(faces) and not len(edges):
+        return triangles, merged, np.zeros(triangles.n_faces, dtype=bool), np.arange(triangles.n_faces)
+    return FaceCutter(triangles, merged, faces, edges).assemble()
 
 
 def affected_elements(
@@ -275,11 +250,11 @@ class FaceCutter:
                     NewSegment(*ends_here, -1, edge, np.conj(vector) if over else vector, merged.owners[p])
                 )
 
-    def assemble(self) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_]]:
-        """The triangles after all cuts, the sources on them, and which faces are new."""
+    def assemble(self) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
+        """What `cut_along` returns."""
         triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
-        parents = np.concatenate([kept, [f.parent for f in self.faces]])
+        parents = np.concatenate([kept, [f.parent for f in self.faces]]).astype(np.int64)
         order = np.argsort(
             parents, kind="stable"
         )  # the first face of an edge remains, or one of its parts takes its place
@@ -320,7 +295,8 @@ class FaceCutter:
         faces[on_edge] = finer.first_halfedges[edges[on_edge]] // 3
         vectors = np.array([p.vector for p in self.pieces], dtype=np.complex128)
         owners = np.array([p.owner for p in self.pieces], dtype=np.int64)
-        return finer, MergedSources(nodes, ends, faces, edges, vectors, owners, merged.samples), is_new
+        moved = MergedSources(nodes, ends, faces, edges, vectors, owners, merged.samples)
+        return finer, moved, is_new, parents[order]
 
 
 class NewFace(NamedTuple):
@@ -357,8 +333,7 @@ def points_on_elements(
     vertices = points_at_vertices(triangles, elements[at_vertex])
     faces[at_vertex], weights[at_vertex] = vertices.faces, vertices.barycentric
     faces[on_edge], side = np.divmod(triangles.first_halfedges[elements[on_edge]], 3)
-    ahead = triangles.edges.forward[faces[on_edge], side]
-    weights[on_edge] = barycentric_on_sides(side, np.where(ahead, along[on_edge], 1 - along[on_edge]))
+    weights[on_edge] = barycentric_on_edges(triangles.edges, faces[on_edge], side, along[on_edge])
     return LocatedPoints(faces, weights, kinds, elements, np.where(kinds == EDGE, along, 0.0))
 
 

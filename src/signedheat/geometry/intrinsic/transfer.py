@@ -16,8 +16,17 @@ from ..geodesics.exact import cleared
 from ..geodesics.sources import zero_line
 from ..intrinsic_mesh import FLATTEST, IntrinsicMesh
 from ..polylines import assemble_polylines
-from ..surface_points import SNAP, LocatedPoints, barycentric_in, concatenated, contain, locate_points, unique_points
-from .conforming_refinement import FaceCutter, MergedSources, affected_elements
+from ..surface_points import (
+    SNAP,
+    LocatedPoints,
+    barycentric_in,
+    concatenated,
+    contain,
+    edges_between,
+    locate_points,
+    unique_points,
+)
+from .conforming_refinement import cut_along
 from .history import History, straight_lines, turned_lines
 
 
@@ -45,22 +54,13 @@ class ConformingRefinement(Frozen):
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> ConformingRefinement:
         """Cut faces along all segments inside them, and put vertices at all points of the sources."""
-        finer, parents = triangles, np.arange(triangles.n_faces)
-        corners = np.broadcast_to(np.eye(3), (triangles.n_faces, 3, 3))
-        marked = np.zeros(triangles.n_edges, dtype=bool)
         if not parts:
-            return cls(triangles, marked, parents, corners)
-        merged = MergedSources.of(parts)
-        faces, edges = affected_elements(triangles, merged, [True] * len(parts))
-        if len(faces) or len(edges):
-            cut = FaceCutter(triangles, merged, faces, edges)
-            finer, merged, is_new = cut.assemble()
-            kept = np.setdiff1d(parents, cut.cut_faces)
-            parents = np.sort(np.concatenate([kept, [f.parent for f in cut.faces]])).astype(np.int64)
-            corners = np.where(is_new[:, None, None], 0.0, np.eye(3))
-            new = np.flatnonzero(is_new)
-            corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
-            marked = np.zeros(finer.n_edges, dtype=bool)
+            corners = np.broadcast_to(np.eye(3), (triangles.n_faces, 3, 3))
+            return cls(triangles, np.zeros(triangles.n_edges, dtype=bool), np.arange(triangles.n_faces), corners)
+        finer, merged, is_new, parents = cut_along(triangles, parts)
+        corners, new = np.where(is_new[:, None, None], 0.0, np.eye(3)), np.flatnonzero(is_new)
+        corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
+        marked = np.zeros(finer.n_edges, dtype=bool)
         marked[merged.edges[merged.edges >= 0]] = True
         return cls(finer, marked, parents, corners)
 
@@ -149,9 +149,7 @@ def transfer_segments(
     turn = (directions / (at_piece * np.abs(directions / at_piece)))[owners]
     grown = steps * np.where(carried.imag * turn.imag < 0, np.conj(turn), turn)
     begin, finish = (barycentric_in(after, faces, located[end]) for end in joined.T)
-    off = (begin == 0) & (finish == 0)
-    side = (off.argmax(axis=1) + 1) % 3
-    on_edge = off.any(axis=1)
+    edges, side = edges_between(after, faces, begin, finish)
     used = np.union1d(np.arange(len(nodes)), joined)
     place = np.searchsorted(used, joined)
     chosen, who = unique_points(located[used])
@@ -159,8 +157,8 @@ def transfer_segments(
         located[used][chosen],
         who[place],
         faces,
-        np.where(on_edge, after.edges.face_edges[faces, side], -1),
-        np.where(on_edge, after.in_edge_frames(grown, faces, side), grown),
+        edges,
+        np.where(edges >= 0, after.in_edge_frames(grown, faces, side), grown),
         source.oriented,
     )
 
