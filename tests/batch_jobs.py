@@ -30,4 +30,4 @@ def measure(path: Path, stem: Path) -> dict[str, object]:
         path.with_suffix(".fed").touch()
         os.kill(os.getpid(), signal.SIGKILL)
     Path(f"{stem}.txt").write_text(path.read_text())
-    return {"length": len(path.read_text()), "told": ["this is known"]}
+    return {"length": len(path.read_text()), "notes": ["this is known"]}

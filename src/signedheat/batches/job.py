@@ -16,7 +16,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, SignedHeatError
 from ..fields.grid_field import GridField
 from ..io.fields import BAND_FORMATS
-from ..io.figures import describe, shape_figures, told
+from ..io.figures import describe, shape_figures
 from ..io.files import told_apart
 from ..io.shapes import read, save
 from ..lowering.area_elements import bounds_around
@@ -140,7 +140,7 @@ class Job:
                     )
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
-        """Make it of one shape: files that begin with `stem`. Returns figures, with what to know under "told"."""
+        """Make it of one shape: files that begin with `stem`. Returns figures, and important notes under "notes"."""
         shape = read(path)
         figures: dict[str, object] = {"info": shape_figures(shape)} if self.info else {}
         if not self._measures:
@@ -151,7 +151,7 @@ class Job:
         padding = room_around(bounds, max(map(abs, self.offsets), default=0.0))
         padding = padding if self.padding is None else self.padding
         phi = self._distance(shape, Grid.around(bounds, self.resolution, padding, self.spacing))
-        figures |= {"told": told(phi), "field": describe(phi)}
+        figures |= {"notes": [str(note) for note in phi.diagnostics.important], "field": describe(phi)}
         if self.volume is not None:
             phi.save(f"{stem}{self.volume}")
         surfaces = []

@@ -66,13 +66,13 @@ class Watertight:
             positive_number(self.thickness, "thickness")
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
-        """Make it of one shape, in a file that begins with `stem`; figures, with what to know under "told"."""
+        """Make it of one shape, in a file that begins with `stem`; figures, and all notes under "notes"."""
         shape = read(path)
         solid = complete(shape.squares if isinstance(shape, DigitalSurface) else shape)
         surface, way = self.closed(solid)
         save(surface, f"{stem}{self.surfaces}")
         notes = [str(note) for note in solid.diagnostics.notes]
-        return {"way": way, **figures_of(surface, solid, 0.5 * (self.thickness or 0.0)), "told": notes}
+        return {"way": way, **figures_of(surface, solid, 0.5 * (self.thickness or 0.0)), "notes": notes}
 
     def closed(self, solid: Solid) -> tuple[TriangleMesh, str]:
         """The surface, and how it was made.

@@ -64,7 +64,7 @@ class Task:
                 figures = dict(self.job(self.shape.path.absolute(), self.scratch / target.name))
                 outputs = [(Path(self.shape.name).parent / name).as_posix() for name in self._move_to(target.parent)]
                 said = [str(each.message) for each in caught if issubclass(each.category, UserWarning)]
-                message = "; ".join(map(str, [*figures.pop("told", []), *dict.fromkeys(said)]))
+                message = "; ".join(map(str, [*figures.pop("notes", []), *dict.fromkeys(said)]))
                 state = "done"
             except MemoryError:
                 message, is_starved = "there was not enough memory", True

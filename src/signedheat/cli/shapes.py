@@ -40,7 +40,6 @@ from ..io import (
 )
 from ..io.fields import VALUE_FORMATS, save_with_values
 from ..io.figures import describe as describe
-from ..io.figures import told
 from ..io.files import contents, extension, told_apart
 from ..io.images import CONFIDENCE, NIFTI
 from ..io.scenes import METRES, unit_of
@@ -202,8 +201,8 @@ def compute(shape: Any, domain: Grid | TetMesh, arguments: Namespace) -> GridFie
         else:
             field = distance_to_shapes(shape, domain, **options, **repair, progress=progress)
     if not arguments.quiet:
-        for line in told(field):
-            say(f"signedheat: {line}")
+        for note in field.diagnostics.important:
+            say(f"signedheat: {note}")
     return field
 
 

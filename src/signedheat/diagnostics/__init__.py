@@ -99,6 +99,11 @@ class Diagnostics(ShortRepr):
     unreached: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     notes: tuple[Note, ...] = ()
 
+    @property
+    def important(self) -> list[Note]:
+        """Notes to read before the result is trusted."""
+        return [note for note in self.notes if note.important]
+
     def note(self, kind: type[AnyNote]) -> AnyNote | None:
         """The note of a given type, or None."""
         return next((note for note in self.notes if isinstance(note, kind)), None)

@@ -14,6 +14,11 @@ from ..reprs import ShortRepr
 class Note(Frozen, ShortRepr):
     """A note on a computation; ``str(note)`` is its text."""
 
+    @property
+    def important(self) -> bool:
+        """Whether it should be read before the result is trusted: commands print it."""
+        return False
+
     def as_dict(self) -> dict[str, object]:
         """The values of the note by name, ready for JSON."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}

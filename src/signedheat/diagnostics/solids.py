@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from .note import Note
 
+SMALL = 0.005
+"""Fraction of the surface that may be completed, or bound nothing, without being important."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SampledSource(Note):
@@ -51,6 +54,10 @@ class ShapeOriented(Note):
     nested_bodies: int
     cavities: int
 
+    @property
+    def important(self) -> bool:
+        return self.turned_faces > 0 or self.merged_faces > 0
+
     def __str__(self) -> str:
         texts = [
             (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.1%} of the area"),
@@ -70,6 +77,10 @@ class OrientedPoints(Note):
 
     normals_fitted: int
     normals_turned: int
+
+    @property
+    def important(self) -> bool:
+        return self.normals_fitted > 0 or self.normals_turned > 0
 
     def __str__(self) -> str:
         return f"{self.normals_fitted} normals fitted, {self.normals_turned} turned"
@@ -99,6 +110,10 @@ class LeftOut(Note):
     merged_faces: int = 0
     doubled_walls: int = 0
 
+    @property
+    def important(self) -> bool:
+        return self.covered_faces > 0
+
     def __str__(self) -> str:
         return (
             f"left out: {self.covered_faces} faces, {self.covered_area:.1%} of the area, that lie inside other bodies "
@@ -112,6 +127,10 @@ class FacesRestored(Note):
 
     restored_faces: int
     restored_area: float
+
+    @property
+    def important(self) -> bool:
+        return True
 
     def __str__(self) -> str:
         return f"lost faces restored: {self.restored_faces}, {self.restored_area:.1%} of the area"
@@ -145,6 +164,10 @@ class CompletedArea(Note):
     completed_share: float
     where: NDArray[np.float64]
 
+    @property
+    def important(self) -> bool:
+        return self.completed_share > SMALL
+
     def __str__(self) -> str:
         text = f"{self.completed_share:.1%} of the surface is completed"
         if not len(self.where):
@@ -158,6 +181,10 @@ class BoundsNothing(Note):
     """Fraction of the area that has the same side on both sides: distance to it is positive all around."""
 
     open_area: float
+
+    @property
+    def important(self) -> bool:
+        return self.open_area > SMALL
 
     def __str__(self) -> str:
         return f"{self.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"

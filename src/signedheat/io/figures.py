@@ -1,4 +1,4 @@
-"""Key figures of fields and shapes, ready for JSON, and what to know before trusting them."""
+"""Key figures of fields and shapes, ready for JSON."""
 
 from __future__ import annotations
 
@@ -8,46 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from ..diagnostics import (
-    BoundsNothing,
-    CompletedArea,
-    FacesRestored,
-    LeftOut,
-    OrientedPoints,
-    SampledSource,
-    ShapeOriented,
-)
+from ..diagnostics import SampledSource
 from ..domains.digital_surface import DigitalSurface
 from ..domains.inspection import inspect
 from ..domains.kinds import Shape
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..fields.grid_field import GridField
-from ..fields.tet_field import TetField
 from ..orientation.meshes import orientation
 from ..solids.thickness import thickness
-
-TOLD = 0.005
-"""Fraction of the surface that may be completed, or bound nothing, without a word."""
-
-
-def told(field: GridField | TetField) -> list[str]:
-    """What to know about a field before trusting it, a line for each thing."""
-    lines = []
-    for note in field.diagnostics.notes:
-        if isinstance(note, ShapeOriented) and (note.turned_faces or note.merged_faces):
-            lines.append(str(note))
-        elif isinstance(note, OrientedPoints) and (note.normals_fitted or note.normals_turned):
-            lines.append(str(note))
-        elif isinstance(note, FacesRestored):
-            lines.append(str(note))
-        elif isinstance(note, LeftOut) and note.covered_faces:
-            lines.append(str(note))
-        elif isinstance(note, CompletedArea) and note.completed_share > TOLD:
-            lines.append(str(note))
-        elif isinstance(note, BoundsNothing) and note.open_area > TOLD:
-            lines.append(str(note))
-    return lines
 
 
 def describe(field: Any) -> dict[str, Any]:
