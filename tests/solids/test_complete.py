@@ -166,6 +166,42 @@ def test_patches_whose_rims_run_beside_each_other_are_one_body(gone):
     assert np.abs(solid.distance(points) - (radii - 1)).max() < 0.012  # chords of the coarsest patch are off by .01
 
 
+def shell(inner, height):
+    """A ball cut off at a height, and a smaller one in it as a cavity; no wall between their rims."""
+    ball = samples.sphere(4)
+    sides = []
+    for radius in (1.0, inner):
+        vertices = radius * ball.vertices
+        faces = ball.faces[vertices[ball.faces][:, :, 2].max(axis=1) < height]
+        sides.append((vertices, faces if radius == 1 else faces[:, ::-1]))
+    return joined(*sides)
+
+
+@pytest.mark.parametrize("inner", [0.85, 0.9, 0.97, 0.995])
+def test_the_lip_of_a_bowl_closes_between_its_rims(inner):
+    solid = sh.complete(shell(inner, 0.05))
+    assert 0.9 < volume(solid) / (2 / 3 * np.pi * (1 - inner**3)) < 1.1
+    assert not solid.inside([[0.0, 0.0, -0.5], [0.0, 0.0, 0.3]]).any()
+
+
+@pytest.mark.parametrize(("inner", "height"), [(0.6, 0.97), (0.95, 0.95), (0.95, 0.8)])
+def test_a_hole_through_a_wall_closes_on_both_sides(inner, height):
+    solid = sh.complete(shell(inner, height))
+    assert solid.inside([[0.0, 0.0, 0.5 + inner / 2], [0.0, 0.0, -0.5 - inner / 2]]).all()
+    assert not solid.inside([[0.0, 0.0, 0.0]])[0]
+
+
+@pytest.mark.parametrize("thickness", [0.05, 0.005])
+def test_two_sides_of_a_plate_are_joined_around_it(thickness):
+    top = grid_sheet((0, 0, 0), (1, 0, 0), (0, 1, 0), 9)
+    bottom = grid_sheet((0, 0, -thickness), (0, 1, 0), (1, 0, 0), 7)  # with other vertices
+    for sides in ((top, bottom), (bottom, top)):
+        solid = sh.complete(joined(*sides))
+        np.testing.assert_allclose(volume(solid), thickness, rtol=1e-9)
+    sheets = sh.complete(joined(top, grid_sheet((0, 0, -thickness), (1, 0, 0), (0, 1, 0), 7)), as_oriented=True)
+    assert not sheets.inside([[0.5, 0.5, -thickness / 2]])[0]
+
+
 def test_boxes_that_touch_along_an_edge_where_each_lacks_a_side_stay_solid():
     """The wall that stands on the board looks like a fold of its upper side."""
     board, wall = box((2.0, 1.0, 0.2), without=(0,)), box((0.2, 1.0, 1.5), (0.0, 0.0, 0.2), without=(4,))

@@ -33,6 +33,7 @@ from .joining import Shape, joined_shape
 from .loose import bound_together, clusters_of, scatter_of, without_copies
 from .lost_faces import lost_faces
 from .solid import Solid
+from .walls import wall_ends
 from .winding import Windings
 
 STEPS = 2
@@ -206,6 +207,7 @@ def completed(mesh: TriangleMesh, completion: Literal["lids", "heat"], keep_over
     if completion == "heat":
         return united(_by_heat(given, method), keep_overlaps)
     lost = lost_faces(vertices, given.ids)
+    lost = np.concatenate([lost, wall_ends(vertices, np.concatenate([given.ids, lost]))])
     surfaces = _by_lids(given, lost, vertices, method)
     restored = float(parts.face_areas(vertices[lost]).sum() / parts.face_areas(given.triangles).sum())
     notes = [FacesRestored(len(lost), restored / (1 + restored))] if len(lost) else []
