@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..geometry.surfels import Surfels, boundary_surfels, corrected_normals
 from ..operators.surfel_smoothing import smoothed_corners
-from .display import Displayed
+from .exchange import Displayed
 from .polygon_mesh import PolygonMesh
 from .surface import Surface
 from .triangle_mesh import TriangleMesh

@@ -15,7 +15,7 @@ from ..errors import GeometryError, MemoryLimitError
 from ..frozen import Frozen
 from ..packages import lazy_module
 from ..reprs import short
-from .display import Displayed
+from .exchange import Displayed
 from .foreign import ForeignShape, Shape, as_shapes
 from .polyline import Polyline
 from .validation import (

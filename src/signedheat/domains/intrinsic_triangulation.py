@@ -27,7 +27,7 @@ from ..geometry.intrinsic.transfer import ConformingRefinement, level_lines, tra
 from ..geometry.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
 from ..progress import Progress, Stopwatch
 from .curves import Curve, CurveOrPoints, CurvesAndPoints
-from .display import Displayed
+from .exchange import Displayed
 from .foreign import ForeignShape, converted
 from .level_sets import is_consistent, level_set, without_repeats
 from .segments import segments_of, segments_of_each

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import GeometryError
 from ..geometry.local_triangulations import LocalTriangulations, local_triangulations
 from ..geometry.welding import same_rows
-from .exchange import Exchangeable
+from .exchange import Elements, Exchangeable
 from .surface import Surface
 from .triangle_mesh import TriangleMesh
 from .validation import coordinates, finite_rows, frozen, numbers, whole_number
@@ -61,6 +61,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     normals: NDArray[np.float64] | None
     areas: NDArray[np.float64] | None
     n_neighbors: int
+    _has_faces = False
 
     def __init__(
         self,
@@ -98,6 +99,14 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         object.__setattr__(self, "normals", directions)
         object.__setattr__(self, "areas", sizes)
         object.__setattr__(self, "n_neighbors", int(n_neighbors))
+
+    @classmethod
+    def _of(cls, elements: Elements) -> PointCloud:
+        return cls(elements.points, elements.normals)
+
+    @property
+    def _elements(self) -> Elements:
+        return Elements(self.points, normals=self.normals)
 
     @property
     def n_points(self) -> int:

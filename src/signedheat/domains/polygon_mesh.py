@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.virtual_refinement import VirtualRefinement, virtual_refinement
-from .exchange import Exchangeable
+from .exchange import Elements, Exchangeable
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
 from .validation import array_of, coordinates, frozen, used_bounds, whole_numbers
@@ -84,6 +84,14 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         object.__setattr__(self, "vertices", positions)
         object.__setattr__(self, "corners", frozen(corners))
         object.__setattr__(self, "offsets", frozen(offsets))
+
+    @classmethod
+    def _of(cls, elements: Elements) -> PolygonMesh:
+        return cls(elements.points, elements.faces)
+
+    @property
+    def _elements(self) -> Elements:
+        return Elements(self.vertices, self.corners, np.diff(self.offsets))
 
     @property
     def n_vertices(self) -> int:

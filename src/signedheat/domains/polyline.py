@@ -13,7 +13,7 @@ from ..errors import GeometryError
 from ..frozen import Frozen
 from ..geometry.marching import level_lines
 from ..packages import lazy_module
-from .display import Displayed
+from .exchange import Displayed
 from .validation import boolean, coordinates, flag, numbers, positive_steps
 
 if TYPE_CHECKING:

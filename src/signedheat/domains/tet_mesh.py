@@ -18,8 +18,7 @@ from ..geometry.components import element_components
 from ..geometry.tet_faces import FaceTable, face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
 from ..packages import lazy_module
-from .display import Displayed
-from .exchange import save_shape
+from .exchange import Displayed, save_shape, tets_of_meshio, tets_of_pyvista
 from .triangle_mesh import TriangleMesh
 from .validation import coordinates, element_ids, frozen, used_bounds
 
@@ -149,17 +148,7 @@ class TetMesh(Displayed, Frozen):
         GeometryError
             If it has no tets, or tets of other than four corners.
         """
-        blocks = [block.data for block in mesh.cells if block.type == "tetra"]
-        if not blocks:
-            kinds = sorted({block.type for block in mesh.cells}) or ["no cells"]
-            raise GeometryError(
-                f"the mesh holds no tets, but {', '.join(kinds)}",
-                remedy="convert it to tetrahedra first",
-            )
-        for block in blocks:
-            if block.ndim != 2 or block.shape[1] != 4:
-                raise GeometryError(f"tets are rows of four vertices, not an array of {block.shape}", element="tets")
-        return cls(mesh.points, np.concatenate(blocks))
+        return cls(mesh.points, tets_of_meshio(mesh))
 
     def to_meshio(self, point_data: Mapping[str, NDArray[np.float64]] | None = None) -> meshio.Mesh:
         """As a `meshio.Mesh`, with `point_data`, arrays at the vertices by name."""
@@ -168,13 +157,7 @@ class TetMesh(Displayed, Frozen):
     @classmethod
     def from_pyvista(cls, grid: pyvista.UnstructuredGrid) -> TetMesh:
         """From the tets of a `pyvista.UnstructuredGrid`; cells of other kinds are ignored."""
-        cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
-        if 10 not in cells:  # VTK_TETRA
-            raise GeometryError(
-                f"the grid holds no tets among its {grid.n_cells} cells",
-                remedy="triangulate it first",
-            )
-        return cls(grid.points, np.asarray(cells[10], dtype=np.int64))
+        return cls(grid.points, tets_of_pyvista(grid))
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As a `pyvista.UnstructuredGrid`."""

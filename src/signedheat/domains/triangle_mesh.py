@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..geometry.edges import EdgeTable, edge_table
-from .exchange import Exchangeable
+from .exchange import Elements, Exchangeable
 from .surface import Surface
 from .validation import coordinates, element_ids, used_bounds
 
@@ -48,6 +48,14 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         positions = coordinates(vertices, "vertices", 3)
         object.__setattr__(self, "vertices", positions)
         object.__setattr__(self, "faces", element_ids(faces, "faces", 3, len(positions)))
+
+    @classmethod
+    def _of(cls, elements: Elements) -> TriangleMesh:
+        return cls(elements.points, elements.triangles)
+
+    @property
+    def _elements(self) -> Elements:
+        return Elements.of_triangles(self.vertices, self.faces)
 
     @property
     def n_vertices(self) -> int:

@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
-from ..domains.display import Displayed, with_values
+from ..domains.exchange import Displayed, with_values
 from ..domains.grid import Dimension, Grid
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..diagnostics import Diagnostics
 from ..domains.curves import Curve, SurfacePoints
-from ..domains.display import Displayed
+from ..domains.exchange import Displayed
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
-from ..domains.display import Displayed, with_values
+from ..domains.exchange import Displayed, with_values
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import contiguous, finite_number

@@ -14,7 +14,7 @@ from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
 from ..domains.common_subdivision import common_subdivision
 from ..domains.curves import Curve, SurfacePoints
-from ..domains.display import Displayed, with_values
+from ..domains.exchange import Displayed, with_values
 from ..domains.foreign import SurfaceShape
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
 from ..domains.kinds import EmbeddedSurface, SurfaceDomain

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.display import NAME
+from ..domains.exchange import NAME
 from ..domains.foreign import SurfaceShape, faces_of, points_of
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud

@@ -16,7 +16,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.display import NAME
+from ..domains.exchange import NAME
 from ..errors import FileFormatError
 from ..fields.grid_field import GridField
 from ..operators.grid.blocks import CUBE, SIDE, Blocks

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..domains.digital_surface import DigitalSurface
-from ..domains.display import NAME
+from ..domains.exchange import NAME
 from ..domains.grid import Grid
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.transforms import transform

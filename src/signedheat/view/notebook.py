@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..domains.digital_surface import DigitalSurface
-from ..domains.display import html_of
+from ..domains.exchange import html_of
 from ..domains.foreign import converted
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..domains.display import NAME, plotter_of
+from ..domains.exchange import NAME, plotter_of
 from ..domains.grid import Grid
 from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
