@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SourceError
 from ..geometry.meshes import Triangles
 from ..geometry.polylines import assemble_polylines, leaving
 from ..geometry.surface_points import SNAP, barycentric_on_edges, crossed_sides
@@ -27,10 +26,6 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     a neighbour equals it, so that rounding moves no curve to the other side of a vertex.
     """
     faces, edges = mesh.faces, mesh.edges
-    if values.shape != (mesh.n_vertices,):
-        raise SourceError(
-            f"a level set needs one value per vertex: {mesh.n_vertices}, not an array {values.shape}", element="values"
-        )
     values = snapped(values, edges.vertices, level)
     known = np.asarray(np.isfinite(values)[faces].all(axis=1))
     crossed, sides = crossed_sides((values >= level)[faces], known)

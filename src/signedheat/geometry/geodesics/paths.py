@@ -110,7 +110,7 @@ def geodesic_paths(
         if counts[k] >= 0:
             parts.append(located[np.arange(begin[k], begin[k] + counts[k])])
             continue
-        parts.append(through_vertices(triangles, start[[k]], end[[k]], name))
+        parts.append(path_through_vertices(triangles, start[[k]], end[[k]], name))
         counts[k] = len(parts[-1])
     return concatenated(parts), counts
 
@@ -127,7 +127,9 @@ def faces_at(
     return faces, points, np.searchsorted(which, np.arange(len(located) + 1))
 
 
-def through_vertices(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str) -> LocatedPoints:
+def path_through_vertices(
+    triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str
+) -> LocatedPoints:
     """The path between two points that are connected only through vertices at which fans of faces touch."""
     edges, n = triangles.edges, triangles.n_vertices
     arcs, lengths = [edges.vertices], [triangles.lengths_of_edges]
