@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from .box_tree import BoxTree
+from .edges import edge_table
 
 TOUCHING = 1e-8
 """Depth, over the size of the shape, up to which triangles that overlap only touch: what coordinates are rounded to."""
@@ -15,7 +16,7 @@ TOUCHING = 1e-8
 def cut_faces(
     triangles: NDArray[np.float64], ids: NDArray[np.int64], knives: NDArray[np.float64], knife_ids: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
-    """Cut triangles along the planes of others that they cross, and along the edges of those that they lie in.
+    """Cut triangles along the planes of others that they cross, and along the outlines of flat parts that they lie in.
 
     Triangles that share an edge do not cut each other.
 
@@ -49,8 +50,29 @@ def cut_faces(
     size = float(np.ptp(knives.reshape(-1, 3), axis=0).max())
     corners, others = (np.ascontiguousarray(each).reshape(-1, 9) for each in (triangles, knives))
     slack = TOUCHING * size
-    pieces, origins, met = _cut(corners, ids, others, knife_ids, *tree.meeting(triangles, slack), slack)
+    outlines = _outlines(knives, knife_ids, slack)
+    pieces, origins, met = _cut(corners, ids, others, knife_ids, outlines, *tree.meeting(triangles, slack), slack)
     return pieces.reshape(-1, 3, 3), origins, met
+
+
+def _outlines(triangles: NDArray[np.float64], ids: NDArray[np.int64], slack: float) -> NDArray[np.bool_]:
+    """(m, 3) edges from corner k to k + 1 that bound flat parts: across all others one triangle goes on in the plane.
+
+    What lies in a flat part has the same on both of its sides wherever within its outline it is.
+    """
+    table = edge_table(ids)
+    mates = np.where((table.balance == 0)[table.face_edges].ravel(), table.mates, -1)
+    edges = np.flatnonzero(mates >= 0)
+    a, b, c = triangles.transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    own, other = edges // 3, mates[edges] // 3
+    apex = triangles[other, (mates[edges] + 2) % 3]
+    height = np.abs(((apex - triangles[own, 0]) * normals[own]).sum(axis=1))
+    ahead = (normals[own] * normals[other]).sum(axis=1) > 0
+    outlines = np.ones(ids.size, dtype=np.bool_)
+    outlines[edges[(height <= slack) & ahead]] = False
+    return outlines.reshape(-1, 3)
 
 
 @compiled
@@ -177,6 +199,7 @@ def _cut(
     ids: NDArray[np.int64],
     knives: NDArray[np.float64],
     knife_ids: NDArray[np.int64],
+    outlines: NDArray[np.bool_],
     starts: NDArray[np.int64],
     near: NDArray[np.int64],
     slack: float,
@@ -217,6 +240,8 @@ def _cut(
                     count = _halve(pieces, alive, count, at, nx, ny, nz, height, slack)
                     continue
                 for c in range(0, 9, 3):  # along each edge, whatever came of the piece before
+                    if not outlines[g, c // 3]:
+                        continue
                     d = (c + 3) % 9
                     ex, ey, ez = q[d] - q[c], q[d + 1] - q[c + 1], q[d + 2] - q[c + 2]
                     ax, ay, az = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
