@@ -250,7 +250,7 @@ def test_offsets_do_not_depend_on_scale():
         shape = moved(turned_box(), scale * np.eye(3))
         volumes.append(volume(sh.offset(shape, 0.1 * scale, corners="mitre", resolution=30)) / scale**3)
     np.testing.assert_allclose(volumes, 2.2 * 1.5 * 0.7, rtol=3e-3)  # some edges are cut off at so few nodes
-    np.testing.assert_allclose(volumes, volumes[1], rtol=1e-4)
+    np.testing.assert_allclose(volumes, volumes[1], rtol=4e-4)  # where they are cut off depends on rounding
 
 
 def test_a_wall_may_keep_the_faces_outside_and_have_a_drain():

@@ -34,6 +34,7 @@ from .fields.vertex_field import VertexField
 from .geometry.components import element_components
 from .geometry.face_features import FaceFeatures
 from .geometry.face_tree import FaceTree
+from .geometry.nearest import weights_in
 from .lowering.area_elements import area_elements, bounds_around
 from .lowering.grid.discretization import refuse_beyond_memory
 from .progress import Progress
@@ -42,7 +43,7 @@ from .signed_distance import signed_distance
 from .solids.complete import complete
 from .solids.contouring import sharp_surface
 from .solids.offsets import Offset, Reach, checked_reach
-from .solids.solid import Solid, weights_in
+from .solids.solid import Solid
 from .solver import SignedHeatSolver, as_list
 
 __all__ = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,13 @@ from signedheat import samples
 from signedheat.geometry.box_tree import BoxTree
 from signedheat.geometry.face_features import FaceFeatures
 from signedheat.geometry.face_tree import search_from
-from signedheat.geometry.nearest import foot_on_triangle, nearest_on_triangles, triangle_rows
+from signedheat.geometry.nearest import (
+    away_from_triangle,
+    foot_on_triangle,
+    nearest_on_triangles,
+    triangle_rows,
+    weights_in,
+)
 
 UNIT = np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
 
@@ -54,6 +62,48 @@ def test_needles_and_specks_keep_their_distance():
         one = foot_on_triangle(triangle_rows(whole.reshape(1, 9)), 0, *point)[0]
         rows = triangle_rows(parts)
         assert min(foot_on_triangle(rows, f, *point)[0] for f in range(3)) == pytest.approx(one, rel=1e-9)
+
+
+def distance_without_rounding(corners, point):
+    """Of the nearest place inside a triangle or on its sides, in fractions."""
+    a, b, c, p = (np.array([Fraction(float(x)) for x in place], dtype=object) for place in (*corners, point))
+    squares = []
+    for start, end in ((a, b), (b, c), (c, a)):
+        side, square = end - start, (end - start) @ (end - start)
+        along = min(max((p - start) @ side / square, 0), 1) if square else 0
+        squares.append((p - start - along * side) @ (p - start - along * side))
+    u, v, w = b - a, c - a, p - a
+    area = (u @ u) * (v @ v) - (u @ v) ** 2
+    if area:
+        s, t = ((v @ v) * (w @ u) - (u @ v) * (w @ v)) / area, ((u @ u) * (w @ v) - (u @ v) * (w @ u)) / area
+        if s > 0 and t > 0 and s + t < 1:
+            squares.append((w - s * u - t * v) @ (w - s * u - t * v))
+    return float(min(squares)) ** 0.5
+
+
+@pytest.mark.parametrize("short", [0, 1, 2, None])
+@pytest.mark.parametrize("height", [1e-3, 1e-7, 1e-10, 1e-13, 1e-15, 1e-17, 0.0])
+def test_slivers_are_exact(height, short):
+    """Needles, with one short side, and slivers, with a corner on the opposite side, to rounding of their length."""
+    rng = np.random.default_rng(4)
+    for _ in range(6):
+        triangle = rng.normal(size=(3, 3))
+        near = triangle[0] + rng.uniform(-0.3, 1.3) * (triangle[1] - triangle[0]) if short is None else triangle[short]
+        triangle[2 if short is None else (short + 1) % 3] = near + height * rng.normal(size=3)
+        points = (
+            rng.dirichlet(np.ones(3), 8) @ triangle
+            + rng.normal(size=(8, 3)) * np.repeat([1e-9, 1e-3, 1, 9], 2)[:, None]
+        )
+        exact = np.array([distance_without_rounding(triangle, point) for point in points])
+        rows, ways = triangle_rows(triangle.reshape(1, 9)), np.empty((1, 4, 8))
+        away_from_triangle(rows, 0, points.T.copy(), 0, ways)
+        feet = np.array([foot_on_triangle(rows, 0, *point)[2:] for point in points])
+        np.testing.assert_allclose(np.linalg.norm(points - feet, axis=1), exact, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(np.sqrt(ways[0, 0]), exact, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(points - ways[0, 1:].T, feet, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(
+            weights_in(np.repeat(triangle[None], 8, axis=0), points) @ triangle, feet, atol=1e-13
+        )
 
 
 def test_a_search_leads_to_the_nearest_face():

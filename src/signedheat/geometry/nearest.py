@@ -10,30 +10,52 @@ from .box_tree import LEAF, BoxTree
 
 # Feature codes of a foot: 0 inside the face; 1, 2, 3 on its edges (corner 0–1, 1–2, 2–0); 4, 5, 6 its corners 0, 1, 2.
 
+HEIGHT = 1e-14
+"""Height of a triangle over its length up to which it has none: rounding would say where it lies, and its normal."""
+
 
 @compiled
 def triangle_rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, 16) what `foot_on_triangle` needs of (m, 9) corners: a corner, two sides, their products and inverses.
+    """(m, 16) what `foot_on_triangle` needs of (m, 9) corners: each triangle in a plane of its own.
 
-    Triangles with no area, or so little that rounding hides it, get none: their feet are on their sides.
+    A corner; directions of two axes, along the first side and at a right angle to it; the length of this side; the
+    directions in the plane, and the lengths, of the sides from the first corner to the third and from the second.
     """
     rows = np.zeros((len(corners), 16))
+    u, v, w = np.empty(3), np.empty(3), np.empty(3)
     for f in range(len(corners)):
-        uu = uv = vv = 0.0
         for d in range(3):
-            a = corners[f, d]
-            u, v = corners[f, 3 + d] - a, corners[f, 6 + d] - a
-            rows[f, d], rows[f, 3 + d], rows[f, 6 + d] = a, u, v
-            uu += u * u
-            uv += u * v
-            vv += v * v
-        ww = uu - 2.0 * uv + vv
-        area = uu * vv - uv * uv
-        rows[f, 9], rows[f, 10], rows[f, 11] = uu, uv, vv
-        rows[f, 12] = 1.0 / uu if uu > 0.0 else 0.0
-        rows[f, 13] = 1.0 / vv if vv > 0.0 else 0.0
-        rows[f, 14] = 1.0 / ww if ww > 0.0 else 0.0
-        rows[f, 15] = 1.0 / area if area > 1e-14 * uu * vv else 0.0
+            rows[f, d] = corners[f, d]
+            u[d], v[d] = corners[f, 3 + d] - corners[f, d], corners[f, 6 + d] - corners[f, d]
+        length = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
+        for d in range(3):
+            u[d] = u[d] / length if length > 0.0 else 1.0 if d == 0 else 0.0
+        across = v[0] * u[0] + v[1] * u[1] + v[2] * u[2]
+        for d in range(3):
+            w[d] = v[d] - across * u[d]
+        up = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        flat = not up > HEIGHT * abs(across)
+        if flat:  # in any plane through its side
+            least = 0 if abs(u[0]) <= abs(u[1]) and abs(u[0]) <= abs(u[2]) else 1 if abs(u[1]) <= abs(u[2]) else 2
+            for d in range(3):
+                w[d] = 1.0 if d == least else 0.0
+        for _ in range(2):  # again for slivers, whose height is of few digits
+            lean = w[0] * u[0] + w[1] * u[1] + w[2] * u[2]
+            for d in range(3):
+                w[d] -= lean * u[d]
+            norm = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+            for d in range(3):
+                w[d] /= norm
+        up = 0.0 if flat else v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
+        for d in range(3):
+            rows[f, 3 + d], rows[f, 6 + d] = u[d], w[d]
+        rows[f, 9] = length
+        for k in range(2):
+            along = across - k * length
+            side = np.sqrt(along * along + up * up)
+            rows[f, 10 + 3 * k] = along / side if side > 0.0 else 1.0
+            rows[f, 11 + 3 * k] = up / side if side > 0.0 else 0.0
+            rows[f, 12 + 3 * k] = side
     return rows
 
 
@@ -43,39 +65,93 @@ def foot_on_triangle(
 ) -> tuple[float, int, float, float, float]:
     """Squared distance to triangle f, feature code, and the three coordinates of the foot.
 
-    Inside, where the foot of the perpendicular is; else the nearest on three sides, each found as a fraction.
+    Inside, where the foot of the perpendicular is; else the nearest on three sides.
     """
     px, py, pz = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
-    pu = px * rows[f, 3] + py * rows[f, 4] + pz * rows[f, 5]
-    pv = px * rows[f, 6] + py * rows[f, 7] + pz * rows[f, 8]
-    uu, uv, vv = rows[f, 9], rows[f, 10], rows[f, 11]
-    s, t = (vv * pu - uv * pv) * rows[f, 15], (uu * pv - uv * pu) * rows[f, 15]
+    p = px * rows[f, 3] + py * rows[f, 4] + pz * rows[f, 5]
+    q = px * rows[f, 6] + py * rows[f, 7] + pz * rows[f, 8]
+    length = rows[f, 9]
+    r = p - length
     feature = 0
-    if not (s > 0.0 and t > 0.0 and s + t < 1.0):
-        s, t = pu * rows[f, 12], 0.0
-        s = s if s > 0.0 else 0.0
-        s = s if s < 1.0 else 1.0
-        best = s * (s * uu - 2.0 * pu)
-        feature = 1 if s > 0.0 else 4
-        feature = feature if s < 1.0 else 5
-        r = pv * rows[f, 13]
-        r = r if r > 0.0 else 0.0
-        r = r if r < 1.0 else 1.0
-        square = r * (r * vv - 2.0 * pv)
+    if not (q > 0.0 and p * rows[f, 11] > q * rows[f, 10] and r * rows[f, 14] < q * rows[f, 13]):
+        t = p if p > 0.0 else 0.0
+        t = t if t < length else length
+        best, s, up = (p - t) * (p - t) + q * q, t, 0.0
+        feature = 4 if not t > 0.0 else 1 if t < length else 5
+        side = rows[f, 12]
+        t = p * rows[f, 10] + q * rows[f, 11]
+        t = t if t > 0.0 else 0.0
+        t = t if t < side else side
+        a, b = t * rows[f, 10], t * rows[f, 11]
+        square = (p - a) * (p - a) + (q - b) * (q - b)
         if square < best:
-            best, s, t = square, 0.0, r
-            feature = 3 if r < 1.0 else 6
-        qw = pv - pu - uv + uu
-        r = qw * rows[f, 14]
-        if r > 0.0 and r < 1.0:
-            square = uu - 2.0 * pu - r * qw
+            best, s, up = square, a, b
+            feature = 3 if t < side else 6
+        side = rows[f, 15]
+        t = r * rows[f, 13] + q * rows[f, 14]
+        if t > 0.0 and t < side:
+            a, b = length + t * rows[f, 13], t * rows[f, 14]
+            square = (p - a) * (p - a) + (q - b) * (q - b)
             if square < best:
-                s, t = 1.0 - r, r
+                s, up = a, b
                 feature = 2
-    dx = px - s * rows[f, 3] - t * rows[f, 6]
-    dy = py - s * rows[f, 4] - t * rows[f, 7]
-    dz = pz - s * rows[f, 5] - t * rows[f, 8]
+    else:
+        s, up = p, q
+    dx = px - s * rows[f, 3] - up * rows[f, 6]
+    dy = py - s * rows[f, 4] - up * rows[f, 7]
+    dz = pz - s * rows[f, 5] - up * rows[f, 8]
     return dx * dx + dy * dy + dz * dz, feature, x - dx, y - dy, z - dz
+
+
+@compiled
+def away_from_triangle(
+    rows: NDArray[np.float64], f: int, places: NDArray[np.float64], at: int, out: NDArray[np.float64]
+) -> None:
+    """Squared distance of (3, n) places to triangle f, and the way to each from its foot, into ``out[at]``, (4, n).
+
+    The same as `foot_on_triangle`, without a branch, so that processors do several places at once. The compiler must
+    not know how many there are: it does few one by one.
+    """
+    ax, ay, az = rows[f, 0], rows[f, 1], rows[f, 2]
+    ux, uy, uz = rows[f, 3], rows[f, 4], rows[f, 5]
+    vx, vy, vz = rows[f, 6], rows[f, 7], rows[f, 8]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    first, second, third = rows[f, 9], rows[f, 12], rows[f, 15]
+    c, d, g, h = rows[f, 10], rows[f, 11], rows[f, 13], rows[f, 14]
+    for k in range(places.shape[1]):
+        x, y, z = places[0, k] - ax, places[1, k] - ay, places[2, k] - az
+        p, q = x * ux + y * uy + z * uz, x * vx + y * vy + z * vz
+        up = x * nx + y * ny + z * nz
+        t = p if p > 0.0 else 0.0
+        t = t if t < first else first
+        a, b = p - t, q
+        square = a * a + b * b
+        beyond = -q
+        out_of = q * c - p * d
+        beyond = beyond if beyond > out_of else out_of
+        t = p * c + q * d
+        t = t if t > 0.0 else 0.0
+        t = t if t < second else second
+        i, j = p - t * c, q - t * d
+        other = i * i + j * j
+        nearer = other < square
+        a, b, square = i if nearer else a, j if nearer else b, other if nearer else square
+        r = p - first
+        out_of = r * h - q * g
+        beyond = beyond if beyond > out_of else out_of
+        t = r * g + q * h
+        t = t if t > 0.0 else 0.0
+        t = t if t < third else third
+        i, j = r - t * g, q - t * h
+        other = i * i + j * j
+        nearer = other < square
+        a, b, square = i if nearer else a, j if nearer else b, other if nearer else square
+        above = beyond < 0.0
+        a, b, square = 0.0 if above else a, 0.0 if above else b, 0.0 if above else square
+        out[at, 0, k] = square + up * up
+        out[at, 1, k] = up * nx + a * ux + b * vx
+        out[at, 2, k] = up * ny + a * uy + b * vy
+        out[at, 3, k] = up * nz + a * uz + b * vz
 
 
 @compiled
@@ -84,25 +160,38 @@ def barycentric_on_triangles(
 ) -> NDArray[np.float64]:
     """(n, 3) barycentric coordinates of the place of a triangle that is nearest to each point."""
     weights = np.zeros((len(points), 3))
-    for p in range(len(points)):
-        f = faces[p]
-        _, feature, x, y, z = foot_on_triangle(rows, f, points[p, 0], points[p, 1], points[p, 2])
-        x, y, z = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
-        pu = x * rows[f, 3] + y * rows[f, 4] + z * rows[f, 5]
-        pv = x * rows[f, 6] + y * rows[f, 7] + z * rows[f, 8]
-        uu, uv, vv = rows[f, 9], rows[f, 10], rows[f, 11]
+    for k in range(len(points)):
+        f = faces[k]
+        _, feature, _, _, _ = foot_on_triangle(rows, f, points[k, 0], points[k, 1], points[k, 2])
+        x, y, z = points[k, 0] - rows[f, 0], points[k, 1] - rows[f, 1], points[k, 2] - rows[f, 2]
+        p = x * rows[f, 3] + y * rows[f, 4] + z * rows[f, 5]
+        q = x * rows[f, 6] + y * rows[f, 7] + z * rows[f, 8]
         s, t = 0.0, 0.0
         if feature == 0:
-            s, t = (vv * pu - uv * pv) * rows[f, 15], (uu * pv - uv * pu) * rows[f, 15]
+            lean, along = rows[f, 10] * rows[f, 12] / rows[f, 9], p / rows[f, 9]
+            t = q / (rows[f, 11] * rows[f, 12])
+            if lean != 0.0 and lean * t > along:  # rounding, in slivers
+                t = along / lean
+            if lean != 1.0 and (1.0 - lean) * t > 1.0 - along:
+                t = (1.0 - along) / (1.0 - lean)
+            s = along - lean * t
         elif feature == 1 or feature == 5:
-            s = pu * rows[f, 12] if feature == 1 else 1.0
+            s = p / rows[f, 9] if feature == 1 else 1.0
         elif feature == 3 or feature == 6:
-            t = pv * rows[f, 13] if feature == 3 else 1.0
+            t = (p * rows[f, 10] + q * rows[f, 11]) / rows[f, 12] if feature == 3 else 1.0
         elif feature == 2:
-            t = (pv - pu - uv + uu) * rows[f, 14]
+            t = ((p - rows[f, 9]) * rows[f, 13] + q * rows[f, 14]) / rows[f, 15]
             s = 1.0 - t
-        s, t = min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
-        weights[p, 0], weights[p, 1], weights[p, 2] = max(1.0 - s - t, 0.0), s, t
+        t = min(max(t, 0.0), 1.0)
+        s = min(max(s, 0.0), 1.0 - t)
+        weights[k, 0], weights[k, 1], weights[k, 2] = 1.0 - s - t, s, t
+    return weights
+
+
+def weights_in(triangles: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) barycentric coordinates of (n, 3) places, each in one of (n, 3, 3) triangles."""
+    rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
+    weights: NDArray[np.float64] = barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), places)
     return weights
 
 
@@ -115,9 +204,9 @@ def nearest_on_triangles(
     --------
     >>> triangle = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
     >>> tree = BoxTree.of(triangle.min(axis=1), triangle.max(axis=1))
-    >>> nearest_on_triangles(triangle, tree, np.array([[0.5, -1.0, 3.0], [2.0, 2.0, 0.0]]))
-    (array([0, 0]), array([[0.5, 0.5, 0. ],
-           [0. , 0.5, 0.5]]))
+    >>> faces, weights = nearest_on_triangles(triangle, tree, np.array([[0.5, -1.0, 3.0], [2.0, 2.0, 0.0]]))
+    >>> faces.tolist(), weights.round(9).tolist()
+    ([0, 0], [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]])
     """
     rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
     found, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))

@@ -21,6 +21,7 @@ from ..frozen import Frozen
 from ..geometry.box_tree import order_in_space
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree, NearestFaces
+from ..geometry.nearest import weights_in
 from ..parallel import in_chunks
 from ..progress import Progress
 from ..reprs import ShortRepr
@@ -337,19 +338,3 @@ def _mesh(triangles: NDArray[np.float64]) -> TriangleMesh:
         raise SourceError("there is none of it", element="solid")
     points, corners = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     return TriangleMesh(points, corners.reshape(-1, 3))
-
-
-def weights_in(corners: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) barycentric coordinates of places in triangles."""
-    a, b, c = corners.transpose(1, 0, 2)
-    u, v, w = b - a, c - a, places - a
-    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
-    wu, wv = (w * u).sum(1), (w * v).sum(1)
-    area = uu * vv - uv * uv
-    flat = ~(area > 1e-14 * uu * vv)
-    area = np.where(flat, 1.0, area)
-    first = np.where(uu >= vv, wu / np.where(uu > 0, uu, 1.0), 0.0)  # along the longer side of a sliver
-    second = np.where(uu >= vv, 0.0, wv / np.where(vv > 0, vv, 1.0))
-    s = np.where(flat, first, (vv * wu - uv * wv) / area)
-    t = np.where(flat, second, (uu * wv - uv * wu) / area)
-    return np.stack([1 - s - t, s, t], axis=1)
