@@ -126,7 +126,9 @@ def proposed_triangles(
         triangles.append(np.stack([row + begin, near[row, sides[row, at]], near[row, following[row, at]]], axis=1))
     sorted_corners = np.sort(np.concatenate(triangles), axis=1)
     number, first = distinct_rows(sorted_corners)
-    return sorted_corners[first], np.bincount(number)
+    found = sorted_corners[first]
+    order = np.lexsort(found.T[::-1])
+    return found[order], np.bincount(number)[order]
 
 
 def well_shaped_triangles(
