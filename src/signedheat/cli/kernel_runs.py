@@ -24,8 +24,7 @@ from ..solids.sampling import sample
 from ..solids.thickness import thickness
 from ..solver import SignedHeatSolver
 from ..tets.tetrahedralize import tetrahedralize
-from ..view import new_figure
-from ..view.scenes import draw_shape
+from ..view import draw_shape, new_figure
 
 
 def solids() -> None:

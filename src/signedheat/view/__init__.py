@@ -1,13 +1,11 @@
 """Fields and shapes as pictures, by Matplotlib, and in windows and notebooks, by PyVista."""
 
-from . import notebook as _notebook  # noqa: F401  provides what notebooks show
 from . import windows as _windows  # noqa: F401  provides windows
 from .deviations import DEVIATION_FORMATS
+from .drawing import save_row
 from .figures import PICTURE_FORMATS, ensure_picture_writable, new_figure
-from .rows import save_row
-from .scenes import draw_shape, save_scene
 from .slices import draw_plane, draw_slices, save_slices
-from .surfaces import draw_surface, save_surface
+from .surfaces import draw_shape, draw_surface, save_scene, save_surface
 
 __all__ = [
     "DEVIATION_FORMATS",

@@ -9,9 +9,8 @@ from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.ply import ply_of
 from ..solids.deviation import Deviation, save_deviation
-from .colors import INSIDE_TO_OUTSIDE
-from .figures import PICTURE_FORMATS, new_figure, write_figure
-from .notebook import draw
+from .drawing import draw
+from .figures import INSIDE_TO_OUTSIDE, PICTURE_FORMATS, picture
 
 DEVIATION_FORMATS = frozenset({".csv", ".ply"}) | PICTURE_FORMATS
 
@@ -41,13 +40,14 @@ def colors(values: NDArray[np.float64], found: Deviation) -> NDArray[np.uint8]:
 
 def _draw(found: Deviation, path: PathLike) -> None:
     """The scan in colours, and the histogram with the percentiles."""
-    figure = new_figure(12, 5)
-    scan, histogram = figure.subplots(1, 2)
-    draw(VertexField(found.scan, found.distances), scan)
-    counts, limits = found.histogram()
-    middles = 0.5 * (limits[1:] + limits[:-1])
-    histogram.bar(middles, counts, np.diff(limits), color=colors(middles, found) / 255, edgecolor="0.5", linewidth=0.5)
-    low, middle, high = found.percentiles((1, 50, 99))
-    title = f"1 %, 50 %, 99 %: {low:.4g}, {middle:.4g}, {high:.4g}; root mean square {found.rms:.4g}"
-    histogram.set(xlabel="deviation, positive outside of the nominal part", ylabel="points", title=title)
-    write_figure(figure, path)
+    with picture(path, 12, 5) as figure:
+        scan, histogram = figure.subplots(1, 2)
+        draw(VertexField(found.scan, found.distances), scan)
+        counts, limits = found.histogram()
+        middles = 0.5 * (limits[1:] + limits[:-1])
+        histogram.bar(
+            middles, counts, np.diff(limits), color=colors(middles, found) / 255, edgecolor="0.5", linewidth=0.5
+        )
+        low, middle, high = found.percentiles((1, 50, 99))
+        title = f"1 %, 50 %, 99 %: {low:.4g}, {middle:.4g}, {high:.4g}; root mean square {found.rms:.4g}"
+        histogram.set(xlabel="deviation, positive outside of the nominal part", ylabel="points", title=title)

@@ -1,19 +1,37 @@
-"""Figures without display or global state, and their files."""
+"""Figures without display or global state, their files, and the colours and isolines of distance in all of them.
+
+Blue is inside, orange outside; both sides have one scale.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..packages import lazy_module, require
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure, SubFigure
 
 backend_agg = lazy_module("matplotlib.backends.backend_agg", "pictures")
+mpl_cm = lazy_module("matplotlib.cm", "pictures")
+mpl_colors = lazy_module("matplotlib.colors", "pictures")
 mpl_figure = lazy_module("matplotlib.figure", "pictures")
 
 PICTURE_FORMATS = frozenset({".png", ".pdf", ".svg", ".jpg"})
+INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]
+"""From far inside to far outside: blue inside, light at the surface, orange outside."""
+TICKS = 7
+"""Approximate number of labels of a colour bar."""
+CLOSEST = 0.07
+"""How near to each other they may be, over the length of the bar."""
 
 
 def ensure_picture_writable(path: PathLike) -> None:
@@ -37,7 +55,101 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def write_figure(figure: Figure, path: PathLike, dpi: int = 130) -> None:
-    """Write a figure in the format given by the extension."""
+@contextmanager
+def picture(path: PathLike, width: float, height: float, dpi: int = 130) -> Iterator[Figure]:
+    """A figure to draw into, which is then written in the format given by the extension.
+
+    Raises
+    ------
+    FileFormatError
+        If the picture cannot be written; before anything is drawn.
+    """
+    ensure_picture_writable(path)
+    figure = new_figure(width, height)
+    yield figure
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=dpi, format=extension(path)[1:])
+
+
+def distance_colors(low: float, high: float) -> ScalarMappable:
+    """A colour scale for distances between two values, light at zero.
+
+    Equal distances inside and outside have equally saturated colours. The scale is in the square root of distance, so
+    that a thin inside is visible next to a wide outside.
+    """
+    reach = max(abs(low), abs(high), 1e-300)
+    norm = mpl_colors.FuncNorm((signed_root, signed_square), -reach, reach)
+    colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
+    scale: ScalarMappable = mpl_cm.ScalarMappable(norm, colors)
+    return scale
+
+
+def signed_root(values: Any) -> Any:
+    """√|x|, with the sign of x."""
+    return np.sign(values) * np.sqrt(np.abs(values))
+
+
+def signed_square(values: Any) -> Any:
+    """x², with the sign of x."""
+    return np.sign(values) * np.square(values)
+
+
+def isolines_between(low: float, high: float, most: int = 16) -> tuple[NDArray[np.float64], float]:
+    """Levels between two values, without zero, about `most` of them; and the step between them, a round number.
+
+    Examples
+    --------
+    >>> levels, step = isolines_between(-0.25, 0.5, 8)
+    >>> levels.tolist(), step
+    ([-0.2, -0.1, 0.1, 0.2, 0.30000000000000004, 0.4, 0.5], 0.1)
+    """
+    step = round_step((high - low) / max(most, 1))
+    levels = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
+    return levels[np.abs(levels) > 0.5 * step], step
+
+
+def round_step(width: float) -> float:
+    """1, 2 or 5 times a power of ten, close to `width`."""
+    if not width > 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(width))
+    return float(power * min((1, 2, 5, 10), key=lambda digit: abs(np.log(width / power / digit))))
+
+
+def legible(ticks: NDArray[np.float64], low: float, high: float) -> list[float]:
+    """Zero, and those of some ticks that are far enough from the one before, in the root of distance.
+
+    Examples
+    --------
+    >>> legible(np.array([-0.5, 0.5, 1.0, 1.5, 2.0]), -0.7, 2.2)
+    [-0.5, 0.0, 0.5, 1.0, 1.5, 2.0]
+    >>> legible(np.arange(11.0), 0.0, 10.5)
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 9.0]
+    """
+    apart = CLOSEST * float(signed_root(high) - signed_root(low))
+    kept = [0.0]
+    for outwards in (ticks[ticks > 0], ticks[ticks < 0][::-1]):
+        last = 0.0
+        for tick in outwards.tolist():
+            if abs(signed_root(tick) - signed_root(last)) >= apart:
+                kept.append(tick)
+                last = tick
+    return sorted(kept)
+
+
+def add_color_bar(
+    figure: Figure | SubFigure, axes: Sequence[Axes], colors: ScalarMappable, isolines: NDArray[np.float64], step: float
+) -> None:
+    """A colour bar that spans the isolines, with round numbers on both sides of zero."""
+    bar = figure.colorbar(colors, ax=list(axes), shrink=0.85, pad=0.015)
+    bar.set_label(f"signed distance, a line every {step:g}")
+    if len(isolines):
+        apart = round_step((isolines[-1] - isolines[0]) / TICKS)
+        ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
+        reach = float(np.max(colors.norm.vmax or 0.0))
+        first, last = isolines[0], isolines[-1]
+        low = 0.0 if abs(first) < 1e-9 * reach else max(min(first - step, 0.0), -reach)  # no colour that is nowhere
+        high = 0.0 if abs(last) < 1e-9 * reach else min(max(last + step, 0.0), reach)
+        bar.ax.set_ylim(low, high)
+        bar.set_ticks(legible(ticks, low, high))
+        bar.ax.yaxis.set_major_formatter("{x:g}")

@@ -17,9 +17,8 @@ from ..fields.grid_field import GridField
 from ..geometry.marching import level_lines
 from ..io.files import PathLike
 from ..packages import lazy_module
-from .colors import add_color_bar, distance_colors, isolines_between
-from .figures import ensure_picture_writable, new_figure, write_figure
-from .scenes import outside_of, triangulated
+from .figures import add_color_bar, distance_colors, isolines_between, picture
+from .surfaces import outside_of, triangulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,8 +33,7 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
     """Write three orthogonal slices through a field, each where it cuts most of the inside, with the shape.
 
     Blue is inside, orange outside; the black line is φ = 0, dashed where surface was completed; the shape is red; solid
-    nodes are grey. A field in the
-    plane is drawn whole.
+    nodes are grey. A field in the plane is drawn whole.
 
     Parameters
     ----------
@@ -55,20 +53,17 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
     GeometryError
         If the field has one dimension, or more than three.
     """
-    ensure_picture_writable(path)
     if field.grid.dimension not in (2, 3):
         raise GeometryError(
             f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}", element="field"
         )
     if field.grid.dimension == 2:
         sides = field.grid.upper - field.grid.origin
-        figure = new_figure(*(7.5 * sides / sides.max() + [1.6, 0.6]))
-        draw_plane(field, figure.add_subplot(), shape, levels)
-        return write_figure(figure, path)
-    figure = new_figure(13.2, 4.6)
-    axes = [figure.add_subplot(1, 3, k + 1) for k in range(3)]
-    draw_slices(field, axes, shape, levels)
-    write_figure(figure, path)
+        with picture(path, *(7.5 * sides / sides.max() + [1.6, 0.6])) as figure:
+            draw_plane(field, figure.add_subplot(), shape, levels)
+    else:
+        with picture(path, 13.2, 4.6) as figure:
+            draw_slices(field, figure.subplots(1, 3).tolist(), shape, levels)
 
 
 def draw_slices(

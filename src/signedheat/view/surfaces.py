@@ -1,4 +1,4 @@
-"""Pictures of distance on surfaces: shaded, with isolines and sources."""
+"""Pictures of shapes, with inner sides red, and of distance on surfaces, with isolines and sources; all shaded."""
 
 from __future__ import annotations
 
@@ -9,17 +9,78 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.curves import Curve
+from ..domains.digital_surface import DigitalSurface
+from ..domains.foreign import ForeignShape, as_shape
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
+from ..domains.kinds import Shape
+from ..domains.point_cloud import PointCloud
+from ..domains.polygon_mesh import PolygonMesh
+from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike
-from .colors import add_color_bar, distance_colors, isolines_between
-from .figures import ensure_picture_writable, new_figure, write_figure
+from .figures import add_color_bar, distance_colors, isolines_between, picture
 from .rasterizer import Camera, oblique, rasterize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+OUTSIDE, INSIDE = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
+MOST_POINTS = 200_000
+"""Of larger clouds an even subset is drawn."""
+
+
+def save_scene(shape: Shape | ForeignShape, path: PathLike, up: int = 2) -> None:
+    """Write a picture of a shape seen obliquely from above, with axis `up` pointing up.
+
+    Raises
+    ------
+    FileFormatError
+        If the picture cannot be written.
+    UnsupportedTypeError
+        If it is no shape.
+    """
+    with picture(path, 7, 6) as figure:
+        draw_shape(shape, figure.add_subplot(), up=up)
+
+
+def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float] = (18, -58), up: int = 2) -> None:
+    """Draw a shape into axes, seen from an elevation and an azimuth in degrees."""
+    shape = outside_of(shape)
+    direction = oblique(*view, up)
+    axes.set_axis_off()
+    if isinstance(shape, PointCloud):
+        points = shape.points[:: max(1, shape.n_points // MOST_POINTS)]
+        pixels = Camera.around(points, direction, up).pixels(points)
+        x, y, depth = pixels[np.argsort(pixels[:, 2])].T
+        axes.scatter(x, y, s=4, c=depth, cmap="Blues", vmin=depth[0] - np.ptp(depth), linewidths=0)
+        axes.set_aspect("equal")
+        return
+    mesh = triangulated(shape)
+    camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
+    corners = camera.pixels(mesh.vertices)[mesh.faces]
+    _, face, _ = rasterize(corners, np.zeros((mesh.n_faces, 3)), camera.width, camera.height)
+    outwards = mesh.face_area_vectors @ camera.frame[2] > 0
+    colors = np.where(outwards[:, None], OUTSIDE, INSIDE) * camera.shades(mesh.face_area_vectors)[:, None]
+    axes.imshow(np.where((face >= 0)[..., None], colors[face], 1.0), origin="lower", interpolation="antialiased")
+
+
+def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | PointCloud:
+    """What is seen of a shape of any kind: of voxels and tets, the boundary."""
+    own = as_shape(shape)
+    if isinstance(own, DigitalSurface):
+        return own.squares
+    return own.boundary if isinstance(own, TetMesh) else own
+
+
+def triangulated(mesh: Any) -> TriangleMesh:
+    """Polygons as fans around their centroids, for drawing."""
+    if isinstance(mesh, TriangleMesh):
+        return mesh
+    center = mesh.n_vertices + mesh.corner_polygons
+    faces = np.stack([mesh.corners, mesh.next_corners, center], axis=1)
+    return TriangleMesh(np.concatenate([mesh.vertices, mesh.polygon_centroids]), faces)
 
 
 def save_surface(
@@ -47,12 +108,10 @@ def save_surface(
     FileFormatError
         If the picture cannot be written.
     """
-    ensure_picture_writable(path)
-    figure = new_figure(8.0, 7.0)
-    axes = figure.add_subplot(1, 1, 1)
-    draw_surface(field, axes, sources, n_contours, up=up)
-    add_legend(axes, with_sources=bool(sources))
-    write_figure(figure, path)
+    with picture(path, 8.0, 7.0) as figure:
+        axes = figure.add_subplot()
+        draw_surface(field, axes, sources, n_contours, up=up)
+        add_legend(axes, with_sources=bool(sources))
 
 
 def add_legend(axes: Axes, with_sources: bool) -> None:
@@ -133,7 +192,7 @@ def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: NDArray
         axes.plot(*pixels[visible].T, "o", color="#ffd83b", markeredgecolor="black", markersize=6)
 
 
-def toward_sources(mesh: Any, sources: Sequence[Any], up: int = 2) -> NDArray[np.float64]:
+def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> NDArray[np.float64]:
     """A direction from which most of the sources are visible; for flat surfaces, along their normals."""
     normals = [mesh.face_area_vectors[s.faces] for s in sources]
     mean = np.zeros(3)
@@ -143,10 +202,11 @@ def toward_sources(mesh: Any, sources: Sequence[Any], up: int = 2) -> NDArray[np
         mean = (stacked[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0) / len(stacked)
     direction = oblique(22, -58, up)
     if np.linalg.norm(mean) > 0.3:
-        return mean / np.linalg.norm(mean) + 0.2 * direction
+        towards: NDArray[np.float64] = mean / np.linalg.norm(mean) + 0.2 * direction
+        return towards
     extents = np.ptp(mesh.bounds, axis=0)
     if not normals or extents.min() < 1e-3 * extents.max():
-        total = mesh.face_area_vectors.sum(axis=0)
+        total: NDArray[np.float64] = mesh.face_area_vectors.sum(axis=0)
         if np.linalg.norm(total) > 0.5 * mesh.face_areas.sum():
             return total
     return direction

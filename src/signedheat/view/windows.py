@@ -18,8 +18,8 @@ from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
 from ..packages import lazy_module
-from .colors import INSIDE_TO_OUTSIDE, isolines_between
-from .scenes import INSIDE, OUTSIDE
+from .figures import INSIDE_TO_OUTSIDE, isolines_between
+from .surfaces import INSIDE, OUTSIDE
 
 pyvista = lazy_module("pyvista", "windows")
 mpl_colors = lazy_module("matplotlib.colors", "pictures")

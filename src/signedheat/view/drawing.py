@@ -1,4 +1,4 @@
-"""What notebooks show of shapes and fields: a line of text and a small picture."""
+"""Drawing of anything: rows of pictures in one style, and what notebooks show: a line of text and a small picture."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from ..fields.grid_field import GridField
 from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField, on_simple_surface
+from ..io.files import PathLike
 from ..packages import lazy_module
-from .figures import new_figure
-from .scenes import draw_shape
+from .figures import new_figure, picture
 from .slices import draw_plane, draw_slices, telling_layer
-from .surfaces import draw_surface
+from .surfaces import draw_shape, draw_surface
 
 pillow = lazy_module("PIL.Image", "pictures")
 
@@ -36,8 +36,34 @@ SIDE = 3.4
 """Of the picture, in inches."""
 DPI = 90
 N_COLORS = 96
+PANEL = 4.3
+"""Side of a panel of a row, in inches."""
 SECTION_NODES = 80
 """Nodes along the longest side of a section through tets."""
+
+
+def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
+    """Write a picture of several shapes and fields, side by side, each with its title.
+
+    Parameters
+    ----------
+    path : str or path
+        The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
+    panels : tuples of (title, thing) or (title, thing, options)
+        A shape or a field, and a dictionary of options for it: ``view`` (elevation and azimuth) of shapes; ``shape``,
+        ``levels`` and ``across`` of fields on grids, as in `draw_slices`; ``sources`` and ``view`` of fields on
+        surfaces, as in `draw_surface`.
+
+    Raises
+    ------
+    FileFormatError
+        If the picture cannot be written.
+    """
+    with picture(path, PANEL * len(panels), PANEL, dpi=110) as figure:
+        for k, (title, thing, *options) in enumerate(panels):
+            axes = figure.add_subplot(1, len(panels), k + 1)
+            draw(thing, axes, **(options[0] if options else {}))
+            axes.set_title(title, fontsize=11)
 
 
 @html_of.provide
