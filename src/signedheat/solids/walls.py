@@ -41,7 +41,7 @@ def wall_ends(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArra
     edges, owners = open_edges(faces, labels)
     if not len(edges):
         return edges.reshape(-1, 3)
-    areas = np.bincount(labels, face_areas(vertices[faces]))
+    areas = np.bincount(labels, face_areas(vertices[faces])).astype(np.float64)
     keys = (faces * len(vertices) + np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(keys)
     rims = []
