@@ -17,7 +17,7 @@ from ..errors import FileFormatError, SignedHeatError
 from ..fields.grid_field import GridField
 from ..io.fields import BAND_FORMATS
 from ..io.figures import describe, shape_figures
-from ..io.files import told_apart
+from ..io.files import distinct_names
 from ..io.shapes import read, save
 from ..lowering.area_elements import bounds_around
 from ..orientation.orient import orient
@@ -125,7 +125,7 @@ class Job:
 
     def refuse_shared_names(self, shapes: Iterable[Input]) -> None:
         """Raise `FileFormatError` if results of two shapes would have one name: one would replace the other."""
-        endings = [f"_{name}{self.surfaces}" for name in told_apart(self.offsets)]
+        endings = [f"_{name}{self.surfaces}" for name in distinct_names(self.offsets)]
         endings += [] if self.volume is None else [self.volume]
         endings += [] if self.samples is None else [self._of_samples]
         owners: dict[str, Input] = {}
@@ -155,7 +155,7 @@ class Job:
         if self.volume is not None:
             phi.save(f"{stem}{self.volume}")
         surfaces = []
-        for distance, name in zip(self.offsets, told_apart(self.offsets), strict=True):
+        for distance, name in zip(self.offsets, distinct_names(self.offsets), strict=True):
             surface = cast("GridField[Literal[3]]", phi).offset(distance)
             save(surface, f"{stem}_{name}{self.surfaces}")
             surfaces.append({"distance": distance, "vertices": surface.n_vertices, "faces": surface.n_faces})

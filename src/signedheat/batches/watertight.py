@@ -18,6 +18,7 @@ from ..geometry.face_tree import FaceTree
 from ..geometry.self_intersections import self_intersections
 from ..io.shapes import read, save
 from ..solids.complete import complete
+from ..solids.parts import face_areas
 from ..solids.solid import Solid
 
 BOUNDS = 1e-3
@@ -86,7 +87,7 @@ class Watertight:
             surface = solid.surface(0.5 * self.thickness, resolution=self.resolution, spacing=self.spacing)
             return surface, f"thickened to {self.thickness:g}"
         behind, ahead = solid.windings.beside(solid.triangles)
-        areas = _areas(solid.triangles)
+        areas = face_areas(solid.triangles)
         if areas[behind != ahead].sum() < BOUNDS * areas.sum():
             raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
         if not self.contoured:
@@ -119,9 +120,9 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
         "vertices": surface.n_vertices,
         "faces": surface.n_faces,
         "volume": float(volumes.sum()),
-        "area": float(_areas(corners).sum()),
+        "area": float(face_areas(corners).sum()),
         "openings": _openings(made),
-        "completed_area": float(_areas(made).sum()),
+        "completed_area": float(face_areas(made).sum()),
         "to_faces": float(off.max(initial=0.0)),
         "from_faces": float(np.abs(back).max(initial=0.0)),
         "self_intersections": len(self_intersections(surface.vertices, surface.faces)),
@@ -143,12 +144,6 @@ def in_words(figures: dict[str, object]) -> str:
 def _places(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     places: NDArray[np.float64] = np.einsum("pk,mkj->mpj", PARTS, triangles).reshape(-1, 3)
     return places
-
-
-def _areas(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    a, b, c = triangles.transpose(1, 0, 2)
-    areas: NDArray[np.float64] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return areas
 
 
 def _tree(triangles: NDArray[np.float64]) -> FaceTree:

@@ -40,7 +40,7 @@ from ..io import (
 )
 from ..io.fields import VALUE_FORMATS, save_with_values
 from ..io.figures import describe as describe
-from ..io.files import contents, extension, told_apart
+from ..io.files import contents, distinct_names, extension
 from ..io.images import CONFIDENCE, NIFTI
 from ..io.scenes import METRES, unit_of
 from ..io.voxels import LabelImage, read_labels
@@ -352,4 +352,4 @@ def output_names(output: str, distances: list[float]) -> list[str]:
     path = Path(output)
     if len(distances) == 1 or not path.name:  # a name that is none is refused as it is
         return [output]
-    return [str(path.with_name(f"{path.stem}_{number}{path.suffix}")) for number in told_apart(distances)]
+    return [str(path.with_name(f"{path.stem}_{number}{path.suffix}")) for number in distinct_names(distances)]

@@ -37,7 +37,7 @@ from .curve_readers import (
     read_obj,
     read_text,
 )
-from .files import PathLike, extension, reading, replacing, unknown_extension
+from .files import PathLike, format_for, reading, replacing
 from .globe import write_geojson
 
 
@@ -80,11 +80,10 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     ...     read_curves(f"{folder}/curves.txt", mesh)
     [Curve(3 points, open, oriented)]
     """
-    if extension(path) not in READERS:
-        raise unknown_extension(path, READERS, "curves")
+    read_groups = format_for(path, READERS, "curves")
     domain = surface_in_space(domain)
     with reading(path):
-        found = READERS[extension(path)](path, domain)
+        found = read_groups(path, domain)
         sources = [source if isinstance(source, Curve) else placed(source, domain) for source in found]
         if strict:
             refuse_gaps(sources, domain.triangulation)
@@ -132,10 +131,9 @@ def write_curves(
     FileFormatError
         If the format is unknown or the file cannot be written.
     """
-    if extension(path) not in WRITERS:
-        raise unknown_extension(path, WRITERS, "curves")
+    content_of = format_for(path, WRITERS, "curves")
     listed = [curves] if isinstance(curves, (Curve, SurfacePoints)) else list(curves)
-    content = WRITERS[extension(path)](listed, surface_in_space(domain))
+    content = content_of(listed, surface_in_space(domain))
     with replacing(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
 

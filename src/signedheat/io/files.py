@@ -51,12 +51,12 @@ def format_for(path: PathLike, formats: Mapping[str, T], purpose: str) -> T:
     return formats[extension(path)]
 
 
-def told_apart(numbers: Sequence[float]) -> list[str]:
-    """Numbers with their signs, for names of files: in six digits, or in as many as tell them apart.
+def distinct_names(numbers: Sequence[float]) -> list[str]:
+    """Numbers with their signs, for names of files: in six digits, or in as many as make them distinct.
 
     Examples
     --------
-    >>> told_apart([0.1, -2.0]), told_apart([0.12345678, 0.12345679])
+    >>> distinct_names([0.1, -2.0]), distinct_names([0.12345678, 0.12345679])
     (['+0.1', '-2'], ['+0.12345678', '+0.12345679'])
     """
     for digits in range(6, 18):

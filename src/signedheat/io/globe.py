@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,8 @@ from ..domains.kinds import EmbeddedSurface
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, UnsupportedTypeError
-from .files import PathLike, extension, reading, text, unknown_extension
+from .files import PathLike, format_for, reading, text
 from .points import read_point_lists
-
-GLOBE_FORMATS = frozenset({".csv", ".json", ".geojson"})
 
 Line = tuple[NDArray[np.float64], bool]
 """Longitudes and latitudes in degrees, and whether the last point is joined to the first."""
@@ -49,13 +47,9 @@ def read_globe_curves(path: PathLike, mesh: TriangleMesh | PolygonMesh | Foreign
         If a point is out of range, two in succession are opposite each other, or the mesh is no globe.
     """
     mesh = converted(mesh)
-    if extension(path) not in GLOBE_FORMATS:
-        raise unknown_extension(path, GLOBE_FORMATS, "curves on a globe")
+    read_lines = format_for(path, GLOBE_FORMATS, "curves on a globe")
     with reading(path):
-        if extension(path) == ".csv":
-            lines = read_point_lists(path, 2)
-        else:
-            lines = list(_lines(json.loads(text(path)), 0))
+        lines = read_lines(path)
         if not lines:
             raise FileFormatError("there is no curve in it", remedy="export lines or polygons", path=path)
         return [globe_curve(mesh, points, closed) for points, closed in lines]
@@ -111,3 +105,14 @@ def _turns_left(points: NDArray[np.float64]) -> float:
     """1 if a ring runs counter-clockwise in the plane of longitude and latitude, else −1."""
     x, y = points.T
     return 1.0 if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0 else -1.0
+
+
+def _geojson(path: PathLike) -> list[Line]:
+    return list(_lines(json.loads(text(path)), 0))
+
+
+GLOBE_FORMATS: dict[str, Callable[[PathLike], list[Line]]] = {
+    ".csv": lambda path: read_point_lists(path, 2),
+    ".geojson": _geojson,
+    ".json": _geojson,
+}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..domains.polyline import Polyline
 from ..errors import FileFormatError, GeometryError
 from ..packages import lazy_module
-from .files import PathLike, contents, extension, parsed_by_others, reading, replacing, unknown_extension
+from .files import PathLike, contents, format_for, parsed_by_others, reading, replacing
 from .points import read_point_lists, write_point_lists
 
 svgpathtools = lazy_module("svgpathtools", "SVG drawings")
@@ -53,10 +53,9 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     ...     read_polylines(f"{folder}/square.svg")
     [Polyline(4 points, closed)]
     """
-    if extension(path) not in POLYLINE_FORMATS:
-        raise unknown_extension(path, POLYLINE_FORMATS, "polylines in the plane")
+    read_lists = format_for(path, READERS, "polylines in the plane")
     with reading(path):
-        lists = read_svg(path) if extension(path) == ".svg" else read_point_lists(path, 2)
+        lists = read_lists(path)
     lines = []
     for number, (points, closed) in enumerate(lists):
         try:
@@ -84,13 +83,8 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
     FileFormatError
         If the format is unknown or the file cannot be written.
     """
-    if extension(path) not in POLYLINE_FORMATS:
-        raise unknown_extension(path, POLYLINE_FORMATS, "polylines in the plane")
-    listed = [lines] if isinstance(lines, Polyline) else list(lines)
-    if extension(path) == ".svg":
-        content = svg(listed)
-    else:
-        content = write_point_lists([(line.points, line.closed) for line in listed])
+    content_of = format_for(path, WRITERS, "polylines in the plane")
+    content = content_of([lines] if isinstance(lines, Polyline) else list(lines))
     with replacing(path) as temporary:
         temporary.write_text(content, encoding="utf-8")
 
@@ -146,4 +140,14 @@ def svg(lines: Sequence[Polyline]) -> str:
     )
 
 
-POLYLINE_FORMATS = frozenset({".csv", ".svg"})
+def table(lines: Sequence[Polyline]) -> str:
+    """x and y on each line, an empty line between polylines."""
+    return write_point_lists([(line.points, line.closed) for line in lines])
+
+
+READERS: dict[str, Callable[[PathLike], list[tuple[NDArray[np.float64], bool]]]] = {
+    ".csv": lambda path: read_point_lists(path, 2),
+    ".svg": read_svg,
+}
+WRITERS: dict[str, Callable[[Sequence[Polyline]], str]] = {".csv": table, ".svg": svg}
+POLYLINE_FORMATS = frozenset(READERS)

@@ -20,7 +20,7 @@ from ..domains.exchange import NAME
 from ..errors import FileFormatError
 from ..fields.grid_field import GridField
 from ..operators.grid.blocks import CUBE, SIDE, Blocks
-from .files import PathLike, extension, replacing, unknown_extension
+from .files import PathLike, format_for, replacing
 
 MAGIC, FILE_VERSION, LIBRARY = 0x56444220, 224, (10, 0)
 """First number of every file, the format's version, and that of a library that writes it so."""
@@ -64,8 +64,7 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
     >>> bool(abs(back([[1.1, 0, 0]])[0] - 0.1) < 0.02)
     True
     """
-    if extension(path) != ".vdb":
-        raise unknown_extension(path, [".vdb"], "an OpenVDB grid")
+    format_for(path, {".vdb": None}, "an OpenVDB grid")
     if field.grid.dimension != 3:
         raise FileFormatError("an OpenVDB grid has three axes", remedy="save the field as .npz", path=path)
     tree = _LevelSet(field) if field.blocks is not None else _dense_tree(field)
