@@ -68,7 +68,7 @@ class Job:
     surfaces : str
         Extension of their files.
     samples : Sampling, optional
-        Points to learn from, ``NAME.npz``; ``NAME_samples.npz`` beside a field of that name.
+        Points to learn from, ``NAME.npz``; ``NAME_samples.npz`` next to a field of that name.
     info : bool
         Report counts and defects of the shape, as ``signedheat info`` does, in the manifest.
     resolution, spacing, padding

@@ -261,7 +261,7 @@ def _in_processes(
 def _on_cluster(
     tasks: list[Task], address: str, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
-    """Outcomes as they come from a Dask cluster, each task in a process beside the Dask worker that got it."""
+    """Outcomes as they come from a Dask cluster, each task in a process of its own on the worker that got it."""
     with connected(address) as client:
         pool = client.get_executor(pure=False)
         jobs = {pool.submit(do_apart, task, threads, time_limit): task for task in tasks}

@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     with Signals() as signals, _warnings_in_lines():
         try:
             return _run(argv)
-        except SystemExit as stop:  # argparse: help was asked for, or the usage is wrong
+        except SystemExit as stop:  # argparse: help was wanted, or the usage is wrong
             return int(stop.code or 0)
         except BaseException as error:
             if signals.caught or isinstance(error, KeyboardInterrupt):  # whatever else it became on its way

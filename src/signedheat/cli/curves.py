@@ -85,7 +85,7 @@ def about_curves(written: str) -> tuple[Option, ...]:
         "--contours",
         type=whole_number(1, 1000),
         metavar="N",
-        help="write N isolines beside the output, as OUT.contours.obj",
+        help="write N isolines next to the output, as OUT.contours.obj",
     ),
     option(
         "--subdivide",

@@ -1,4 +1,4 @@
-"""How commands are declared: options as data beside the function that runs them, and one parser made of all.
+"""How commands are declared: options as data next to the function that runs them, and one parser made of all.
 
 Nothing here imports NumPy, so that help and errors of usage come at once.
 """

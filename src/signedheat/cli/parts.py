@@ -1,6 +1,6 @@
 """Parts of the package that commands use, imported when one of them is first used.
 
-So help and errors of usage come at once, without NumPy, although a command is declared beside what runs it.
+So help and errors of usage come at once, without NumPy, although a command is declared next to what runs it.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
     Raises
     ------
     FileFormatError
-        If what is on standard input is of no format that can be told from what it begins with.
+        If what is on standard input is of no format that can be recognised from what it begins with.
     """
     inputs = [name for name in INPUTS if getattr(arguments, name, None) == "-"]
     output = getattr(arguments, "output", None) == "-"
@@ -132,7 +132,9 @@ def sniffed(data: bytes) -> str:
         if lines and test():
             return ending
     raise FileFormatError(
-        "what is on standard input is of no format that can be told from its beginning" if data else "nothing is there",
+        "what is on standard input is of no format that can be recognised from its beginning"
+        if data
+        else "nothing is there",
         remedy="name a file",
         path="standard input",
     )

@@ -93,7 +93,7 @@ def _nearest(
     corners[:, 2, 2] = np.linalg.norm(b - a, axis=1)  # a triangle that stands on each segment is nearest at its foot
     features = FaceFeatures.of(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
     found = FaceTree.of(features).search(np.pad(points, ((0, 0), (0, 1))))
-    return found.distances, found.feet[:, :2], features.ids[found.faces]
+    return found.distances, found.places[:, :2], features.ids[found.faces]
 
 
 def _sides(

@@ -93,7 +93,7 @@ def _converted(domain: Surface, source: object) -> object:
 
 
 def _is_point(domain: Surface, curve: Curve) -> bool:
-    """Whether all points of a curve coincide; faces that do not exist are told by who uses the curve."""
+    """Whether all points of a curve coincide; faces that do not exist are refused by who uses the curve."""
     triangles = domain.triangulation
     if not hasattr(triangles, "vertices") or not ((curve.faces >= 0) & (curve.faces < triangles.n_faces)).all():
         return False

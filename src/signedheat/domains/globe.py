@@ -31,7 +31,7 @@ def globe_curve(
     closed : bool
         Whether the last point is joined to the first.
     oriented : bool
-        Whether the sides of the curve are told apart.
+        Whether the sides of the curve are distinguished.
 
     Returns
     -------

@@ -50,7 +50,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
 
 
 def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
-    """Curves whose points differ: those in a row that rounding alone tells apart are one, and one alone is no curve.
+    """Curves whose points differ: those in a row that differ by rounding alone are one, and one alone is no curve.
 
     Of points less than `SAME` of a face's least height apart the last stays, whose face holds what follows.
 

@@ -169,8 +169,8 @@ def finite_number(
     2.0
     """
     if isinstance(value, bool) or not isinstance(value, Real | np.ndarray) or np.ndim(value) != 0:  # type: ignore[arg-type]
-        told = _described(value) if isinstance(value, np.ndarray) else " ".join(f"{value!r:.60}".split())
-        raise error(f"{name} must be a number, not {told}", element=name)
+        described = _described(value) if isinstance(value, np.ndarray) else " ".join(f"{value!r:.60}".split())
+        raise error(f"{name} must be a number, not {described}", element=name)
     number = _float(value)
     if not (np.isfinite(number) and number >= least):
         wanted = "finite" if least == -np.inf else "finite and not negative" if least == 0 else f"at least {least:g}"

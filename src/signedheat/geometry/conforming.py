@@ -39,7 +39,7 @@ def conforming(
 
     Examples
     --------
-    A large face beside two small ones:
+    A large face next to two small ones:
 
     >>> corners = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 2, 0]], [[0, 0, 0], [1, -1, 0], [1, 0, 0]],
     ...                     [[1, 0, 0], [1, -1, 0], [2, 0, 0]]])

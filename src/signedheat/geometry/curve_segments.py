@@ -150,7 +150,7 @@ def given_directions(
 def carried_left(
     triangles: IntrinsicMesh, faces: NDArray[np.int64], edges: NDArray[np.int64], lengths: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(k,) −1 where the face that tells a segment's left is turned against those of most of the curve, else 1.
+    """(k,) −1 where the face that decides a segment's left is turned against those of most of the curve, else 1.
 
     Faces are compared across the edges around the curve, so left stays on one side of it however faces are turned. On a
     curve along which orientation is lost, left changes sides somewhere.
@@ -160,7 +160,7 @@ def carried_left(
     triangles : IntrinsicMesh
         The surface.
     faces, edges : (k,) int
-        Face of each segment, and the edge that it runs along or −1: there the first face at the edge tells left.
+        Face of each segment, and the edge that it runs along or −1: there the first face at the edge decides.
     lengths : (k,) float
         Of the segments.
     """

@@ -1,4 +1,4 @@
-"""The sides of curves on a surface, told by the curves alone: where they are closed, no heat is needed."""
+"""The sides of curves on a surface, found from the curves alone: where they are closed, no heat is needed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class CurveSides:
     regions : (n,) int
         1 or −1 in regions that the curves bound from one side only, without a free end in it; 0 elsewhere.
     nearby : (n,) int
-        The side of the nearest segment among those in the faces at a vertex; 0 where there is none, and beside free
+        The side of the nearest segment among those in the faces at a vertex; 0 where there is none, and near free
         ends.
     reach : (n,) float
         Distance to that segment; inf where there is none.
@@ -43,7 +43,7 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
     """Find the sides of curves, from their segments.
 
     The regions are those of vertices joined by edges that no curve crosses. A region is on one side if all segments
-    seen from its vertices show them the same side; free ends connect both, and make every region beside them unknown.
+    seen from its vertices show them the same side; free ends connect both, and make every region around them unknown.
     """
     ends = free_ends(triangles, placed)
     nearby, reach = nearest_sides(triangles, placed, ends)
@@ -55,12 +55,12 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
     is_open = ~(on_curve[tail] | on_curve[head])
     is_open[nodes.elements[nodes.kinds == EDGE]] = False
     region = connected_components(triangles.n_vertices, tail[is_open], head[is_open])
-    told = np.zeros((2, region.max(initial=-1) + 1), dtype=bool)
-    told[0, region[nearby > 0]] = told[1, region[nearby < 0]] = True
+    reached = np.zeros((2, region.max(initial=-1) + 1), dtype=bool)
+    reached[0, region[nearby > 0]] = reached[1, region[nearby < 0]] = True
     if len(ends):
         around = triangles.corner_vertices[incident_faces(triangles, placed.nodes[ends])[1]]
-        told[:, region[around]] = True
-    side = told[0].astype(np.int64) - told[1]
+        reached[:, region[around]] = True
+    side = reached[0].astype(np.int64) - reached[1]
     return CurveSides(np.where(on_curve, 0, side[region]), np.where(on_curve, 0, nearby), reach, ends)
 
 
@@ -88,7 +88,7 @@ def nearest_sides(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Side of the nearest oriented segment in the faces at each vertex, and the distance to it.
 
-    Of segments that meet at the nearest point, the one that is seen most from the front tells the side.
+    Of segments that meet at the nearest point, the one that is seen most from the front decides the side.
     """
     n = triangles.n_vertices
     rows = np.flatnonzero(placed.sides != 0)

@@ -102,7 +102,7 @@ class _Creases:
 def _flips(
     vertices: NDArray[np.float64], creases: _Creases, whole: NDArray[np.bool_], held: NDArray[np.bool_] | None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of faces to replace, (k,) each, none beside another, and what replaces them, (k, 3) each.
+    """Pairs of faces to replace, (k,) each, no two of them neighbors, and what replaces them, (k, 3) each.
 
     The edge from a to b has c and d across; the edge from c to d takes its place, unless there is one already: of the
     vertices that are `whole`, one of which it needs, all faces are here.
@@ -121,12 +121,12 @@ def _flips(
     normals = creases.normals
     gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *made)
     reach = np.linalg.norm(vertices[c] - vertices[d], axis=1)
-    beside = [first, second]
+    faces_around = [first, second]
     for tail, head, side, owner, new in rim:
         beyond = mates[3 * owner + side]
         there = beyond >= 0
         other = np.where(there, beyond // 3, owner)
-        beside.append(other)
+        faces_around.append(other)
         before = _bend(vertices, tail, head, normals[owner], normals[other])
         gain += np.where(there, before - _bend(vertices, tail, head, made[new], normals[other]), 0.0)
     taken = np.sort(edge_keys(*creases.table.vertices.T))
@@ -140,9 +140,9 @@ def _flips(
     rank[order] = np.arange(1, len(gain) + 1)
     rank[gain <= GAIN * reach] = 0
     best = np.zeros(len(faces), dtype=np.int64)
-    for face in beside:
+    for face in faces_around:
         np.maximum.at(best, face, rank)
-    won = np.flatnonzero((rank > 0) & np.all([best[face] == rank for face in beside], axis=0))  # none beside another
+    won = np.flatnonzero((rank > 0) & np.all([best[face] == rank for face in faces_around], axis=0))
     won = won[np.unique(keys[won], return_index=True)[1]]  # two of them may want the same edge
     return first[won], second[won], np.stack([a, d, c], axis=1)[won], np.stack([d, b, c], axis=1)[won]
 

@@ -37,7 +37,7 @@ Normals: TypeAlias = tuple[
 ]
 """See `FaceFeatures.normals`."""
 FOLD = 0.02
-"""Where unit normals of two faces add up to less than this, the edge between them is a fold and tells no side."""
+"""Where unit normals of two faces add up to less than this, the edge between them is a fold and decides no side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,8 @@ class FaceFeatures:
     """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
 
     An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
-    a vertex is, if all edges around it are and its faces make one fan. There the sign of ``(x − foot) · normal`` tells
-    the side of a point x whose nearest place the foot is.
+    a vertex is, if all edges around it are and its faces make one fan. There the sign of ``(x − y) · normal`` is the
+    side of a point x whose nearest place is y.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class FaceFeatures:
 
     @property
     def normals(self) -> Normals:
-        """What tells the side of a foot."""
+        """What decides the side of a place."""
         return (
             self.faces,
             self.edges,

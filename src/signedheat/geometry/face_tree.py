@@ -86,7 +86,7 @@ class FaceTree:
         nearer = self._brought_near(points)
         faces, _ = self.nearest(nearer)
         found = search_from(self.features, nearer, faces[:, None])
-        return found if nearer is points else replace(found, distances=np.linalg.norm(points - found.feet, axis=1))
+        return found if nearer is points else replace(found, distances=np.linalg.norm(points - found.places, axis=1))
 
     def _distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         nearer = self._brought_near(points)
@@ -176,19 +176,19 @@ class NearestFaces:
         Which one.
     distances : (n,) float
         To it.
-    feet : (n, 3) float
+    places : (n, 3) float
         The nearest place.
     features : (n,) int
         What it lies on, in the code of `foot_on_triangle`.
     cosines : (n,) float
         Of the angle between the way from the foot to the point and the normal there: positive in front of the face.
     regular : (n,) bool
-        Whether that tells the side: the foot is inside a face, or on a regular edge or vertex.
+        Whether that decides the side: the nearest place is inside a face, or on a regular edge or vertex.
     """
 
     faces: NDArray[np.int32]
     distances: NDArray[np.float64]
-    feet: NDArray[np.float64]
+    places: NDArray[np.float64]
     features: NDArray[np.int8]
     cosines: NDArray[np.float32]
     regular: NDArray[np.bool_]
@@ -204,11 +204,11 @@ def search_from(
     Where a point has no candidate, there is no face, and distance is infinite.
     """
     n = len(points)
-    faces, squares, feet = np.empty(n, dtype=np.int32), np.empty(n), np.empty((n, 3))
+    faces, squares, places = np.empty(n, dtype=np.int32), np.empty(n), np.empty((n, 3))
     codes, cosines, regular = np.empty(n, dtype=np.int8), np.empty(n, dtype=np.float32), np.empty(n, dtype=np.bool_)
-    nearest_of_candidates(features.links, points, candidates, faces, squares, codes, feet)
-    facing(features.normals, points, faces, codes, feet, cosines, regular)
-    return NearestFaces(faces, np.sqrt(squares), feet, codes, cosines, regular)
+    nearest_of_candidates(features.links, points, candidates, faces, squares, codes, places)
+    facing(features.normals, points, faces, codes, places, cosines, regular)
+    return NearestFaces(faces, np.sqrt(squares), places, codes, cosines, regular)
 
 
 @compiled
@@ -219,7 +219,7 @@ def nearest_of_candidates(
     out_faces: NDArray[np.int32],
     out_squares: NDArray[np.float64],
     out_features: NDArray[np.int8],
-    out_feet: NDArray[np.float64],
+    out_places: NDArray[np.float64],
 ) -> None:
     """From the nearest of some faces, and the foot of each point on it, to faces that are nearer, across their rims.
 
@@ -274,7 +274,7 @@ def nearest_of_candidates(
                 break
             face, square, feature, fx, fy, fz = other, s, which, u, v, w
         out_faces[p], out_squares[p], out_features[p] = face, square, feature
-        out_feet[p, 0], out_feet[p, 1], out_feet[p, 2] = fx, fy, fz
+        out_places[p, 0], out_places[p, 1], out_places[p, 2] = fx, fy, fz
 
 
 @compiled
@@ -283,11 +283,11 @@ def facing(
     points: NDArray[np.float64],
     which: NDArray[np.int32],
     codes: NDArray[np.int8],
-    feet: NDArray[np.float64],
+    places: NDArray[np.float64],
     out_cosines: NDArray[np.float32],
     out_regular: NDArray[np.bool_],
 ) -> None:
-    """Cosine between the way from each foot to its point and the normal there; and whether that tells the side."""
+    """Cosine between the way from each foot to its point and the normal there; and whether that decides the side."""
     faces, edges, face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular = normals
     for p in range(len(points)):
         face, code = np.int64(which[p]), np.int64(codes[p])
@@ -305,7 +305,7 @@ def facing(
             e = faces[face, code - 4]
             nx, ny, nz = vertex_normals[e, 0], vertex_normals[e, 1], vertex_normals[e, 2]
             regular = vertex_regular[e]
-        dx, dy, dz = points[p, 0] - feet[p, 0], points[p, 1] - feet[p, 1], points[p, 2] - feet[p, 2]
+        dx, dy, dz = points[p, 0] - places[p, 0], points[p, 1] - places[p, 1], points[p, 2] - places[p, 2]
         lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + dz * dz))
         if lengths > 0.0:
             out_cosines[p] = (nx * dx + ny * dy + nz * dz) / lengths

@@ -23,7 +23,7 @@ from .signed_graph import Links, signs_of
 from .welding import distinct_rows
 
 GIVEN = 1.0
-"""Weight of a given normal, beside that of a neighbour in the same plane, of which there are six."""
+"""Weight of a given normal, relative to that of a neighbour in the same plane, of which there are six."""
 _CHUNK = 65536
 
 

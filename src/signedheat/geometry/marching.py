@@ -112,9 +112,9 @@ def closed_at_unknown(height: NDArray[np.float64]) -> NDArray[np.float64]:
     depth = np.pad(np.where(height < 0, -height, 0.0), 1)
     sums, counts = np.zeros_like(height), np.zeros_like(height)
     for shift in np.ndindex((3,) * height.ndim):
-        beside = depth[tuple(slice(i, i + n) for i, n in zip(shift, height.shape, strict=True))]
-        sums += beside
-        counts += beside > 0
+        shifted = depth[tuple(slice(i, i + n) for i, n in zip(shift, height.shape, strict=True))]
+        sums += shifted
+        counts += shifted > 0
     filling = np.where(counts > 0, (1 / CAP - 1) * sums / np.maximum(counts, 1), 1.0)
     return np.where(unknown, filling, height)
 

@@ -266,8 +266,8 @@ def descend(
                         px, py, pz = x - discs[child, 0], y - discs[child, 1], z - discs[child, 2]
                         along = px * discs[child, 3] + py * discs[child, 4] + pz * discs[child, 5]
                         height = max(abs(along) - discs[child, 7], 0.0)
-                        beside = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0)) - discs[child, 6]
-                        flat = height * height + (beside * beside if beside > 0.0 else 0.0)
+                        outside = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0)) - discs[child, 6]
+                        flat = height * height + (outside * outside if outside > 0.0 else 0.0)
                         square = max(square, flat)
                     if square < gap:
                         near, gap, other = child, square, gap

@@ -115,7 +115,7 @@ def best_signs(weights: NDArray[np.float64], first: NDArray[np.float64]) -> NDAr
     weights : (n, n) float
         W; its diagonal does not matter.
     first : (n,) float
-        Signs ±1 to start from, beside those that `signs_of` finds and those of the first two eigenvectors.
+        Signs ±1 to start from, in addition to those that `signs_of` finds and those of the first two eigenvectors.
 
     Examples
     --------
@@ -138,15 +138,15 @@ def _turned_in_groups(
     weights: NDArray[np.float64], groups: list[NDArray[np.int64]], found: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Signs, with groups turned, one after the other, that agree more with the others then, until none does."""
-    told, least = weights @ found, 1e-12 * float(np.abs(weights).sum())
+    agreement, least = weights @ found, 1e-12 * float(np.abs(weights).sum())
     for _ in range(_ROUNDS):
         turned = False
         for group in groups:
             own = found[group]
-            outside = float(own @ told[group] - own @ weights[np.ix_(group, group)] @ own)
+            outside = float(own @ agreement[group] - own @ weights[np.ix_(group, group)] @ own)
             if outside < -least:
                 found[group] = -own
-                told -= 2 * weights[:, group] @ own
+                agreement -= 2 * weights[:, group] @ own
                 turned = True
         if not turned:
             break
@@ -175,8 +175,8 @@ def _merged(links: Links, n_nodes: int) -> _Graph:
     pairs, which = np.unique(low * n_nodes + high, return_inverse=True)
     total = np.bincount(which.ravel(), weights[apart], len(pairs))
     size = np.bincount(which.ravel(), np.abs(weights[apart]), len(pairs))
-    told = np.abs(total) > 1e-12 * size
-    low, high, total = pairs[told] // n_nodes, pairs[told] % n_nodes, total[told]
+    clear = np.abs(total) > 1e-12 * size
+    low, high, total = pairs[clear] // n_nodes, pairs[clear] % n_nodes, total[clear]
     rows, columns = np.concatenate([low, high]), np.concatenate([high, low])
     order = np.lexsort((columns, rows))
     starts = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n_nodes))])
@@ -214,10 +214,10 @@ def turn_where_better(
     for _ in range(rounds):
         turned = False
         for node in range(len(signs)):
-            told = 0.0
+            agreement = 0.0
             for k in range(starts[node], starts[node + 1]):
-                told += weights[k] * signs[neighbors[k]]
-            if told * signs[node] < 0.0:
+                agreement += weights[k] * signs[neighbors[k]]
+            if agreement * signs[node] < 0.0:
                 signs[node] = -signs[node]
                 turned = True
         if not turned:

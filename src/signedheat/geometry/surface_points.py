@@ -108,7 +108,7 @@ def corners_at(
     if not np.issubdtype(vertices.dtype, np.integer):
         if len(vertices) == 0:
             return np.empty(0, dtype=np.int64)
-        raise SourceError(f"{name}s are told by integer vertex ids, not {vertices.dtype}", element="vertices")
+        raise SourceError(f"{name}s are given by integer vertex ids, not {vertices.dtype}", element="vertices")
     outside = np.flatnonzero((vertices < 0) | (vertices >= n_vertices))
     if len(outside):
         raise SourceError(

@@ -60,9 +60,9 @@ def uphill_roots(
     [0, 0, 0]
     """
     own = np.arange(len(heights))
-    beside = np.where(neighbors >= 0, heights[neighbors], -np.inf)
-    best = beside.argmax(axis=1)
-    higher = ~settled & (beside[own, best] > heights)
+    around = np.where(neighbors >= 0, heights[neighbors], -np.inf)
+    best = around.argmax(axis=1)
+    higher = ~settled & (around[own, best] > heights)
     roots = np.where(higher, neighbors[own, best], own)
     while True:  # every round doubles the length of the paths followed
         further = roots[roots]

@@ -69,7 +69,7 @@ def save_field(field: GridField, path: PathLike) -> None:
     """Write a field on a grid, in the format given by the extension.
 
     ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
-    same name beside it, ``.vdb`` (OpenVDB; single precision).
+    same name next to it, ``.vdb`` (OpenVDB; single precision).
 
     Parameters
     ----------
@@ -93,8 +93,8 @@ def save_field(field: GridField, path: PathLike) -> None:
     write = (_GRID_WRITERS if field.blocks is None else _BAND_WRITERS)[extension(path)]
     if extension(path) == ".npy":
         about = {"origin": field.grid.origin.tolist(), "spacing": field.grid.spacing.tolist(), "convention": CONVENTION}
-        with replacing(Path(path).with_suffix(".json")) as beside, replacing(path) as temporary:
-            beside.write_text(json.dumps(about, indent=1) + "\n")
+        with replacing(Path(path).with_suffix(".json")) as companion, replacing(path) as temporary:
+            companion.write_text(json.dumps(about, indent=1) + "\n")
             write(field, temporary)
     else:
         with replacing(path) as temporary:

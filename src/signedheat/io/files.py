@@ -1,7 +1,7 @@
 """The one place where files are opened, sized and replaced.
 
 Whatever is read is a regular file that fits into memory, and whatever goes wrong in a parser is an error that names the
-file. Whatever is written is written beside, with the permissions that it will have, and renamed when it is whole.
+file. Whatever is written is written next to it, with the permissions that it will have, and renamed when it is whole.
 """
 
 from __future__ import annotations
@@ -287,7 +287,7 @@ def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> Non
 def replacing(path: PathLike) -> Iterator[Path]:
     """A temporary file to write to, which is renamed to `path` on success and removed otherwise.
 
-    It lies beside the file that `path` leads to, and has the permissions of that file, or those that new files have.
+    It lies in the folder that `path` leads to, and has the permissions of the file there, or those that new files have.
 
     Raises
     ------
@@ -340,7 +340,7 @@ def replaceable(path: PathLike) -> os.stat_result | None:
 
 
 def _new_file(path: PathLike) -> Path:
-    """An empty file of a name that is not used, beside what `path` leads to and with the same permissions."""
+    """An empty file of a name that is not used, in the folder of what `path` leads to and with the same permissions."""
     status, real = replaceable(path), Path(os.path.realpath(path))
     new = real.with_name(f".signedheat-{secrets.token_hex(8)}{real.suffix}")
     # created for its owner alone, so that what is secret is so from the start

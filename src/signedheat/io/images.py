@@ -83,7 +83,7 @@ class Image:
     space : str, optional
         What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
     mask, confidence : (n₁, …, n_d), optional
-        What a field has besides its values.
+        What a field has in addition to its values.
     """
 
     values: NDArray[Any]
@@ -129,11 +129,11 @@ def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> 
 
 def _read_npy(path: PathLike) -> Image:
     """An array; origin and spacing from the ``.json`` of the same name, if there is one."""
-    values, beside = read_npy(path), Path(path).with_suffix(".json")
-    if not beside.exists():
+    values, companion = read_npy(path), Path(path).with_suffix(".json")
+    if not companion.exists():
         return _aligned(values, np.zeros(values.ndim), np.ones(values.ndim))
-    text = contents(beside)
-    with reading(beside):
+    text = contents(companion)
+    with reading(companion):
         about = json.loads(text)
         return _aligned(values, about["origin"], about["spacing"])
 
@@ -156,11 +156,11 @@ def _read_nrrd(path: PathLike) -> Image:
         warnings.simplefilter("ignore")  # about fields that nobody needs
         header = dict(nrrd.read_header(file))
     rest = data[file.tell() :]
-    beside = header.get("data file", header.get("datafile"))
-    if beside is not None:
-        if beside.startswith("LIST") or "%" in beside:
+    companion = header.get("data file", header.get("datafile"))
+    if companion is not None:
+        if companion.startswith("LIST") or "%" in companion:
             raise FileFormatError("its data are in several files", remedy="save it as one")
-        rest = contents_beside(path, beside)
+        rest = contents_beside(path, companion)
     sizes = [int(n) for n in header["sizes"]]
     code = _CODES.get(header["type"])
     if code is None or len(sizes) != header["dimension"] or min(sizes, default=0) < 1:

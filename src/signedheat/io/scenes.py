@@ -279,7 +279,7 @@ def _object(element: ElementTree.Element, part: str) -> _Object:
 def read_step(path: PathLike, deflection: float | None = None) -> tuple[TriangleMesh, NDArray[np.int64]]:
     """Triangles of a ``.step`` or ``.stp`` file, and the number of the CAD face that each is part of.
 
-    `Closest.faces` are triangles: the second array, taken at them, tells on which CAD face the nearest place lies.
+    `Closest.faces` are triangles: the second array, taken at them, says on which CAD face the nearest place lies.
 
     Parameters
     ----------

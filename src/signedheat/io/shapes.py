@@ -56,7 +56,7 @@ WRITERS: dict[str, Callable[[SurfaceShape, PathLike], bytes]] = {
 SHAPE_FORMATS = frozenset(WRITERS)
 
 MANY, BYTES_PER_FACE = 100_000, 250
-"""Faces from which on their memory is looked at; and measured: what each takes at least, whatever is asked of it."""
+"""Faces from which on their memory is looked at; and measured: what each takes at least, whatever is done with it."""
 
 
 def read(path: PathLike) -> Shape:

@@ -206,7 +206,7 @@ class _Tree:
 
 
 class _LevelSet(_Tree):
-    """Blocks of a band: what is not there is plus or minus the background, as the coarse field tells."""
+    """Blocks of a band: what is not there is plus or minus the background, as in the coarse field."""
 
     def __init__(self, field: GridField) -> None:
         self.field = field

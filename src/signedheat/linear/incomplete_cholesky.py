@@ -184,7 +184,7 @@ def _precondition(indptr, indices, factor, pivots, r):
 
 @compiled
 def _settled(diagonal, x, r, componentwise):
-    """Whether every row's residual is small beside its own unknowns."""
+    """Whether every row's residual is small compared with its own unknowns."""
     n, width = x.shape
     for i in range(n):
         largest, residual = 0.0, 0.0

@@ -54,7 +54,7 @@ class PardisoFactor:
     def like_this(self, upper: sparse.csr_matrix) -> PardisoFactor | None:
         """Factor of another matrix with entries at the same places, for half the time; None if they are not.
 
-        It takes the memory of this one, which is factorised again when it is asked to solve.
+        It takes the memory of this one, which is factorised again when it is to solve.
         """
         if not self._analysis.fits(upper) or not _makes_factors_anew():
             return None

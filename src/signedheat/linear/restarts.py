@@ -103,8 +103,8 @@ def matrix_forces(matrix: sparse.csr_matrix) -> Forces:
     pattern = sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
 
     def border_forces(values: NDArray[Any], faint: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[Any]]:
-        beside = pattern @ faint
-        return (beside > 0) & (beside < np.diff(matrix.indptr)), matrix @ values
+        around = pattern @ faint
+        return (around > 0) & (around < np.diff(matrix.indptr)), matrix @ values
 
     return border_forces
 

@@ -93,7 +93,7 @@ class Offset:
         if self.level == 0:
             tree = self.solid.tree
             found = tree.search(points)
-            return found.feet, tree.features.face_normals[found.faces]
+            return found.places, tree.features.face_normals[found.faces]
         heights, gradients = self.slopes(points)
         return points - heights[:, None] * gradients, gradients
 
@@ -139,7 +139,7 @@ class Offset:
         assert callable(self.reach)
         step = STEP * float(np.ptp(self.solid.tree.tree.bounds[1].reshape(2, 3), axis=0).max())
         around = (points[:, None] + step * ALONG_AXES).reshape(-1, 3)
-        found = self.reach(self.solid.tree.search(around).feet).reshape(-1, 2, 3)
+        found = self.reach(self.solid.tree.search(around).places).reshape(-1, 2, 3)
         result: NDArray[np.float64] = (found[:, 0] - found[:, 1]) / (2 * step)
         return result
 

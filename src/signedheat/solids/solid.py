@@ -316,7 +316,7 @@ class Solid(Frozen, ShortRepr):
         found = self.tree.search(points)
         ids = self.features.ids[found.faces]
         signs = np.where(self._inside(points, found), -1.0, 1.0)
-        away = points - found.feet
+        away = points - found.places
         lengths = found.distances
         clear = lengths > 1e-12 * np.abs(points).max(initial=1e-290)
         normals = self.features.face_normals[found.faces]
@@ -325,8 +325,8 @@ class Solid(Frozen, ShortRepr):
         weights = np.full((len(points), 3), np.nan)
         if self.source is not None:
             given = origins >= 0
-            weights[given] = weights_in(self.source.vertices[self.source.faces[origins[given]]], found.feet[given])
-        return signs * lengths, found.feet, origins, weights, gradients, self.confidence[ids]
+            weights[given] = weights_in(self.source.vertices[self.source.faces[origins[given]]], found.places[given])
+        return signs * lengths, found.places, origins, weights, gradients, self.confidence[ids]
 
 
 def _checked(points: ArrayLike) -> NDArray[np.float64]:

@@ -39,6 +39,8 @@ def wall_ends(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArra
     """
     labels = parts_of(faces)
     edges, owners = open_edges(faces, labels)
+    several = np.bincount(labels)[owners] > 1  # what scatters as single faces has no walls
+    edges, owners = edges[several], owners[several]
     if not len(edges):
         return edges.reshape(-1, 3)
     areas = np.bincount(labels, face_areas(vertices[faces])).astype(np.float64)

@@ -95,7 +95,7 @@ def test_distances_of_blocks_are_exact_and_know_nothing_of_each_other():
         nearest = np.linalg.norm(sampled - points[p], axis=1).min()
         assert found.distances[p] <= nearest + 1e-12
         assert found.distances[p] >= nearest - 0.02
-    np.testing.assert_allclose(np.linalg.norm(points - found.feet, axis=1), found.distances, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(points - found.places, axis=1), found.distances, atol=1e-12)
     alone = tree.search(block_points(places[3:4], steps))
     np.testing.assert_array_equal(alone.distances, found.distances[3 * 512 : 4 * 512])
     np.testing.assert_array_equal(alone.faces, found.faces[3 * 512 : 4 * 512])

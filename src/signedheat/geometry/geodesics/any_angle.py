@@ -92,20 +92,20 @@ def any_angle_distance(
         inf where no surface is connected, and where there is no distance.
     nearest : (n,) int
         The triangle that it is measured from.
-    feet : (n, 3) float
+    places : (n, 3) float
         The point of that triangle at which the shortest path starts.
     hidden : int
         Number of vertices from which the nearest point of the surface is not visible.
     """
     n = len(points)
     distance = np.full(n, np.inf)
-    bend, feet = np.full(n, -1), np.zeros((n, 3))
+    bend, places = np.full(n, -1), np.zeros((n, 3))
     known = np.zeros(n, dtype=np.bool_)
     for v in range(n):
         if nearest[v] >= 0:
             x, y, z = points[v]
-            square, _, feet[v, 0], feet[v, 1], feet[v, 2] = foot_on_triangle(rows, nearest[v], x, y, z)
-            if _seen(planes, neighbors, tets, points, first_tet, tets_at, v, feet[v], slack):
+            square, _, places[v, 0], places[v, 1], places[v, 2] = foot_on_triangle(rows, nearest[v], x, y, z)
+            if _seen(planes, neighbors, tets, points, first_tet, tets_at, v, places[v], slack):
                 distance[v], known[v] = np.sqrt(square), True
     for i in range(len(rows)):  # a triangle in a tet is visible from the tet's corners, if not the nearest to them
         for k in range(4):
@@ -115,7 +115,7 @@ def any_angle_distance(
                 square, _, a, b, c = foot_on_triangle(rows, i, x, y, z)
                 if square < distance[v] ** 2:
                     distance[v], nearest[v] = np.sqrt(square), i
-                    feet[v, 0], feet[v, 1], feet[v, 2] = a, b, c
+                    places[v, 0], places[v, 1], places[v, 2] = a, b, c
                     push(queue, v, distance[v])
     hidden = 0
     for v in range(n):
@@ -137,7 +137,7 @@ def any_angle_distance(
                     continue
                 x, y, z = points[v]
                 if bend[u] >= 0:
-                    via, near, foot, length = bend[u], nearest[u], feet[u], distance[bend[u]]
+                    via, near, foot, length = bend[u], nearest[u], places[u], distance[bend[u]]
                     target = points[via]
                 else:
                     near, foot = _foot(rows, triangles_at, first_triangle, corners, nearest[u], x, y, z)
@@ -146,10 +146,10 @@ def any_angle_distance(
                 if length >= distance[v]:
                     continue
                 if not _seen(planes, neighbors, tets, points, first_tet, tets_at, v, target, slack):
-                    via, near, foot, length = u, nearest[u], feet[u], distance[u] + _length(points[u], x, y, z)
+                    via, near, foot, length = u, nearest[u], places[u], distance[u] + _length(points[u], x, y, z)
                 if length < distance[v]:
                     distance[v], bend[v], nearest[v] = length, via, near
                     for d in range(3):
-                        feet[v, d] = foot[d]
+                        places[v, d] = foot[d]
                     push(queue, v, length)
-    return distance, nearest, feet, hidden
+    return distance, nearest, places, hidden

@@ -25,7 +25,7 @@ def middle(faces, h):
 
 @compiled
 def toll(e: int) -> float:
-    """What a way through an edge costs beside its length: evenly spread numbers, by the golden ratio."""
+    """What a way through an edge costs in addition to its length: evenly spread numbers, by the golden ratio."""
     return 1.0 + TIE * ((e * 0.6180339887498949) % 1.0)
 
 

@@ -97,8 +97,8 @@ class PlacedSegments:
         nodes, ends, faces, edges, vectors = merged.nodes, merged.ends, merged.faces, merged.edges, merged.vectors
         oriented = np.array([part.oriented for part in parts])[merged.owners]
         placed = cls._inside(triangles, nodes, ends, faces, vectors, oriented, np.flatnonzero(edges < 0))
-        beside = cls._beside(triangles, nodes, ends, edges, vectors, oriented, np.flatnonzero(edges >= 0))
-        return cls(nodes, *(np.concatenate(both) for both in zip(placed, beside, strict=True)))
+        adjacent = cls._adjacent(triangles, nodes, ends, edges, vectors, oriented, np.flatnonzero(edges >= 0))
+        return cls(nodes, *(np.concatenate(both) for both in zip(placed, adjacent, strict=True)))
 
     @staticmethod
     def _inside(
@@ -123,7 +123,7 @@ class PlacedSegments:
         return ends, faces, positions, np.zeros(len(rows), dtype=bool), sides, rows
 
     @staticmethod
-    def _beside(
+    def _adjacent(
         triangles: IntrinsicMesh,
         nodes: LocatedPoints,
         ends: Ids,

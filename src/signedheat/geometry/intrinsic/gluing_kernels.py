@@ -314,7 +314,7 @@ def split_edge(g, h, fraction):
     The half at the edge's own tail keeps its id.
     """
     count = sibling_count(g, h)
-    around, beside = np.empty(count, np.int64), np.empty(count, np.int64)
+    around, seconds = np.empty(count, np.int64), np.empty(count, np.int64)
     y = h
     for k in range(count):
         around[k] = y
@@ -337,12 +337,12 @@ def split_edge(g, h, fraction):
         g.tail[second], g.tail[second + 1] = x, head
         g.forward[second], g.front[second] = g.forward[y], g.front[y]
         pair(g, first, x, second + 2, apex, cut)
-        beside[k] = second
+        seconds[k] = second
     g.length[e] = along * whole
     for k in range(count):
         l = (k + 1) % count
-        near, far = (around[k], beside[k]) if g.forward[around[k]] else (beside[k], around[k])
-        next_near, next_far = (around[l], beside[l]) if g.forward[around[l]] else (beside[l], around[l])
+        near, far = (around[k], seconds[k]) if g.forward[around[k]] else (seconds[k], around[k])
+        next_near, next_far = (around[l], seconds[l]) if g.forward[around[l]] else (seconds[l], around[l])
         g.edge[near], g.edge[far] = e, other
         g.start[e], g.start[other] = near, far
         g.sibling[near], g.sibling[far] = next_near, next_far

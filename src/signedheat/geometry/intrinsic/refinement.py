@@ -1,4 +1,4 @@
-"""Intrinsic Delaunay refinement: insert vertices until no triangle is thin, and none large beside the others."""
+"""Intrinsic Delaunay refinement: insert vertices until no triangle is thin, and none large next to the others."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def refined(
 ) -> tuple[Gluing, Agenda, int]:
     """Refine until the goal is met or out of reach; the arrays, perhaps longer ones, and why it ended."""
     list_all(gluing, agenda, goal)
-    listed = np.flatnonzero(agenda.bins >= 0)  # lists by size, large faces first: the current list tells the progress
+    listed = np.flatnonzero(agenda.bins >= 0)  # lists by size, large faces first: the current list shows the progress
     done = 0.0
     while True:
         status = refine(gluing, agenda, goal, PATIENCE)

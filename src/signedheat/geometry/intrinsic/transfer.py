@@ -142,7 +142,7 @@ def transfer_segments(
     owners, faces, carried, joined = owners[keep], faces[keep], carried[keep], joined[keep]
     starts, ends = starts[keep], ends[keep]
 
-    # the angle between segment and normal is known; the transferred normal only tells the side, however thin the faces
+    # the angle between segment and normal is known; the transferred normal only gives the side, however thin the faces
     corners = after.corner_positions[faces]
     steps = ((ends.barycentric - starts.barycentric) * corners).sum(axis=1)
     carried = np.conj(steps) * (carried[:, 1] * corners).sum(axis=1)

@@ -34,7 +34,7 @@ BEFORE[SPLIT_FACE, 0], AFTER[SPLIT_FACE] = [0, 1, 2], [[0, 1, 3], [1, 2, 3], [2,
 OUTWARD = 1e-6
 """Sine of the angle up to which a line that leaves the surface is one along its boundary, but for rounding."""
 ALONG = 1e-9
-"""Barycentric coordinates of a point and of a direction, beside the largest, below which a line runs along an edge.
+"""Barycentric coordinates of a point and of a direction, over the largest, below which a line runs along an edge.
 From face to face lines drift by some 1e-15; results are the same from 1e-12 to 1e-7."""
 ROUNDING = 1e-10
 """Of squared lengths, in parts of the size of their terms."""
