@@ -48,6 +48,7 @@ class Extrapolated:
 
     Examples
     --------
+    >>> import numpy as np
     >>> import signedheat as sh
     >>> from signedheat.samples import sphere
     >>> ball = sphere(3)

@@ -184,7 +184,7 @@ def barycentric_on_triangles(
             s = 1.0 - t
         t = min(max(t, 0.0), 1.0)
         s = min(max(s, 0.0), 1.0 - t)
-        weights[k, 0], weights[k, 1], weights[k, 2] = 1.0 - s - t, s, t
+        weights[k, 0], weights[k, 1], weights[k, 2] = max(1.0 - s - t, 0.0), s, t
     return weights
 
 
