@@ -90,11 +90,24 @@ def test_units_on_the_command_line(tmp_path, ball, capsys):
     assert json.loads(capsys.readouterr().out)["units"] == "inch"
     ball.save(tmp_path / "ball.stl")
     arguments = ["offset", str(tmp_path / "ball.stl"), "5", "-o", str(output), "--resolution", "32"]
-    assert main([*arguments, "--units", "mm"]) == 1
-    assert "--units mm:mm" in capsys.readouterr().err
+    assert main([*arguments, "--units", "mm"]) == 0
+    assert "ball.stl" in capsys.readouterr().err
+    assert np.linalg.norm(sh.read(output).vertices, axis=1).mean() == pytest.approx(6, rel=0.01)
     assert main([*arguments, "--units", "cm:mm", "--quiet"]) == 0
     assert np.linalg.norm(sh.read(output).vertices, axis=1).mean() == pytest.approx(15, rel=0.01)
     assert main([*arguments, "--units", "parsec"]) == 2
+
+
+def test_units_of_drawings(tmp_path):
+    """Lengths and distances of a square a centimetre wide are those of ten millimetres; it is moved by no matrix."""
+    path, output = tmp_path / "square.csv", tmp_path / "square.npz"
+    path.write_text("0,0\n1,0\n1,1\n0,1\n0,0\n")
+    arguments = ["volume", str(path), "-o", str(output), "--resolution", "8", "--quiet"]
+    assert main(arguments) == 0
+    inner = sh.load_field(output).values.min()
+    assert main([*arguments, "--units", "cm:mm"]) == 0
+    assert sh.load_field(output).values.min() == pytest.approx(10 * inner)
+    assert main([*arguments, "--transform", *"1 0 0 0 0 1 0 0 0 0 1 0".split()]) == 1
 
 
 def test_transforms_on_the_command_line(tmp_path, ball, capsys):

@@ -267,8 +267,8 @@ PLACE = group(
         "--units",
         type=units,
         metavar="[FROM:]TO",
-        help="units of all numbers: mm, cm, m, inch, foot, micron; FROM where the file does not say its own, as .3mf "
-        "and .glb do",
+        help="units of all numbers: mm, cm, m, inch, foot, micron; FROM: those of a file that does not say so, as .3mf "
+        "and .glb do, and is in others than TO",
     ),
     option("--transform", nargs="+", metavar="M", help="16 numbers of a matrix by rows, or 12, or a file of them"),
 )

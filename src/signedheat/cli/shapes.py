@@ -20,6 +20,7 @@ from ..diagnostics import SampledSource
 from ..domains.digital_surface import DigitalSurface
 from ..domains.grid import Grid, room_around
 from ..domains.polygon_mesh import PolygonMesh
+from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
 from ..domains.transforms import transform
 from ..domains.triangle_mesh import TriangleMesh
@@ -83,7 +84,10 @@ def read_source(arguments: Namespace) -> Any:
     """The source: a shape in space, placed, or a list of polylines in the plane."""
     path = arguments.shape
     if is_planar(path):
-        return read_polylines(path)
+        if arguments.transform is not None:
+            raise SourceError("a matrix moves shapes in space, and not drawings", element="--transform", path=path)
+        scale = 1.0 if arguments.units is None else unit_scale(arguments)
+        return [Polyline(scale * line.points, line.closed) for line in read_polylines(path)]
     shape = read(path)
     if isinstance(shape, DigitalSurface):
         shape = shape.squares
@@ -98,16 +102,19 @@ def placement(arguments: Namespace) -> NDArray[np.float64] | None:
         return None
     matrix = np.eye(4)
     if arguments.units is not None:
-        own, _, wanted = arguments.units.rpartition(":")
-        own = own or unit_of(arguments.shape)
-        if own is None:
-            raise FileFormatError(
-                "the file does not say its units", remedy=f"name both: --units mm:{wanted}", path=arguments.shape
-            )
-        matrix[:3] *= METRES[own] / METRES[wanted]
+        matrix[:3] *= unit_scale(arguments)
     if arguments.transform is not None:
         matrix = matrix_of(arguments.transform) @ matrix
     return matrix
+
+
+def unit_scale(arguments: Namespace) -> float:
+    """What ``--units`` multiplies lengths by: 1 where neither it nor the file names the units that the file is in."""
+    own, _, wanted = arguments.units.rpartition(":")
+    own = own or unit_of(arguments.shape)
+    if own is None and not is_quiet(arguments):
+        say(f"signedheat: {arguments.shape} does not say its units: taken as {wanted} (else --units inch:{wanted})")
+    return METRES[own or wanted] / METRES[wanted]
 
 
 def matrix_of(words: list[str]) -> NDArray[np.float64]:
