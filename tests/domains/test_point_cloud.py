@@ -183,6 +183,11 @@ def test_outliers_get_no_distance_and_disturb_no_one():
     assert field.diagnostics.note(PointsLeftOut).points_without_triangles.tolist() == [
         len(points) + k for k in range(3)
     ]
+    pieces = [ids[: len(ids) // 2], ids[len(ids) // 2 - 1 :]]
+    with pytest.warns(sh.errors.UnreachedWarning):
+        completed = sh.signed_distance([cloud.path(piece) for piece in pieces], cloud)
+    assert np.isnan(completed.values[-3:]).all()
+    assert cases.error(completed.values[:-3], exact) < 2e-3
 
 
 def test_a_mobius_strip_of_points_is_like_one_of_triangles():

@@ -137,7 +137,9 @@ class Strokes:
         """
         surface, fluxes = self.surface, self.fluxes
         masses = sparse.diags(self.areas)
-        blur = factorize(sparse.csr_matrix(masses + self.width**2 * surface.stiffness), order=surface.vertex_order)
+        alone = sparse.diags((self.areas == 0).astype(np.float64))  # points far from all others, which have no faces
+        matrix = sparse.csr_matrix(masses + alone + self.width**2 * surface.stiffness)
+        blur = factorize(matrix, order=surface.vertex_order)
         k = fluxes.shape[0]
         result = np.empty((k, k))
         for begin in range(0, k, BLOCK):
