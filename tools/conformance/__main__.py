@@ -1,7 +1,9 @@
 """The tests of other packages, as they are, with our functions in place of theirs: ``make conformance PEERS=FOLDER``.
 
-FOLDER holds checkouts of trimesh, gpytoolbox, pygeodesic and scikit-fmm, or their folders of tests alone; the packages
-themselves are installed. Tests that call none of our functions are counted as such: they say nothing about us.
+FOLDER holds checkouts of trimesh, gpytoolbox, pygeodesic, scikit-fmm, potpourri3d and libigl-python-bindings, or their
+folders of tests alone; the packages themselves are installed. Tests that call none of our functions are counted as
+such: they say nothing about us. Those of the last two compare nothing: each call is made of both, and their results
+are compared.
 """
 
 from __future__ import annotations
@@ -38,6 +40,7 @@ TESTS = {
         ],
     ),
     "pygeodesic": ("pygeodesic", ["tests/test_pygeodesic.py"]),
+    "libigl-python-bindings": ("igl", ["tests/test_all.py"]),
 }
 """Of packages tested by pytest: the name of the package, and files of its repository."""
 HERE = Path(__file__).parent
@@ -67,6 +70,11 @@ def run_pytest(folder: Path, package: str, files: list[str]) -> list[tuple[str, 
             text=True,
             check=False,
         )
+    return rows_of(found)
+
+
+def rows_of(found: subprocess.CompletedProcess[str]) -> list[tuple[str, str, str]]:
+    """Name, outcome and reason, from the lines of a process."""
     rows = [line.split("\t")[1:] for line in found.stdout.splitlines() if line.startswith("CONFORMANCE\t")]
     if not rows:
         print(found.stdout[-2000:], found.stderr[-2000:], file=sys.stderr)
@@ -75,6 +83,12 @@ def run_pytest(folder: Path, package: str, files: list[str]) -> list[tuple[str, 
         (name, outcome if called == "True" else unused.get(outcome, outcome), why)
         for name, outcome, called, why in rows
     ]
+
+
+def run_sample(folder: Path) -> list[tuple[str, str, str]]:
+    """The calls of potpourri3d's sample program."""
+    command = [sys.executable, "-W", "ignore", str(HERE / "held.py"), str(folder / "test/sample.py")]
+    return rows_of(subprocess.run(command, capture_output=True, text=True, check=False))
 
 
 def run_skfmm(folder: Path) -> list[tuple[str, str, str]]:
@@ -116,10 +130,13 @@ def run_skfmm(folder: Path) -> list[tuple[str, str, str]]:
     return rows
 
 
+OTHERS = {"scikit-fmm": run_skfmm, "potpourri3d": run_sample}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("peers", type=Path)
-    parser.add_argument("names", nargs="*", default=[*TESTS, "scikit-fmm"], help="some of the packages")
+    parser.add_argument("names", nargs="*", default=[*TESTS, *OTHERS], help="some of the packages")
     arguments = parser.parse_args()
     peers, names = arguments.peers.resolve(), arguments.names
     for name, (package, files) in TESTS.items():
@@ -130,8 +147,9 @@ def main() -> None:
             show(name, run_pytest(folder, package, files))
         else:
             print(f"{name}: not there, or not installed")
-    if "scikit-fmm" in names and (peers / "scikit-fmm").is_dir():
-        show("scikit-fmm", run_skfmm(peers / "scikit-fmm"))
+    for name, run in OTHERS.items():
+        if name in names and (peers / name).is_dir():
+            show(name, run(peers / name))
 
 
 def show(name: str, rows: list[tuple[str, str, str]]) -> None:
