@@ -82,7 +82,12 @@ def held(name: str, theirs: Callable[..., Any], ours: Callable[..., Pairs], tole
 def constraint_of(word: str, weight: float) -> sh.Free | sh.ZeroSet | sh.EachComponent:
     if weight > 0:
         raise NotOurs("its soft constraint pulls to the first node of a curve")
-    return {"none": sh.Free(), "zeroset": sh.ZeroSet(hard=True), "multiple": sh.EachComponent(hard=True)}[word.lower()]
+    words: dict[str, sh.Free | sh.ZeroSet | sh.EachComponent] = {
+        "none": sh.Free(),
+        "zeroset": sh.ZeroSet(hard=True),
+        "multiple": sh.EachComponent(hard=True),
+    }
+    return words[word.lower()]
 
 
 def mesh_signed(
@@ -97,7 +102,7 @@ def mesh_signed(
 ) -> Pairs:
     if preserve_source_normals:
         raise NotOurs("normals of the source that are kept")
-    given = [curve_of_elements(mesh, curve) for curve in curves]
+    given: list[Any] = [curve_of_elements(mesh, curve) for curve in curves]
     signs = curve_signs or [True] * len(given)
     sources = [
         *(replace(curve, oriented=bool(sign)) for curve, sign in zip(given, signs, strict=True)),
