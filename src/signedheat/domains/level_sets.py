@@ -12,9 +12,10 @@ from ..geometry.polylines import assemble_polylines, leaving
 from ..geometry.surface_points import SNAP, barycentric_on_edges, crossed_sides
 from .curves import Curve
 
-SAME = 1e-6
+SAME = 2e-5
 """Distance, over a face's least height, up to which points in a row are one: where a line passes a vertex that rounding
-puts beside it, it crosses edges up to 3e-7 of that apart (completed curves on spheres); others are above 1e-4."""
+puts next to it, it crosses edges up to 1e-5 of that apart. Of 22,000 steps of completed curves on spheres 15 are between
+3e-5 and 1e-3, and none between 3e-6 and 3e-5."""
 
 
 def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> list[Curve]:
