@@ -167,3 +167,18 @@ def test_faces_cannot_be_kept_elsewhere_or_of_sheets():
         complete(sh.TriangleMesh([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])).surface(
             keep_faces=True
         )
+
+
+@pytest.mark.parametrize("name", ["box", "torus with holes", "two bodies"])
+def test_simplified_surfaces_are_closed_and_within_the_tolerance(name):
+    pytest.importorskip("manifold3d")
+    solid = complete(SHAPES[name]())
+    plain, simple = solid.surface(resolution=40), solid.surface(resolution=40, tolerance=0.01)
+    assert_closed_manifold(simple)
+    assert not len(self_intersections(simple.vertices, simple.faces))
+    assert simple.n_faces < (50 if name == "box" else 0.9 * plain.n_faces)
+    for one, other in ((simple, plain), (plain, simple)):
+        places = np.concatenate([one.vertices, one.vertices[one.faces].mean(axis=1)])
+        assert np.abs(complete(other).distance(places)).max() <= 0.01 * (1 + 1e-9)
+    with pytest.raises(sh.errors.SignedHeatError, match="tolerance"):
+        solid.surface(tolerance=-1)

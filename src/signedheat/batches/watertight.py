@@ -42,6 +42,8 @@ class Watertight:
         Of sheets, which bound nothing by themselves: the surface is at half of this distance from everything.
     contoured : bool
         Contour everything: even triangles in place of few.
+    tolerance : float, optional
+        Simplify the surface, by no more than this distance.
     resolution, spacing
         Of the contour, as for `Solid.surface`.
 
@@ -59,12 +61,15 @@ class Watertight:
     surfaces: str = ".stl"
     thickness: float | None = None
     contoured: bool = False
+    tolerance: float | None = None
     resolution: int = 256
     spacing: float | None = None
 
     def __post_init__(self) -> None:
         if self.thickness is not None:
             positive_number(self.thickness, "thickness")
+        if self.tolerance is not None:
+            positive_number(self.tolerance, "tolerance")
 
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Make it of one shape, in a file that begins with `stem`; figures, and all notes under "notes"."""
@@ -84,7 +89,7 @@ class Watertight:
             If the shape is a sheet and there is no thickness.
         """
         if self.thickness is not None:
-            surface = solid.surface(0.5 * self.thickness, resolution=self.resolution, spacing=self.spacing)
+            surface = self._contour(solid, 0.5 * self.thickness)
             return surface, f"thickened to {self.thickness:g}"
         behind, ahead = solid.windings.beside(solid.triangles)
         areas = face_areas(solid.triangles)
@@ -92,12 +97,15 @@ class Watertight:
             raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
         if not self.contoured:
             try:
-                return solid.surface(keep_faces=True), "faces kept"
+                return solid.surface(keep_faces=True, tolerance=self.tolerance), "faces kept"
             except GeometryError as error:
                 reason = str(error).partition(":")[0]
-                surface = solid.surface(resolution=self.resolution, spacing=self.spacing)
+                surface = self._contour(solid, 0.0)
                 return surface, f"contoured, since {reason}"
-        return solid.surface(resolution=self.resolution, spacing=self.spacing), "contoured"
+        return self._contour(solid, 0.0), "contoured"
+
+    def _contour(self, solid: Solid, level: float) -> TriangleMesh:
+        return solid.surface(level, tolerance=self.tolerance, resolution=self.resolution, spacing=self.spacing)
 
 
 def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[str, object]:

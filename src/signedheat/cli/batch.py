@@ -119,6 +119,7 @@ def batch(arguments: Namespace) -> Summary:
     *MANY,
     option("--thickness", type=positive, metavar="D", help="of the solids around sheets"),
     option("--contour", action="store_true", help="contour everything: even triangles in place of few"),
+    option("--tolerance", type=positive, metavar="D", help="fewer triangles, no farther away than this (manifold3d)"),
     option("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side, for contours (256)"),
     option("--spacing", type=positive, metavar="H", help="cells of contours, in units of the file"),
     check=lambda arguments: refuse_together(arguments, "--spacing", "--resolution"),
@@ -129,6 +130,7 @@ def watertight(arguments: Namespace) -> Summary:
         surfaces=f".{arguments.surface}",
         thickness=arguments.thickness,
         contoured=arguments.contour,
+        tolerance=arguments.tolerance,
         resolution=arguments.resolution or 256,
         spacing=arguments.spacing,
     )

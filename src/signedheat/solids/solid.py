@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import finite_number, query_points
+from ..domains.validation import finite_number, positive_number, query_points
 from ..errors import SignedHeatError, SourceError
 from ..fields.grid_field import GridField
 from ..fields.known_solid import Closest
@@ -30,6 +30,7 @@ from .fields import band_field, dense_field
 from .files import save_solid
 from .keeping import given_surface
 from .offsets import Offset
+from .simplification import simplified
 from .stores import Scheduler
 from .winding import Windings
 
@@ -219,6 +220,7 @@ class Solid(Frozen, ShortRepr):
         *,
         sharp: bool = True,
         keep_faces: bool = False,
+        tolerance: float | None = None,
         resolution: int = 128,
         spacing: ArrayLike | None = None,
         progress: Progress | None = None,
@@ -237,6 +239,8 @@ class Solid(Frozen, ShortRepr):
         keep_faces : bool
             At level 0, the faces that were given, cut where bodies overlap, and what completes them: exact, and of few
             triangles. Edges are divided where those of the completion are finer. Bodies that touch share edges.
+        tolerance : float, optional
+            Simplify the surface, by manifold3d: no point of the result is farther from it than this, nor the converse.
         resolution : int
             Nodes along the longest side of a grid around the solid, and around the surface.
         spacing : float or (3,) float, optional
@@ -255,7 +259,10 @@ class Solid(Frozen, ShortRepr):
         OutsideError
             If distance has the level nowhere, or only where it is thinner than a cell.
         GeometryError
-            If faces are to be kept and do not join with the completion all around; it says where.
+            If faces are to be kept and do not join with the completion all around; it says where. Or if a surface whose
+            bodies touch along edges is to be simplified.
+        MissingPackageError
+            If it is to be simplified, and manifold3d is not installed.
         SignedHeatError
             If faces are to be kept at another level than 0.
         MemoryLimitError
@@ -269,6 +276,12 @@ class Solid(Frozen, ShortRepr):
         >>> bool(np.abs(np.linalg.norm(surface.vertices, axis=1) - 0.8).max() < 0.01)
         True
         """
+        if tolerance is not None:
+            within = positive_number(tolerance, "tolerance")
+            whole = self.surface(
+                level, sharp=sharp, keep_faces=keep_faces, resolution=resolution, spacing=spacing, progress=progress
+            )
+            return simplified(whole, within)
         height = finite_number(level, "level")
         if keep_faces:
             if height != 0:
