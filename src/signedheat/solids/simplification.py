@@ -17,8 +17,8 @@ from ..packages import lazy_module
 manifold3d = lazy_module("manifold3d", "simplified surfaces")
 
 ATTEMPTS = 6
-"""Times that the tolerance of manifold3d is halved until its result is one that can be taken: of 24 surfaces none
-needed more than 2."""
+"""Attempts, each with half the tolerance for manifold3d, until its result is one that can be taken: on six surfaces at
+tolerances of .02 and .1 cell the fourth was the last."""
 SMALLEST = 0.05
 """Longest side, over the tolerance, of pieces that are not divided further: their distance is above .95 of it."""
 
@@ -27,7 +27,8 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
     """A surface of few triangles, no point of which is farther than a tolerance from another surface, and the converse.
 
     Edges are collapsed by manifold3d. Its result is taken if both distances are proven to be within the tolerance, and
-    no triangles of it pass through each other; otherwise edges are collapsed less.
+    no triangles of it pass through each other; otherwise edges are collapsed less. If no result can be taken, it is the
+    surface as it was.
 
     Raises
     ------
