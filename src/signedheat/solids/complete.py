@@ -207,19 +207,19 @@ def completed(mesh: TriangleMesh, completion: Literal["lids", "heat"], keep_over
     if completion == "heat":
         return united(_by_heat(given, method), keep_overlaps)
     lost = lost_faces(vertices, given.ids)
-    lost = np.concatenate([lost, wall_ends(vertices, np.concatenate([given.ids, lost]))])
-    surfaces = _by_lids(given, lost, vertices, method)
+    ends = wall_ends(vertices, np.concatenate([given.ids, lost]))
+    surfaces = _by_lids(given, np.concatenate([lost, ends]), vertices, method)
     restored = float(parts.face_areas(vertices[lost]).sum() / parts.face_areas(given.triangles).sum())
     notes = [FacesRestored(len(lost), restored / (1 + restored))] if len(lost) else []
     return united(surfaces, keep_overlaps, notes)
 
 
-def _by_lids(given: Surface, lost: NDArray[np.int64], vertices: NDArray[np.float64], method: Heat) -> list[Surface]:
-    """Bodies, with the faces that they lost between their vertices, and their lids; sheets; what loose pieces are."""
+def _by_lids(given: Surface, added: NDArray[np.int64], vertices: NDArray[np.float64], method: Heat) -> list[Surface]:
+    """Bodies, with the faces added between their vertices, and their lids; sheets; what loose pieces are."""
     whole = Surface(
-        np.concatenate([given.triangles, vertices[lost]]),
-        np.concatenate([given.ids, lost]),
-        np.concatenate([given.origins, np.full(len(lost), -1)]),
+        np.concatenate([given.triangles, vertices[added]]),
+        np.concatenate([given.ids, added]),
+        np.concatenate([given.origins, np.full(len(added), -1)]),
         True,
     )
     labels, is_body = parts.bodies(whole.triangles, whole.ids)

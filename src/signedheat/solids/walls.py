@@ -101,7 +101,7 @@ def facing(rims: list[_Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]
         one = rims[i]
         for j in near:
             other = rims[j]
-            if i == j or not (0.5 * one.radius < other.radius < one.radius or (other.radius == one.radius and i < j)):
+            if (other.radius, j) >= (one.radius, i):  # once, from the larger one
                 continue
             lids = one.lid + other.lid
             if lids > LARGE * areas[np.unique([one.part, other.part])].sum():
