@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from signedheat import samples
-from signedheat.geometry.box_tree import BoxTree
 from signedheat.geometry.face_features import FaceFeatures
 from signedheat.geometry.face_tree import search_from
 from signedheat.geometry.nearest import (
+    TriangleTree,
     away_from_triangle,
     foot_on_triangle,
-    nearest_on_triangles,
     triangle_rows,
     weights_in,
 )
@@ -117,8 +116,7 @@ def test_a_search_leads_to_the_nearest_face():
     nearest = np.linalg.norm(corners.mean(axis=1)[None] - points[:, None], axis=2).argsort(axis=1)
     start = nearest[:, 12].astype(np.int32)  # a dozen others are nearer
     found = search_from(features, points, start[:, None])
-    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
-    faces, weights = nearest_on_triangles(corners, tree, points)
+    faces, weights = TriangleTree.of(corners).nearest(points)
     distance = np.linalg.norm(np.einsum("pk,pki->pi", weights, corners[faces]) - points, axis=1)
     np.testing.assert_allclose(found.distances, distance, rtol=1e-12)
     assert found.regular.all()

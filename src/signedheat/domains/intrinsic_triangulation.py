@@ -24,7 +24,7 @@ from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
 from ..geometry.intrinsic.refinement import refine_all
 from ..geometry.intrinsic.transfer import ConformingRefinement, level_lines, transfer_segments
-from ..geometry.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..progress import Progress, Stopwatch
 from .curves import Curve, CurveOrPoints, CurvesAndPoints
 from .exchange import Displayed
@@ -315,7 +315,7 @@ def intrinsic_delaunay(
         raise GeometryError(f"coarsest must be at least 1, not {coarsest!r}", element="coarsest")
     stopwatch = Stopwatch(progress, steps=3)
     with stopwatch("embed curves"):
-        base, _ = laid_out(mesh, MARGIN)
+        base = mesh.intrinsic
         refuse_other_area(mesh, base)
         listed = list(keep) if isinstance(keep, Sequence) else [keep]
         refinement = ConformingRefinement.of(

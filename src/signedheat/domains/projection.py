@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SourceError
-from ..geometry.box_tree import BoxTree
 from ..geometry.geodesics.paths import join
-from ..geometry.intrinsic_mesh import MARGIN, laid_out
+from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.meshes import Triangles
-from ..geometry.nearest import nearest_on_triangles
+from ..geometry.nearest import TriangleTree
 from ..geometry.surface_points import locate_points
 from .curves import Curve
 from .validation import coordinates, finite_number
 
 
+class PlaceableTriangles(Triangles, Protocol):
+    """Triangles on which points in space are placed and joined; what that takes is made once."""
+
+    @property
+    def intrinsic(self) -> IntrinsicMesh:
+        """The triangles in the plane."""
+
+    @property
+    def search_tree(self) -> TriangleTree:
+        """Tree of the faces."""
+
+
 def projected_curve(
-    mesh: Triangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
+    mesh: PlaceableTriangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
 ) -> Curve:
     """The curve through the closest points on a mesh, joined by geodesic paths."""
     points = coordinates(points, "points of the polyline", 3, SourceError)
@@ -37,7 +50,7 @@ def projected_curve(
             remedy="check units and placement, or raise max_distance",
             element=f"point {far}",
         )
-    triangles, _ = laid_out(mesh, MARGIN)
+    triangles = mesh.intrinsic
     start = np.arange(len(points) if closed else len(points) - 1)
     located, starts, ends, _ = join(
         triangles, locate_points(triangles, faces, weights), start, (start + 1) % len(points), "polyline"
@@ -47,11 +60,9 @@ def projected_curve(
 
 
 def closest_points(
-    mesh: Triangles, points: NDArray[np.float64]
+    mesh: PlaceableTriangles, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Face, barycentric coordinates and distance of the closest point on a mesh, for each of (n, 3) points."""
-    corners = mesh.vertices[mesh.faces]
-    tree = BoxTree.of(corners.min(axis=1), corners.max(axis=1))
-    faces, weights = nearest_on_triangles(corners, tree, np.ascontiguousarray(points))
-    found = np.einsum("ik,ikj->ij", weights, corners[faces])
+    faces, weights = mesh.search_tree.nearest(points)
+    found = np.einsum("ik,ikj->ij", weights, mesh.vertices[mesh.faces[faces]])
     return faces, weights, np.linalg.norm(points - found, axis=1)

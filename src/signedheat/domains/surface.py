@@ -7,11 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import SourceError
 from ..frozen import Frozen
-from ..geometry.meshes import Triangles
 from ..geometry.surface_points import corners_at
 from .curves import Curve, SurfacePoints
 from .level_sets import boundary_curves, level_set, region_boundary
-from .projection import projected_curve
+from .projection import PlaceableTriangles, projected_curve
 from .validation import array_of, finite_number, flag, numbers
 
 
@@ -22,7 +21,7 @@ class Surface(Frozen):
     """
 
     @property
-    def triangulation(self) -> Triangles:
+    def triangulation(self) -> PlaceableTriangles:
         """The triangles that curves refer to."""
         raise NotImplementedError
 

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..geometry.edges import EdgeTable, edge_table
+from ..geometry.intrinsic_mesh import MARGIN, IntrinsicMesh, laid_out
+from ..geometry.nearest import TriangleTree
 from .exchange import Elements, Exchangeable
 from .surface import Surface
 from .validation import coordinates, element_ids, used_bounds
@@ -95,6 +97,16 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         tail, head = self.edges.vertices.T
         lengths: NDArray[np.float64] = np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
         return lengths
+
+    @cached_property
+    def intrinsic(self) -> IntrinsicMesh:
+        """The triangles in the plane, edges lengthened by no more than rounding so that every one has an area."""
+        return laid_out(self, MARGIN)[0]
+
+    @cached_property
+    def search_tree(self) -> TriangleTree:
+        """Tree of the faces, in which those nearest to points are found."""
+        return TriangleTree.of(self.vertices[self.faces])
 
     @property
     def triangulation(self) -> TriangleMesh:

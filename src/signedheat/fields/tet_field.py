@@ -18,9 +18,8 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import contiguous, finite_number
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..frozen import Frozen
-from ..geometry.box_tree import BoxTree
 from ..geometry.marching_tets import closed_level_set
-from ..geometry.nearest import nearest_on_triangles
+from ..geometry.nearest import TriangleTree
 from ..geometry.tet_clipping import Planes, barycentric, containing_tets
 from .booleans import Combinable
 from .files import save_field
@@ -218,9 +217,8 @@ class TetField(Displayed, Combinable, Frozen):
         return Planes.of(self.mesh)
 
     @cached_property
-    def _wall_tree(self) -> BoxTree:
-        corners = self.mesh.vertices[self.mesh.boundary.faces]
-        return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
+    def _wall_tree(self) -> TriangleTree:
+        return TriangleTree.of(self.mesh.vertices[self.mesh.boundary.faces])
 
     def _place(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """(k, 4) vertices and weights that interpolate at each point, or at the closest point of the mesh, and offsets.
@@ -235,9 +233,7 @@ class TetField(Displayed, Combinable, Frozen):
         weights[inside] = barycentric(self.mesh, tets[inside], points[inside])
         if len(outside):
             walls = self.mesh.boundary
-            faces, coordinates = nearest_on_triangles(
-                walls.vertices[walls.faces], self._wall_tree, np.ascontiguousarray(points[outside])
-            )
+            faces, coordinates = self._wall_tree.nearest(points[outside])
             corners[outside, :3], weights[outside, :3] = walls.faces[faces], coordinates
             corners[outside, 3] = corners[outside, 0]
             nearest = np.einsum("pk,pki->pi", coordinates, walls.vertices[walls.faces[faces]])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -195,24 +198,45 @@ def weights_in(triangles: NDArray[np.float64], places: NDArray[np.float64]) -> N
     return weights
 
 
-def nearest_on_triangles(
-    triangles: NDArray[np.float64], tree: BoxTree, points: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Closest triangle to each of (k, 3) points, and barycentric coordinates of the closest point in it.
+@dataclass(frozen=True, eq=False)
+class TriangleTree:
+    """Triangles in a tree of boxes, in which the nearest to points are found.
 
-    Examples
-    --------
-    >>> triangle = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
-    >>> tree = BoxTree.of(triangle.min(axis=1), triangle.max(axis=1))
-    >>> faces, weights = nearest_on_triangles(triangle, tree, np.array([[0.5, -1.0, 3.0], [2.0, 2.0, 0.0]]))
-    >>> faces.tolist(), weights.round(9).tolist()
-    ([0, 0], [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]])
+    Attributes
+    ----------
+    rows : (m, 16) float
+        The triangles, as `triangle_rows` gives them.
+    tree : BoxTree
+        Of their bounding boxes.
     """
-    rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
-    found, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
-    no_discs = np.full((len(tree.bounds), 8), -1.0)
-    descend(rows, tree.bounds, no_discs, tree.items, points, len(points), found, squares)
-    return found.astype(np.int64), barycentric_on_triangles(rows, found, points)
+
+    rows: NDArray[np.float64]
+    tree: BoxTree
+
+    @classmethod
+    def of(cls, triangles: NDArray[np.float64]) -> TriangleTree:
+        """The tree of (m, 3, 3) corners."""
+        rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
+        return cls(rows, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)))
+
+    @cached_property
+    def _no_discs(self) -> NDArray[np.float64]:
+        return np.full((len(self.tree.bounds), 8), -1.0)
+
+    def nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Closest triangle to each of (k, 3) points, and barycentric coordinates of the closest point in it.
+
+        Examples
+        --------
+        >>> tree = TriangleTree.of(np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]))
+        >>> faces, weights = tree.nearest(np.array([[0.5, -1.0, 3.0], [2.0, 2.0, 0.0]]))
+        >>> faces.tolist(), weights.round(9).tolist()
+        ([0, 0], [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]])
+        """
+        points = np.ascontiguousarray(points)
+        found, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
+        descend(self.rows, self.tree.bounds, self._no_discs, self.tree.items, points, len(points), found, squares)
+        return found.astype(np.int64), barycentric_on_triangles(self.rows, found, points)
 
 
 @compiled

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry.box_tree import BoxTree
 from ..geometry.components import grouped
 from ..geometry.geodesics.any_angle import any_angle_distance
 from ..geometry.geodesics.heap_kernels import Queue
-from ..geometry.nearest import nearest_on_triangles, triangle_rows
+from ..geometry.nearest import TriangleTree
 from ..geometry.tet_clipping import barycentric
 from ..geometry.visibility import GRAZING
 from ..lowering.tets.discretization import TetDiscretization
@@ -59,7 +58,8 @@ def distance_around(
     """
     mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
     triangles = surface.positions[surface.corners]
-    nearest, _ = nearest_on_triangles(triangles, BoxTree.of(triangles.min(axis=1), triangles.max(axis=1)), points)
+    tree = TriangleTree.of(triangles)
+    nearest, _ = tree.nearest(points)
     nearest[np.isnan(values)] = -1
     tets_at = by_element(unknowns, len(values), 4)
     triangles_at = by_element(surface.corners, len(surface.positions), 3)
@@ -71,7 +71,7 @@ def distance_around(
         unknowns,
         points,
         *tets_at,
-        triangle_rows(triangles.reshape(-1, 9)),
+        tree.rows,
         surface.corners,
         *triangles_at,
         surface.owners,
