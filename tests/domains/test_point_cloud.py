@@ -10,6 +10,7 @@ from shapes import domain_cases as cases
 from signedheat.diagnostics import PointsLeftOut
 from signedheat.geometry.hole_filling import hole_fillings
 from signedheat.geometry.local_triangulations import local_triangulations
+from signedheat.samples import sphere
 
 
 def sphere_with_circle(n, height=0.3, seed=0):
@@ -234,3 +235,13 @@ def test_scale_and_motion():
         cloud = sh.PointCloud(positions)
         fields.append(sh.SignedHeatSolver(cloud).distance(cloud.path(ids, closed=True)).values)
     assert fields[1] / 1e3 == pytest.approx(fields[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_point_of_a_connected_surface_gets_a_value(seed):
+    """Thin sheets with noise: neighbours see such points in planes so different that none of their triangles fit."""
+    random = np.random.default_rng(seed)
+    points = sphere(4).vertices * [1.0, 0.6, 0.12]
+    points = (points + random.normal(scale=0.01, size=points.shape))[random.random(len(points)) < 0.8]
+    cloud = sh.PointCloud(points)
+    assert np.isfinite(sh.SignedHeatSolver(cloud).distance(cloud.points_at(0)).values).all()

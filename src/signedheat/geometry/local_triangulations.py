@@ -19,6 +19,7 @@ from ..parallel import in_chunks
 from .components import connected_components, sums_of
 from .edges import edge_table
 from .hole_filling import hole_fillings
+from .nearest import TriangleTree
 from .signed_graph import Links, signs_of
 from .welding import distinct_rows
 
@@ -60,7 +61,8 @@ def local_triangulations(
 
     Notes
     -----
-    Small holes that are left where the local triangulations disagree are filled.
+    Where the local triangulations disagree, triangles are split at points that all proposals have left out, and small
+    holes are filled.
 
     Examples
     --------
@@ -75,6 +77,7 @@ def local_triangulations(
     if len(candidates) == 0:
         return LocalTriangulations(candidates, axis)
     faces = nonoverlapping_triangles(points, axes, candidates[np.lexsort((circumradii, -votes))])
+    faces = split_at_points_left(points, faces, candidates)
     oriented = axis * aligned(points, axis, faces, normals)[:, None]
     faces = facing(points, oriented, faces)
     return LocalTriangulations(np.concatenate([faces, hole_fillings(points, oriented, faces)]), oriented)
@@ -162,6 +165,29 @@ def nonoverlapping_triangles(
         turn = np.mod(angle[1] - angle[0] + np.pi, 2 * np.pi) - np.pi
         starts[:, k], widths[:, k] = np.where(turn < 0, angle[1], angle[0]), np.abs(turn)
     return triangles[accept_apart(triangles, starts, widths, len(points))]
+
+
+def split_at_points_left(
+    points: NDArray[np.float64], faces: NDArray[np.int64], candidates: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """The triangles, the nearest to each point that has candidates but no triangle split in three there.
+
+    Tangent planes around such a point lie so differently that each triangle proposed at it overlaps others. Points
+    without candidates are outliers.
+
+    Examples
+    --------
+    >>> corners = np.array([[0.0, 0, 0], [3, 0, 0], [0, 3, 0], [1, 1, 0.5], [1, 1, 9]])
+    >>> split_at_points_left(corners, np.array([[0, 1, 2]]), np.array([[0, 1, 2], [0, 1, 3]])).tolist()
+    [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    """
+    while len(left := np.setdiff1d(candidates, faces)):
+        nearest, _ = TriangleTree.of(points[faces]).nearest(points[left])
+        split, first = np.unique(nearest, return_index=True)
+        around = faces[split]
+        parts = [np.column_stack([around[:, k], around[:, (k + 1) % 3], left[first]]) for k in range(3)]
+        faces = np.concatenate([np.delete(faces, split, axis=0), *parts])
+    return faces
 
 
 def aligned(
