@@ -53,12 +53,12 @@ class CurvesTaken(Note):
     left_out: NDArray[np.int64]
 
     def __str__(self) -> str:
-        told = [
+        taken = [
             f"{name}: {len(which)}, the first of them number {which[0]}"
             for name, which in (("curves turned", self.turned), ("curves left out", self.left_out))
             if len(which)
         ]
-        return "; ".join(told) or "curves are taken as given"
+        return "; ".join(taken) or "curves are taken as given"
 
 
 def distance_to_pieces(
@@ -117,7 +117,7 @@ def warn_of_doubt(decision: Decision, field: VertexField[Surface], curves: Seque
     against = decision.turned_loops()
     if len(against):
         warn_user(
-            f"{told(against)} as a whole ran against the others, and was turned: which of them are right is a guess. "
+            f"{named(against)} as a whole ran against the others, and was turned: which of them are right is a guess. "
             "as_oriented=True takes curves as they are",
             InexactWarning,
         )
@@ -125,7 +125,7 @@ def warn_of_doubt(decision: Decision, field: VertexField[Surface], curves: Seque
     doubtful = decision.doubtful()
     if len(doubtful):
         warn_user(
-            f"{told(doubtful)} may as well be left out, or run the other way: what is bounded then is nearly as "
+            f"{named(doubtful)} may as well be left out, or run the other way: what is bounded then is nearly as "
             "likely. Turn or remove them, or draw more; as_oriented=True takes curves as they are",
             InexactWarning,
         )
@@ -145,7 +145,7 @@ def warn_of_doubt(decision: Decision, field: VertexField[Surface], curves: Seque
             )
 
 
-def told(numbers: NDArray[np.int64]) -> str:
+def named(numbers: NDArray[np.int64]) -> str:
     """The numbers of some curves in words."""
     some = ", ".join(map(str, numbers[:8].tolist())) + (", …" if len(numbers) > 8 else "")
     return f"curves number {some}" if len(numbers) > 1 else f"curve number {some}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import chain
 from typing import Any, cast
 
 import numpy as np
@@ -14,7 +13,7 @@ from ..diagnostics import GeodesicWindows, Note
 from ..discretization import SourceTerm, discretize
 from ..domains.curves import Curve, CurvesAndPoints, SurfacePoints
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
-from ..errors import GeometryError, SourceError, UnsupportedTypeError
+from ..errors import GeometryError, UnsupportedTypeError
 from ..fields.vertex_field import VertexField
 from ..geometry.curve_segments import interpolation_at
 from ..geometry.geodesics.exact import distance_to_segments, distance_to_zero_line
@@ -23,10 +22,9 @@ from ..lowering.surface.discretization import SurfaceDiscretization
 from ..lowering.surface.source import SurfaceSource
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
-from ..solver import as_list
 from .methods import straight_distance
 from .sharpen import Method, sharpen_field, sharpened
-from .to_curves import FALSE_ZERO_WIDTH, ToCurves, told, without_false_zeros
+from .to_curves import FALSE_ZERO_WIDTH, ToCurves, note_on_searches, without_false_zeros
 
 
 @sharpen_field.register
@@ -52,10 +50,7 @@ def _(
     if isinstance(method, Curve | SurfacePoints | Sequence):
         method, curves = None, method
     if curves is not None:
-        parts = list(chain.from_iterable(surface.segments(as_list(curves))))
-        if not parts:
-            raise SourceError("there are no curves to sharpen to", remedy="leave them out", element="curves")
-        method = ToCurves(parts)
+        method = ToCurves(curves)
     elements = LinearElements.on_triangles(surface.triangles)
     new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), method, progress)
     values = new if surface.restriction is None else new[surface.restriction]
@@ -94,12 +89,12 @@ def _(
     unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
     if not isinstance(source, SurfaceSource) or not unsided:
         distance, windows = distance_to_zero_line(surface.triangles, values, tolerance, report)
-        return distance, (told(surface.triangles, windows),)
+        return distance, (note_on_searches(surface.triangles, windows),)
     # Unoriented curves run along edges of refined triangles, whose first vertices are those of the surface.
     near, windows = distance_to_segments(
         source.triangles, [PlacedSegments.of(source.triangles, unsided)], tolerance, report
     )
-    note = told(source.triangles, windows)
+    note = note_on_searches(source.triangles, windows)
     near = near[: len(values)]
     if source.oriented:
         sided = np.concatenate(
@@ -109,6 +104,6 @@ def _(
             surface.triangles, values, near < FALSE_ZERO_WIDTH * surface.spacing, sided[sided < len(values)]
         )
         distance, more = distance_to_zero_line(surface.triangles, lines, tolerance, report)
-        also = told(surface.triangles, more)
+        also = note_on_searches(surface.triangles, more)
         near, note = np.minimum(near, distance), GeodesicWindows(windows + more, note.cut_short or also.cut_short)
     return near, (note,)

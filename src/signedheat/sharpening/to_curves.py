@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..diagnostics import GeodesicWindows, Note, SharpenedToCurves
 from ..discretization import Discretization, SourceTerm
-from ..errors import InexactWarning, warn_user
+from ..domains.curves import CurvesAndPoints
+from ..errors import InexactWarning, SourceError, warn_user
 from ..geometry.components import connected_components
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.curve_sides import CurveSides, curve_sides
@@ -21,6 +23,7 @@ from ..geometry.surface_points import incident_faces
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
+from ..solver import as_list
 
 FAR = 1.0
 """Triangle sizes: what the zero set has farther from any curve stands in for missing curve."""
@@ -78,14 +81,14 @@ class ToCurves:
 
     Attributes
     ----------
-    parts : sequence of CurveSegments
-        The curves and points, on the triangles of the field.
+    curves : Curve, SurfacePoints or a sequence of them
+        The curves and points, on the domain of the field.
     tolerance : float
         As that of `Geodesic`. At a tenth of the default there, distances change by less than 1e-6 of their range with
         the order of faces.
     """
 
-    parts: Sequence[CurveSegments]
+    curves: CurvesAndPoints
     tolerance: float = 1e-5
 
     def sharpened(
@@ -100,7 +103,10 @@ class ToCurves:
         assert isinstance(discretization, SurfaceDiscretization)
         triangles, spacing = discretization.triangles, discretization.spacing
         report = None if progress is None else lambda: progress(0.0, "sharpen")
-        return sharpened_to_curves(triangles, values, self.parts, spacing, self.tolerance, report)
+        parts = list(chain.from_iterable(discretization.segments(as_list(self.curves))))
+        if not parts:
+            raise SourceError("there are no curves to sharpen to", remedy="leave them out", element="curves")
+        return sharpened_to_curves(triangles, values, parts, spacing, self.tolerance, report)
 
 
 def sharpened_to_curves(
@@ -115,7 +121,7 @@ def sharpened_to_curves(
     there = CurvesThere.on(triangles, parts, tolerance, report)
     distance, counts = there.distance, [there.windows]
     if not any(part.oriented for part in parts):
-        return np.where(np.isnan(values), np.nan, distance), (told(triangles, *counts),)
+        return np.where(np.isnan(values), np.nan, distance), (note_on_searches(triangles, *counts),)
     sides, known = there.sides, there.sides.regions != 0
     beside = sides.reach <= distance * (1 + 1e-9)
     side = np.where(known, sides.regions, np.where(beside, sides.nearby, 0))
@@ -138,7 +144,7 @@ def sharpened_to_curves(
         )
     new = np.copysign(distance, np.where(side != 0, side, values))
     new = np.where(np.isfinite(distance), new, values)  # parts of clouds that no triangles join
-    return np.where(np.isnan(values), np.nan, new), (note, told(triangles, *counts))
+    return np.where(np.isnan(values), np.nan, new), (note, note_on_searches(triangles, *counts))
 
 
 def missing_parts(
@@ -200,7 +206,7 @@ def without_false_zeros(
     return answer
 
 
-def told(triangles: IntrinsicMesh, *counts: int) -> GeodesicWindows:
+def note_on_searches(triangles: IntrinsicMesh, *counts: int) -> GeodesicWindows:
     """The note on searches with so many windows, and a warning if one was cut short."""
     note = GeodesicWindows(sum(counts), cut_short=max(counts) >= window_limit(triangles))
     if note.cut_short:
