@@ -104,6 +104,26 @@ def test_faces_missing_at_random_leave_the_ball(share):
     assert (solid.inside(points[clear]) == (radius[clear] < 1)).all()
 
 
+def pipe(sections, inner=0.3, outer=0.5, height=1.4):
+    """A thick pipe of long thin triangles."""
+    angles = 2 * np.pi * np.arange(sections) / sections
+    profile = [(inner, 0.0), (outer, 0.0), (outer, height), (inner, height)]
+    vertices = np.concatenate([np.c_[r * np.cos(angles), r * np.sin(angles), 0 * angles + z] for r, z in profile])
+    here, ring = np.arange(sections), sections * np.arange(4)[:, None]
+    a, b = (ring + here).ravel(), (ring + (here + 1) % sections).ravel()
+    d, c = np.roll(a.reshape(4, -1), -1, axis=0).ravel(), np.roll(b.reshape(4, -1), -1, axis=0).ravel()
+    return vertices, np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
+
+
+@pytest.mark.parametrize("sections", [48, 96])
+def test_half_of_the_triangles_of_a_coarse_part_close_to_about_its_volume(sections):
+    vertices, faces = pipe(sections)
+    whole = volume(sh.complete((vertices, faces)))
+    for seed in range(5):
+        left = faces[np.random.default_rng(seed).random(len(faces)) < 0.5]
+        assert 0.5 * whole < volume(sh.complete((vertices, left))) < 1.2 * whole
+
+
 def test_sheets_bound_nothing_and_keep_their_distance():
     flat = grid_sheet((-1, -1, 0), (2, 0, 0), (0, 2, 0))
     wavy = flat[0] + [0, 0, 1] * np.sin(6 * flat[0][:, :1]) * 0.2, flat[1]

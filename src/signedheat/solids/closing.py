@@ -132,9 +132,8 @@ def _lid(
         return flat
     near = bending.samples_near(own, patches, scipy.spatial.cKDTree(rim), bending.REACH * width)
     normals, curvatures, held = bending.continuation(flat, near, ends[_edges_at(rim, corners)], width)
-    if held.max() <= bending.FREE:
-        return creases.creased(rim, normals) or flat
-    return lids.plate(flat, normals, curvatures, held)
+    bent = lids.plate(flat, normals, curvatures, held, width) if held.max() > bending.FREE else None
+    return bent or creases.creased(rim, normals) or flat
 
 
 def _edges_at(rim: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.int64]:

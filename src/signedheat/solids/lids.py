@@ -21,6 +21,9 @@ STEPS = 4
 """Steps in which a plate is bent, each from the last."""
 STEEPEST = 0.7 * np.pi
 """Angle with a flat lid at which a plate leaves its rim at most: from 0.8 π on, plates over zigzags do not settle."""
+HIGHEST = 1.0
+"""How far a plate rises at most, over the width of its opening. Caps that leave their rim at `STEEPEST` rise .98, lids
+of whole shapes .5 at most (half a roll); on rims in tatters, where nothing is smooth, plates rise hundreds."""
 AT_REST, SHORTER = 1e-3, 0.9
 """Share of the diagonal of its rim by which a plate moves when it has come to rest, and share of its last move that it
 moves at most in each round: without that, plates over zigzags may jump forever."""
@@ -101,7 +104,13 @@ def _membrane(lid: Lid, matrix: sparse.csr_array) -> Lid:
     return Lid(vertices, lid.faces, n)
 
 
-def plate(lid: Lid, normals: NDArray[np.float64], curvatures: NDArray[np.float64], held: NDArray[np.float64]) -> Lid:
+def plate(
+    lid: Lid,
+    normals: NDArray[np.float64],
+    curvatures: NDArray[np.float64],
+    held: NDArray[np.float64],
+    width: float,
+) -> Lid | None:
     """A lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
 
     ``min Σ c_v |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / m_v``, with c = 1 but at hinges of the rim. L is the
@@ -119,8 +128,15 @@ def plate(lid: Lid, normals: NDArray[np.float64], curvatures: NDArray[np.float64
         Sums of its principal curvatures there, positive on a ball.
     held : (n,) float
         c at the rim: 0 at a hinge, 1 where it is clamped.
+    width : float
+        Of the opening.
+
+    Returns
+    -------
+    Lid or None
+        None where no plate that is not higher than `HIGHEST` is at rest.
     """
-    n = lid.n_rim
+    n, film = lid.n_rim, lid
     if n == len(lid.vertices):
         return lid
     rim = lid.vertices[:n]
@@ -146,6 +162,8 @@ def plate(lid: Lid, normals: NDArray[np.float64], curvatures: NDArray[np.float64
             rises = ((vertices - lid.vertices) * up).sum(axis=1)  # what slides along the surface does not change it
             rise = float(np.abs(rises).max())
             lid = Lid(lid.vertices + min(1.0, furthest / max(rise, 1e-300)) * rises[:, None] * up, lid.faces, n)
+            if np.linalg.norm(lid.vertices - film.vertices, axis=1).max() > HIGHEST * width:
+                return None
             furthest = SHORTER * min(rise, furthest)
     return lid
 

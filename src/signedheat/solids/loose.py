@@ -79,7 +79,8 @@ def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64]) ->
     """
     areas = np.bincount(labels, face_areas(triangles))
     n = areas.sum() ** 2 / max(float((areas**2).sum()), np.finfo(float).tiny)
-    return level(triangles) >= max(FRAGMENTS, float(CHANCE / np.sqrt(n)))
+    joint = level(triangles)
+    return joint >= FRAGMENTS and joint * float(np.sqrt(n)) >= CHANCE
 
 
 def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> float:
