@@ -11,9 +11,11 @@ from refusals import refused
 from shapes.degenerate_meshes import stretched_square, with_caps, with_needles
 from shapes.surface_cases import band, book, flipped, sphere, square
 from signedheat.diagnostics import IntrinsicTriangles
+from signedheat.discretization import discretize
 from signedheat.domains.common_subdivision import cut
 from signedheat.geometry.intrinsic.delaunay import flip_to_delaunay
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
+from signedheat.lowering.surface import intrinsic as lowering
 
 
 def squashed(mesh, factor=6.0):
@@ -460,3 +462,13 @@ def test_cutting_takes_time_that_grows_with_the_chords():
 def test_of_chords_that_cross_the_shorter_is_taken():
     parts = cut([7, 8, 9, 10, 11, 12], [(7, 10), (8, 11), (9, 11)])
     assert sorted(map(sorted, parts)) == [[7, 8, 11, 12], [8, 9, 11], [9, 10, 11]]
+
+
+def test_frames_of_edges_stay_where_flat_triangles_are_thickened(monkeypatch):
+    """The first face of an edge, by whose layout its frame is, is not always the lowest one."""
+    monkeypatch.setattr(lowering, "THICKNESS", 1.0)
+    made = sh.intrinsic_delaunay(squashed(sphere(3)), refine=True)
+    lowered = discretize(made).triangles
+    assert not np.allclose(lowered.edge_lengths, made.triangles.edge_lengths)
+    assert (lowered.first_halfedges == made.triangles.first_halfedges).all()
+    assert not lowered.reflected.any()

@@ -138,8 +138,8 @@ def lowered(triangulation: IntrinsicTriangulation, **options: Any) -> SurfaceDis
     triangles = triangulation.triangles
     lengths, added = mollify(triangles.edge_lengths, THICKNESS)
     if added:
-        corners, edges = triangles.corner_vertices, triangles.edges
-        triangles = IntrinsicMesh.from_lengths(corners, lengths, triangles.n_vertices, edges)
+        thicker = IntrinsicMesh.from_lengths(triangles.corner_vertices, lengths, triangles.n_vertices, triangles.edges)
+        triangles = replace(triangles, corner_positions=thicker.corner_positions)  # the first faces of edges stay first
     options = {
         "domain": triangulation,
         "transfer": triangulation.transfer,
