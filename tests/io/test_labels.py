@@ -10,6 +10,7 @@ import pytest
 import signedheat as sh
 from signedheat.cli import main
 from signedheat.domains.inspection import inspect
+from signedheat.solids.complete import complete
 
 nibabel = pytest.importorskip("nibabel")
 
@@ -180,10 +181,10 @@ def test_what_is_mended_in_headers_is_not_told(tmp_path, labels, caplog):
 @pytest.mark.parametrize("kind", AXES)
 def test_the_boundary_of_voxels_goes_to_the_world(labels, kind):
     image = sh.io.LabelImage(labels, AXES[kind], ORIGIN)
-    squares = image.to_world(image.surface(3))
-    assert isinstance(squares, sh.PolygonMesh)
-    middle = (squares.vertices.min(axis=0) + squares.vertices.max(axis=0)) / 2
+    surface = image.to_world(image.surface(3))
+    middle = (surface.vertices.min(axis=0) + surface.vertices.max(axis=0)) / 2
     if kind != "turned":
         np.testing.assert_allclose(middle, AXES[kind] @ CENTER + ORIGIN, atol=0.51 * STEPS.max())
-    outwards = np.einsum("ij,ij->i", squares.polygon_centroids - middle, squares.polygon_area_vectors)
-    assert outwards.min() > 0  # also where axes are mirrored
+    assert complete(surface, as_oriented=True).inside(middle[None])[0]  # also where axes are mirrored
+    corners = surface.vertices[surface.faces] - middle
+    assert np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() > 0

@@ -146,7 +146,7 @@ class Job:
         if not self._measures:
             return figures
         if isinstance(shape, DigitalSurface):
-            shape = shape.squares
+            shape = shape.smooth_surface
         bounds = bounds_around(as_list(shape))
         padding = room_around(bounds, max(map(abs, self.offsets), default=0.0))
         padding = padding if self.padding is None else self.padding

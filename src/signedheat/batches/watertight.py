@@ -74,7 +74,7 @@ class Watertight:
     def __call__(self, path: Path, stem: Path) -> dict[str, object]:
         """Make it of one shape, in a file that begins with `stem`; figures, and all notes under "notes"."""
         shape = read(path)
-        solid = complete(shape.squares if isinstance(shape, DigitalSurface) else shape)
+        solid = complete(shape.smooth_surface if isinstance(shape, DigitalSurface) else shape)
         surface, way = self.closed(solid)
         save(surface, f"{stem}{self.surfaces}")
         notes = [str(note) for note in solid.diagnostics.notes]

@@ -90,7 +90,7 @@ def read_source(arguments: Namespace) -> Any:
         return [Polyline(scale * line.points, line.closed) for line in read_polylines(path)]
     shape = read(path)
     if isinstance(shape, DigitalSurface):
-        shape = shape.squares
+        shape = shape.smooth_surface
     matrix = placement(arguments)
     with prefix_errors(path):
         return shape if matrix is None else transform(shape, matrix)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.surfels import Surfels, boundary_surfels, corrected_normals
+from ..operators.surface_nets import surface_net
 from ..operators.surfel_smoothing import smoothed_corners
 from .exchange import Displayed
 from .polygon_mesh import PolygonMesh
@@ -134,6 +135,16 @@ class DigitalSurface(Displayed, Surface):
     def smooth_vertices(self) -> NDArray[np.float64]:
         """(n, 3) the vertices moved so that faces are nearly orthogonal to `normals`: what distance is measured on."""
         return frozen(smoothed_corners(self.vertices, self.surfels.corners, self.normals))
+
+    @cached_property
+    def smooth_surface(self) -> TriangleMesh:
+        """A smooth surface between the centres of the voxels inside and those outside: closed, manifold, outward.
+
+        It stays within half a voxel, along each axis, of the corners of voxels, and has all voxels on their sides:
+        signed distance to it is negative at the centres of those inside, and at no others.
+        """
+        vertices, faces = surface_net(self.volume)
+        return TriangleMesh(self.origin + vertices * self.spacing, faces)
 
     @property
     def triangulation(self) -> TriangleMesh:

@@ -26,6 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .components import connected_components
+from .edge_flips import flipped_along_creases
+from .self_intersections import self_intersections
 
 AROUND = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 """β and γ of an edge in the four cells around it, counter-clockwise as seen from the end of the edge."""
@@ -187,6 +189,8 @@ def _pieces(edges: NDArray[np.int64], ways: NDArray[np.bool_]) -> NDArray[np.int
 
 SLACK = 1e-6
 """Cells by which a diagonal stays away from the sides of the tetrahedra."""
+ROUNDS = 8
+"""Times that vertices are moved where triangles pass through each other; twice is enough for nearly all shapes."""
 
 
 def dual_triangles(
@@ -247,6 +251,42 @@ def dual_triangles(
     falling = ~rising[np.concatenate([plain, plain, np.repeat(fans, 4)])]
     faces[falling] = faces[falling][:, ::-1]
     return np.concatenate([vertices, added]), faces, fans
+
+
+def separate_triangles(
+    cells: DualCells,
+    nodes: NDArray[np.int64],
+    axes: NDArray[np.int64],
+    rising: NDArray[np.bool_],
+    shares: NDArray[np.float64],
+    choices: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and triangles as of `dual_triangles`, none of which pass through each other if that can be had.
+
+    Edges are flipped to run along creases. Vertices of triangles that pass through each other go from one choice to the
+    next, and edges around them are flipped no more.
+
+    Parameters
+    ----------
+    cells, nodes, axes, rising, shares
+        See `dual_triangles`.
+    choices : (3, v, 3) float
+        Positions in cells, the best first. The last ones are inside the cells, where nothing passes through.
+    """
+    count = choices.shape[1]
+    chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(shares), dtype=bool)
+    for _ in range(ROUNDS):
+        vertices = choices[np.minimum(chosen, 2), np.arange(count)]
+        found, faces, centres = dual_triangles(cells, nodes, axes, rising, shares, vertices, fanned)
+        held = np.concatenate([chosen > 0, np.zeros(len(centres), dtype=bool)])
+        faces = flipped_along_creases(found, faces, held)
+        meeting = np.unique(faces[self_intersections(found, faces)])
+        if not len(meeting):
+            break
+        meeting = np.union1d(meeting[meeting < count], cells.quads[centres[meeting[meeting >= count] - count]])
+        chosen[meeting] += 1
+        fanned |= np.isin(cells.quads, meeting).sum(axis=1) > 1
+    return found, faces
 
 
 def _safe(flat: NDArray[np.float64], height: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:

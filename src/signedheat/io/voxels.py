@@ -78,8 +78,8 @@ class LabelImage:
         matrix[:3, :3], matrix[:3, 3] = self.axes / self.spacing, self.origin
         return matrix
 
-    def surface(self, label: float | None = None) -> PolygonMesh:
-        """The boundary of the voxels with a label, along the axes of the image.
+    def surface(self, label: float | None = None) -> TriangleMesh:
+        """The smooth surface around the voxels with a label, along the axes of the image: closed and manifold.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class LabelImage:
                 remedy="choose another one",
                 element=f"label {label:g}",
             )
-        return DigitalSurface(inside, self.spacing).squares
+        return DigitalSurface(inside, self.spacing).smooth_surface
 
     def to_world(self, surface: Mesh) -> Mesh:
         """A mesh along the axes of the image, moved to its place in the world; outside stays outside."""
@@ -192,8 +192,8 @@ def read_labels(path: PathLike) -> LabelImage:
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     np.save(f"{folder}/labels.npy", np.array([[[0, 3]], [[3, 3]]]))
-    ...     read_labels(f"{folder}/labels.npy").surface(3).n_polygons
-    14
+    ...     read_labels(f"{folder}/labels.npy").surface(3).n_faces
+    28
     """
     image = read_image(path, LABEL_FORMATS, "labels")
     with reading(path):

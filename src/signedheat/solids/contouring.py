@@ -16,10 +16,8 @@ from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import OutsideError
 from ..fields.levels import on_level
-from ..geometry.dual_cells import DualCells, cells_around, dual_cells, dual_triangles, open_cells
-from ..geometry.edge_flips import flipped_along_creases
+from ..geometry.dual_cells import DualCells, cells_around, dual_cells, open_cells, separate_triangles
 from ..geometry.marching import CLEARANCE
-from ..geometry.self_intersections import self_intersections
 from ..operators.grid.blocks import SIDE, Blocks
 from ..progress import Progress
 from .features import placed
@@ -27,8 +25,6 @@ from .fields import in_threads, prepared, tiles_of
 from .nodes import solved
 from .offsets import Offset
 
-ROUNDS = 8
-"""Times that vertices are moved where triangles pass through each other; twice is enough for nearly all shapes."""
 WINDOW = 8
 """Blocks along each edge of a window in which crossed edges are looked for together."""
 IN_BLOCK = np.array(list(np.ndindex(SIDE, SIDE, SIDE)))
@@ -116,35 +112,10 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
     report(0.6, "vertices")
     choices = placed(offset, grid, cells, points)
     report(0.9, "faces")
-    vertices, faces = _apart(cells, crossings, np.clip(shares, CLEARANCE, 1 - CLEARANCE), choices)
+    shares = np.clip(shares, CLEARANCE, 1 - CLEARANCE)
+    vertices, faces = separate_triangles(cells, nodes, axes, crossings.rising, shares, choices)
     report(1.0, "faces")
     return TriangleMesh(grid.origin + vertices * grid.spacing, faces)
-
-
-def _apart(
-    cells: DualCells, crossings: Crossings, shares: NDArray[np.float64], choices: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices in cells and faces, none of which pass through each other if that can be had.
-
-    Edges are flipped to run along creases. Vertices of faces that pass through each other go from one choice to the
-    next, (3, v, 3), the last of which are the middles of the pieces, and edges around them are flipped no more.
-    """
-    count = choices.shape[1]
-    chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(shares), dtype=bool)
-    for _ in range(ROUNDS):
-        vertices = choices[np.minimum(chosen, 2), np.arange(count)]
-        found, faces, centres = dual_triangles(
-            cells, crossings.nodes, crossings.axes, crossings.rising, shares, vertices, fanned
-        )
-        held = np.concatenate([chosen > 0, np.zeros(len(centres), dtype=bool)])
-        faces = flipped_along_creases(found, faces, held)
-        meeting = np.unique(faces[self_intersections(found, faces)])
-        if not len(meeting):
-            break
-        meeting = np.union1d(meeting[meeting < count], cells.quads[centres[meeting[meeting >= count] - count]])
-        chosen[meeting] += 1
-        fanned |= np.isin(cells.quads, meeting).sum(axis=1) > 1
-    return found, faces
 
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
