@@ -140,8 +140,12 @@ def family(
     FAMILIES[name] = Family(name, build, check, memory)
 
 
-def families() -> dict[str, Family]:
-    """All families by name, after importing the modules `cases_*` beside this one."""
+def families(modules: Sequence[str] = ()) -> dict[str, Family]:
+    """Families by name, after importing these modules, or all modules `cases_*` beside this one."""
+    if modules:
+        for name in modules:
+            importlib.import_module(name)
+        return FAMILIES
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
         if module.name.startswith("cases_"):
             importlib.import_module(f"fuzz.{module.name}")
@@ -193,10 +197,10 @@ def _peak() -> int:
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
-def _work(pipe: Connection) -> None:
+def _work(pipe: Connection, modules: Sequence[str]) -> None:
     """A worker: cases come and outcomes go through the pipe until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    known = families()
+    known = families(modules)
     pipe.send(None)
     while True:
         try:
@@ -209,13 +213,14 @@ def _work(pipe: Connection) -> None:
 class Worker:
     """A process that runs cases one after another, and is replaced by another when it hangs or crashes."""
 
-    def __init__(self) -> None:
+    def __init__(self, modules: Sequence[str]) -> None:
+        self.modules = modules
         self.start()
 
     def start(self) -> None:
         """Begin a process, which tells when it is ready."""
         self.pipe, theirs = SPAWN.Pipe()
-        self.process = SPAWN.Process(target=_work, args=(theirs,), daemon=True)
+        self.process = SPAWN.Process(target=_work, args=(theirs, self.modules), daemon=True)
         self.process.start()
         theirs.close()
         self.job: Job | None = None
@@ -276,7 +281,8 @@ def run(
     """Run `cases` cases of each of some families, on `workers` processes; `tell` is called with every outcome."""
     jobs = ((name, seed, number) for number in range(cases) for name in names)
     tally, left = Tally(), cases * len(names)
-    crew = [Worker() for _ in range(workers)]
+    modules = sorted({families()[name].check.__module__ for name in names})
+    crew = [Worker(modules) for _ in range(workers)]
     try:
         while left:
             heard = wait([worker.pipe for worker in crew], timeout=0.5)
