@@ -20,7 +20,7 @@ import signedheat as sh
 from fuzz.frame import Wrong, family
 from fuzz.mutations import damaged
 from signedheat import samples
-from signedheat.io.meshes import read_obj_lines
+from signedheat.io.meshes import read_obj_elements
 
 Files = dict[str, bytes]
 """Contents by name; the first is the one that is read."""
@@ -281,7 +281,7 @@ KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
     "labels": (read_labelled, labels),
     "lines": (sh.io.read_polylines, lines),
     "curves": (lambda path: sh.io.read_curves(path, BALL), curves),
-    "line elements": (read_obj_lines, lambda: [f for f in curves() if "curves.obj" in f]),
+    "line elements": (read_obj_elements, lambda: [f for f in curves() if "curves.obj" in f]),
 }
 
 for _kind in KINDS:

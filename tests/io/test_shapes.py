@@ -94,11 +94,11 @@ def test_obj_with_all_it_may_hold(tmp_path):
     )
     mesh = sh.read(tmp_path / "a.obj")
     assert [p.tolist() for p in mesh.polygons] == [[0, 1, 2], [0, 2, 3], [0, 1, 2, 3]]
-    from signedheat.io.meshes import read_obj_lines
+    from signedheat.io.meshes import read_obj_elements
 
-    vertices, lines = read_obj_lines(tmp_path / "a.obj")
+    vertices, lines, points = read_obj_elements(tmp_path / "a.obj")
     assert len(vertices) == 4
-    assert [line.tolist() for line in lines] == [[0, 1, 2], [3, 0]]
+    assert lines == [[0, 1, 2], [3, 0]] and points == []
 
 
 def test_pc_of_the_published_demo(tmp_path):
@@ -331,3 +331,9 @@ def test_base64_of_vtk_is_decoded_by_hand(tmp_path):
 def test_off_with_vertices_and_faces_over_several_lines(tmp_path):
     (tmp_path / "a.off").write_text("OFF\n4 2 0\n0 0\n0\n1 0 0\n1 1 0\n0 1 0\n3 0\n1 2\n3\n0 2 3 255 0 0\n")
     assert sh.read(tmp_path / "a.off").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+def test_negative_ids_of_obj_count_back_from_their_line(tmp_path):
+    square = "v 0 0 {z}\nv 1 0 {z}\nv 0 1 {z}\nf -3 -2 -1\n"
+    (tmp_path / "two.obj").write_text(square.format(z=0) + square.format(z=1))
+    assert sh.read(tmp_path / "two.obj").faces.tolist() == [[0, 1, 2], [3, 4, 5]]

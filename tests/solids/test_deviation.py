@@ -10,7 +10,7 @@ import signedheat as sh
 from shapes.bodies import box
 from signedheat import samples
 from signedheat.cli import main
-from signedheat.io.ply import read_ply_values
+from signedheat.io.ply import read_ply
 
 
 def test_of_a_box_that_is_too_high_and_shifted():
@@ -58,7 +58,7 @@ def test_files(tmp_path, scan):
     found = sh.deviation(scan, samples.sphere(3))
     for kind in ("ply", "png", "csv"):
         found.save(tmp_path / f"out.{kind}")
-    np.testing.assert_array_equal(read_ply_values(tmp_path / "out.ply", "deviation"), found.distances)
+    np.testing.assert_array_equal(read_ply(tmp_path / "out.ply", ("deviation",)).values["deviation"], found.distances)
     assert {"red", "green", "blue"} <= set((tmp_path / "out.ply").read_bytes()[:400].decode("latin1").split())
     table = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1)
     np.testing.assert_allclose(table, np.column_stack([found.points, found.distances, found.nearest]), atol=1e-8)

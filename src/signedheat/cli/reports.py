@@ -21,7 +21,7 @@ from ..geometry.intrinsic_mesh import IntrinsicMesh
 from ..geometry.surface_points import EDGE, FACE, VERTEX, locate_points
 from ..io import read, read_curves, read_polylines
 from ..io.files import extension
-from ..io.meshes import read_obj_lines
+from ..io.meshes import read_obj_elements
 from ..io.scenes import unit_of
 from ..io.voxels import LabelImage
 from ..lowering.area_elements import bounds_around
@@ -57,7 +57,7 @@ def report(file: str, arguments: Namespace) -> Summary:
     if (unit := unit_of(file)) is not None:
         summary["units"] = unit
     if extension(file) == ".obj":
-        summary["line_elements"] = len(read_obj_lines(file)[1])
+        summary["line_elements"] = len(read_obj_elements(file)[1])
     rows = dict(summary)
     if found is not None:
         widths = thickness(found.shape)

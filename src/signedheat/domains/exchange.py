@@ -6,7 +6,7 @@ their number and order in both directions. Each package is imported only where i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -111,6 +111,10 @@ class Elements:
         Of points.
     tets : (t, 4) int, optional
         Vertex ids, where there are tets and no faces.
+    areas : (n,) float, optional
+        Of points.
+    values : mapping
+        Further numbers at the points, by name.
     """
 
     points: NDArray[Any]
@@ -118,12 +122,23 @@ class Elements:
     counts: NDArray[np.int64] = field(default_factory=_no_ids)
     normals: NDArray[Any] | None = None
     tets: NDArray[np.int64] | None = None
+    areas: NDArray[Any] | None = None
+    values: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
     @classmethod
     def of_triangles(cls, points: NDArray[Any], faces: Any, normals: NDArray[Any] | None = None) -> Elements:
         """With faces as rows of three vertex ids."""
         rows = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
         return cls(points, rows.ravel(), np.full(len(rows), 3), normals)
+
+    @property
+    def kind(self) -> str:
+        """The name of the kind of shape that has these elements."""
+        if self.tets is not None:
+            return "TetMesh"
+        if not len(self.counts):
+            return "PointCloud"
+        return "TriangleMesh" if (self.counts == 3).all() else "PolygonMesh"
 
     @property
     def faces(self) -> list[NDArray[np.int64]]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from os import PathLike, fspath
+from types import MappingProxyType
 from typing import Protocol, TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -170,16 +172,16 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
 def converted(thing: Thing) -> Thing:
     """A shape of another package as one of ours; everything else, such as curves, as it is."""
     package = "numpy" if is_pair(thing) else package_of(thing)
-    return thing if package is None else cast("Thing", _shape_of(elements_of(package, thing)))
+    return thing if package is None else cast("Thing", shape_of(elements_of(package, thing)))
 
 
-def _shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
+def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
     """The shape of the kind that fits."""
     if elements.tets is not None:
         return TetMesh(elements.points, elements.tets)
-    if not len(elements.counts):
-        return PointCloud(elements.points, elements.normals)
-    return assemble(elements.points, elements.corners, elements.counts)
+    kinds = {kind.__name__: kind for kind in (TriangleMesh, PolygonMesh, PointCloud)}
+    shape: TriangleMesh | PolygonMesh | PointCloud = kinds[elements.kind]._of(elements)
+    return shape
 
 
 def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:
@@ -209,21 +211,6 @@ def _whole(ids: NDArray[np.generic], axes: int) -> bool:
     return ids.ndim == axes and bool(np.issubdtype(ids.dtype, np.integer))
 
 
-def assemble(
-    vertices: NDArray[np.float64], corners: NDArray[np.int64], counts: NDArray[np.int64]
-) -> TriangleMesh | PolygonMesh:
-    """A triangle mesh if all faces are triangles, else a polygon mesh; from all corners and their number per face."""
-    if (counts == 3).all():
-        return TriangleMesh(vertices, corners.reshape(-1, 3))
-    return PolygonMesh(vertices, np.split(corners, np.cumsum(counts)[:-1]))
-
-
-def faces_of(shape: SurfaceShape) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The inverse of `assemble`: corners of all faces, and the number of corners of each; empty for point clouds."""
-    elements = shape._elements
-    return elements.corners, elements.counts
-
-
-def points_of(shape: SurfaceShape) -> NDArray[np.float64]:
-    """(n, 3) vertices of a mesh, or points of a cloud."""
-    return shape.points if isinstance(shape, PointCloud) else shape.vertices
+def elements(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]] = MappingProxyType({})) -> Elements:
+    """The inverse of `shape_of`, with named values at the points."""
+    return replace(shape._elements, values=values)

@@ -102,11 +102,11 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @classmethod
     def _of(cls, elements: Elements) -> PointCloud:
-        return cls(elements.points, elements.normals)
+        return cls(elements.points, elements.normals, elements.areas)
 
     @property
     def _elements(self) -> Elements:
-        return Elements(self.points, normals=self.normals)
+        return Elements(self.points, normals=self.normals, areas=self.areas)
 
     @property
     def n_points(self) -> int:

@@ -18,6 +18,7 @@ from ..domains.projection import closest_points
 from ..errors import FileFormatError, SignedHeatError
 from ..geometry.polylines import assemble_polylines
 from .files import PathLike, text
+from .meshes import read_obj_elements
 from .points import read_point_lists
 
 SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
@@ -191,21 +192,7 @@ def read_csv(path: PathLike, domain: EmbeddedSurface) -> list[Curve]:
 
 def read_obj(path: PathLike, domain: EmbeddedSurface) -> Iterable[Group | Curve]:
     """Line and point elements of an OBJ file."""
-    vertices: list[list[float]] = []
-    lines: list[list[int]] = []
-    points: list[list[int]] = []
-    for number, words in enumerate((line.split() for line in text(path).splitlines()), start=1):
-        try:
-            if words[:1] == ["v"]:
-                x, y, z = words[1:4]
-                vertices.append([float(x), float(y), float(z)])
-            elif words[:1] in (["l"], ["p"]):
-                ids = [int(word.split("/")[0]) for word in words[1:]]
-                ids = [i - 1 if i > 0 else len(vertices) + i for i in ids]
-                (lines if words[0] == "l" else points).append(ids)
-        except ValueError as error:
-            raise damaged(number, words, str(error)) from error
-    positions = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    positions, lines, points = read_obj_elements(path)
     bad = [i for ids in lines + points for i in ids if not 0 <= i < len(positions)]
     if bad:
         raise FileFormatError(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.exchange import NAME
-from ..domains.foreign import SurfaceShape, faces_of, points_of
+from ..domains.exchange import NAME, Elements
+from ..domains.foreign import SurfaceShape, elements, shape_of
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -29,10 +29,11 @@ from ..packages import require
 from .arrays import names_in_npz, read_npz, write_npz
 from .files import PathLike, contents, damaged, ensure_writable, extension, format_for, reading, replacing
 from .images import CONFIDENCE, read_image, write_nrrd
-from .ply import ply_of, read_ply, read_ply_values
+from .meshes import write_obj
+from .ply import read_ply, write_ply
 from .tets import TET_FIELD_FORMATS, load_cells, store_cells
 from .vdb import write_vdb
-from .vtk_xml import read_vtp, read_vtp_values, vtp_of, write_vti
+from .vtk_xml import read_vtp, write_vti, write_vtp
 
 CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
@@ -58,9 +59,12 @@ def _(field: object, path: PathLike) -> None:
         format_for(path, dict.fromkeys(TET_FIELD_FORMATS), "a field on tets")
         store_cells(field.mesh.to_meshio({NAME: field.values}), path)
     elif isinstance(field, VertexField):
-        write = format_for(path, _VERTEX_WRITERS, "a field on a surface")
+        write = format_for(path, {".npz": None, ".obj": write_obj, **VALUE_FORMATS}, "a field on a surface")
+        simple = on_simple_surface(field)
+        if write is None:
+            return _write_vertex_npz(simple, path)
         with replacing(path) as temporary:
-            write(on_simple_surface(field), temporary)
+            temporary.write_bytes(write(elements(simple.domain, {NAME: simple.values}), path))
     else:
         raise FileFormatError(f"a {type(field).__name__} is no field", remedy="pass what a solver returned", path=path)
 
@@ -175,11 +179,10 @@ def load_vertex_field(path: PathLike) -> VertexField:
     """A surface with φ at its vertices: what `VertexField.save` wrote, except as ``.obj``."""
     with reading(path):
         if extension(path) in _VALUES:
-            read_shape, read_values = _VALUES[extension(path)]
-            values = read_values(path, NAME)
-            if values is None:
+            found = _VALUES[extension(path)](path, (NAME,))
+            if NAME not in found.values:
                 raise FileFormatError(f"its vertices have no {NAME}: it holds a shape, and no field")
-            return VertexField(read_shape(path), values)
+            return VertexField(cast("SurfaceShape", shape_of(found)), np.asarray(found.values[NAME], np.float64))
         arrays = read_npz(path, ("faces", "offsets", "normals"), needed=("vertices", "values"))
         vertices, values = arrays["vertices"], arrays["values"]
         if "offsets" in arrays:
@@ -269,12 +272,12 @@ def whole_values(field: GridField) -> NDArray[np.float32]:
 def save_with_values(shape: SurfaceShape, path: PathLike, name: str, values: NDArray[np.floating]) -> None:
     """Write a surface with a named value at each vertex, in a format of `VALUE_FORMATS`."""
     with replacing(path) as temporary:
-        temporary.write_bytes(VALUE_FORMATS[extension(path)](shape, {name: values}))
+        temporary.write_bytes(VALUE_FORMATS[extension(path)](elements(shape, {name: values}), path))
 
 
-def _write_vertex_npz(field: VertexField[SurfaceShape], path: Path) -> None:
+def _write_vertex_npz(field: VertexField[SurfaceShape], path: PathLike) -> None:
     domain = field.domain
-    arrays: dict[str, Any] = {"values": field.values, "vertices": points_of(domain)}
+    arrays: dict[str, Any] = {"values": field.values, "vertices": elements(domain).points}
     if isinstance(domain, TriangleMesh):
         arrays["faces"] = domain.faces
     elif isinstance(domain, PolygonMesh):
@@ -284,29 +287,9 @@ def _write_vertex_npz(field: VertexField[SurfaceShape], path: Path) -> None:
     write_npz(path, **arrays)
 
 
-def _write_vertex_obj(field: VertexField[SurfaceShape], path: Path) -> None:
-    """φ is the first texture coordinate, in the units of the surface."""
-    corners, counts = faces_of(field.domain)
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points_of(field.domain).tolist()]
-    lines += [f"vt {value!r} 0" for value in field.values.tolist()]
-    words = [f"{v}/{v}" for v in (corners + 1).tolist()]
-    ends = np.cumsum(counts).tolist()
-    lines += ["f " + " ".join(words[end - count : end]) for end, count in zip(ends, counts.tolist(), strict=True)]
-    path.write_text("\n".join(lines) + "\n")
-
-
-VALUE_FORMATS: dict[str, Callable[[SurfaceShape, Mapping[str, NDArray[np.floating]]], bytes]] = {
-    ".ply": ply_of,
-    ".vtp": vtp_of,
-}
+_VALUES: dict[str, Callable[[PathLike, tuple[str, ...]], Elements]] = {".ply": read_ply, ".vtp": read_vtp}
+VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {".ply": write_ply, ".vtp": write_vtp}
 """Formats of surfaces with values at their vertices."""
-_VALUES = {".ply": (read_ply, read_ply_values), ".vtp": (read_vtp, read_vtp_values)}
-_VERTEX_WRITERS: dict[str, Callable[[VertexField[SurfaceShape], Path], object]] = {
-    ".npz": _write_vertex_npz,
-    ".obj": _write_vertex_obj,
-    ".ply": lambda field, path: path.write_bytes(ply_of(field.domain, {NAME: field.values})),
-    ".vtp": lambda field, path: path.write_bytes(vtp_of(field.domain, {NAME: field.values})),
-}
 _GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
     ".npy": _write_npy,
     ".npz": _write_npz,
@@ -316,4 +299,4 @@ _GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
 }
 _BAND_WRITERS = {ending: _GRID_WRITERS[ending] for ending in (".npz", ".vdb", ".vti")}
 FIELD_FORMATS, BAND_FORMATS = frozenset(_GRID_WRITERS), frozenset(_BAND_WRITERS)
-VERTEX_FIELD_FORMATS = frozenset(_VERTEX_WRITERS)
+VERTEX_FIELD_FORMATS = frozenset({".npz", ".obj", *VALUE_FORMATS})

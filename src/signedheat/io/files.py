@@ -78,11 +78,10 @@ def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> F
     return FileFormatError(f"{cause} for {purpose}", remedy=f"use one of {' '.join(sorted(known))}", path=path)
 
 
-def refuse_kind(thing: object, path: PathLike, holds: str, instead: str) -> FileFormatError:
+def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileFormatError:
     """The error for a format that does not support a kind of shape."""
-    return FileFormatError(
-        f"{extension(path)} files hold {holds}, not a {type(thing).__name__}", remedy=f"save it as {instead}", path=path
-    )
+    cause = f"{extension(path)} files hold {holds}, not a {kind}"
+    return FileFormatError(cause, remedy=f"save it as {instead}", path=path)
 
 
 @contextmanager

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from itertools import islice
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.foreign import SurfaceShape, assemble, points_of
-from ..domains.point_cloud import PointCloud
+from ..domains.exchange import Elements
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
+from ..geometry.directions import unit
 from ..geometry.welding import distinct_rows
 from .files import PathLike, contents, damaged, ensure_fits, numbers, reading, refuse_kind, text
 
@@ -42,21 +43,20 @@ def read_stl(path: PathLike) -> TriangleMesh:
     return _indexed(corners.reshape(-1, 3))
 
 
-def write_stl(shape: SurfaceShape, path: PathLike) -> bytes:
+def write_stl(shape: Elements, path: PathLike) -> bytes:
     """Binary STL, in single precision."""
-    if not isinstance(shape, TriangleMesh):
-        kinds = ".ply or .xyz" if isinstance(shape, PointCloud) else ".obj, .ply, .off or .vtp"
-        raise refuse_kind(shape, path, "triangles", kinds)
-    facets = np.zeros(shape.n_faces, dtype=_FACET)
-    facets["corners"] = shape.vertices[shape.faces]
+    if shape.kind != "TriangleMesh":
+        kinds = ".obj, .ply, .off or .vtp" if len(shape.counts) else ".ply or .xyz"
+        raise refuse_kind(shape.kind, path, "triangles", kinds)
+    corners = shape.points[shape.triangles]
+    facets = np.zeros(len(corners), dtype=_FACET)
+    facets["corners"] = corners
     if not np.isfinite(facets["corners"]).all():
         raise FileFormatError(
             "coordinates are too large for the single precision of STL", remedy="save it as .ply", path=path
         )
-    lengths = np.maximum(2 * shape.face_areas, np.finfo(float).tiny)
-    facets["normal"] = 2 * shape.face_area_vectors / lengths[:, None]
-    result: bytes = b"signedheat".ljust(80) + np.uint32(shape.n_faces).astype("<u4").tobytes() + facets.tobytes()
-    return result
+    facets["normal"] = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return b"signedheat".ljust(80) + len(facets).to_bytes(4, "little") + facets.tobytes()
 
 
 def _text_corners(data: bytes) -> NDArray[np.float64]:
@@ -77,90 +77,97 @@ def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
     return TriangleMesh(corners[firsts].astype(np.float64), ids.reshape(-1, 3))
 
 
-def face_lists(shape: SurfaceShape) -> Sequence[Sequence[int]]:
-    """Corners of each face, as lists; empty for point clouds."""
-    if isinstance(shape, TriangleMesh):
-        result: Sequence[Sequence[int]] = shape.faces.tolist()
-        return result
-    return [] if isinstance(shape, PointCloud) else [polygon.tolist() for polygon in shape.polygons]
+def _rows_of_words(words: list[str], counts: NDArray[np.int64]) -> Iterator[str]:
+    """As many words on each line as it counts."""
+    return (" ".join(islice(left, count)) for left in [iter(words)] for count in counts.tolist())
 
 
-def read_obj(path: PathLike) -> SurfaceShape:
+def read_obj(path: PathLike) -> Elements:
     """The faces of an OBJ file, or its points if it has none; texture coordinates and normals of faces are ignored."""
     lines = _lines_by_keyword(path)
     vertices = _coordinates(lines.get("v", []), "vertices")
     if "f" in lines:
-        corners, counts = _elements(lines["f"], len(vertices))
-        return assemble(vertices, corners, counts)
+        return Elements(vertices, *_elements(lines["f"]))
     if "l" in lines:
         raise FileFormatError(
             f"there are {len(lines['l'])} line elements and no face",
             remedy="read them with sh.io.read_curves(path, mesh)",
         )
     normals = _coordinates(lines["vn"], "normals") if "vn" in lines else None
-    return PointCloud(vertices, normals)
+    return Elements(vertices, normals=normals)
 
 
-def read_obj_lines(path: PathLike) -> tuple[NDArray[np.float64], list[NDArray[np.int64]]]:
-    """The ``l`` elements of an OBJ file: all vertices, and the vertex ids along each line, from 0."""
+def read_obj_elements(path: PathLike) -> tuple[NDArray[np.float64], list[list[int]], list[list[int]]]:
+    """All vertices of an OBJ file, and the vertex ids, from 0, of each of its lines, and of its sets of points."""
     with reading(path):
         lines = _lines_by_keyword(path)
-        vertices = _coordinates(lines.get("v", []), "vertices")
-        corners, counts = _elements(lines.get("l", []), len(vertices))
-        return vertices, np.split(corners, np.cumsum(counts)[:-1]) if len(counts) else []
+        found: dict[str, list[list[int]]] = {}
+        for keyword in ("l", "p"):
+            corners, counts = _elements(lines.get(keyword, []))
+            ids = iter(corners.tolist())
+            found[keyword] = [list(islice(ids, count)) for count in counts.tolist()]
+        return _coordinates(lines["v"], "vertices"), found["l"], found["p"]
 
 
-def write_obj(shape: SurfaceShape, path: PathLike) -> bytes:
-    """OBJ text; points become ``v`` lines, with ``vn`` lines if they have normals."""
-    rows = ["v {!r} {!r} {!r}".format(*p) for p in points_of(shape).tolist()]
-    if isinstance(shape, PointCloud) and shape.normals is not None:
+def write_obj(shape: Elements, path: PathLike) -> bytes:
+    """OBJ text: ``v`` lines, with ``vn`` lines if points have normals; the first value is a texture coordinate."""
+    rows = ["v {!r} {!r} {!r}".format(*p) for p in shape.points.tolist()]
+    if shape.normals is not None:
         rows += ["vn {!r} {!r} {!r}".format(*n) for n in shape.normals.tolist()]
-    rows += ["f " + " ".join([str(i + 1) for i in face]) for face in face_lists(shape)]
+    values = next(iter(shape.values.values()), None)
+    words = list(map(str, (shape.corners + 1).tolist()))
+    if values is not None:
+        rows += [f"vt {value!r} 0" for value in values.tolist()]
+        words = [f"{word}/{word}" for word in words]
+    rows += [f"f {row}" for row in _rows_of_words(words, shape.counts)]
     return ("\n".join(rows) + "\n").encode()
 
 
-def write_pc(shape: SurfaceShape, path: PathLike) -> bytes:
+def write_pc(shape: Elements, path: PathLike) -> bytes:
     """Oriented points, as OBJ text."""
-    if not isinstance(shape, PointCloud):
-        raise refuse_kind(shape, path, "points", ".obj or .ply")
+    if shape.kind != "PointCloud":
+        raise refuse_kind(shape.kind, path, "points", ".obj or .ply")
     return write_obj(shape, path)
 
 
-def _lines_by_keyword(path: PathLike) -> dict[str, list[list[str]]]:
-    lines: dict[str, list[list[str]]] = {"v": [], "vn": [], "f": [], "l": []}
+def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
+    """The words on the lines of each keyword, in place of which is the number of vertices so far."""
+    lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
     ensure_fits(BYTES * sum(content.count(f"\n{keyword} ") for keyword in lines), path)
     for line in re.sub(r"\\[ \t]*\r?\n", " ", content).splitlines():
-        words = line.partition("#")[0].split()
+        words: list[Any] = line.partition("#")[0].split()
         if words and words[0] in lines:
-            lines[words[0]].append(words[1:])
+            lines[words[0]].append(words)
+            words[0] = len(lines["v"])
     if not lines["v"]:
         raise FileFormatError("there is no line 'v x y z': this holds no shape in OBJ format")
     return {keyword: rest for keyword, rest in lines.items() if rest}
 
 
-def _coordinates(rows: list[list[str]], what: str) -> NDArray[np.float64]:
+def _coordinates(rows: list[list[Any]], what: str) -> NDArray[np.float64]:
     """(n, 3) numbers, three from each line; further ones (weights, colours) are ignored."""
-    short = next((k for k, row in enumerate(rows) if len(row) < 3), None)
+    short = next((k for k, row in enumerate(rows) if len(row) < 4), None)
     if short is not None:
-        cause = f"number {short} of the {what} has {len(rows[short])} coordinates instead of 3: it may be truncated"
+        cause = f"number {short} of the {what} has {len(rows[short]) - 1} coordinates instead of 3: it may be truncated"
         raise damaged(cause, element=f"number {short}")
-    return numbers([row[:3] for row in rows], what).reshape(-1, 3)
+    return numbers([row[1:4] for row in rows], what).reshape(-1, 3)
 
 
-def _elements(words: list[list[str]], n_vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Vertex ids from 0 of all elements, and their number in each; ``v/vt/vn`` means v, and −1 the last vertex."""
-    counts = np.array([len(element) for element in words], dtype=np.int64)
-    flat = [word for element in words for word in element]
+def _elements(words: list[list[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertex ids from 0 of all elements, and their number in each; ``v/vt/vn`` means v, and −1 the vertex before."""
+    counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
+    flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
         flat = [word.partition("/")[0] for word in flat]
     ids = numbers(flat, "vertex ids", int)
     if (ids == 0).any():
         raise damaged("a face names vertex 0, but OBJ counts from 1: the file is damaged")
-    return np.where(ids > 0, ids - 1, ids + n_vertices), counts
+    before = np.array([element[0] for element in words], dtype=np.int64)
+    return np.where(ids > 0, ids - 1, ids + np.repeat(before, counts)), counts
 
 
-def read_off(path: PathLike) -> SurfaceShape:
+def read_off(path: PathLike) -> Elements:
     """The faces of an OFF file (also COFF, NOFF, STOFF, …), or its points if it has none."""
     rows = [row for line in text(path).splitlines() if (row := line.partition("#")[0].split())]
     kind = rows[0][0].upper() if rows else ""
@@ -186,12 +193,13 @@ def read_off(path: PathLike) -> SurfaceShape:
     vertices = numbers([row[:3] for row in vertex_rows], "vertices").reshape(-1, 3)
     if not n_faces:
         has_normals = "N" in kind[:-3] and all(len(row) >= 6 for row in vertex_rows)
-        return PointCloud(vertices, numbers([r[3:6] for r in vertex_rows], "normals") if has_normals else None)
+        normals = numbers([row[3:6] for row in vertex_rows], "normals") if has_normals else None
+        return Elements(vertices, normals=normals)
     counts = numbers([row[0] for row in face_rows], "numbers of corners", int)
     if any(len(row) <= count for row, count in zip(face_rows, counts.tolist(), strict=True)):
         raise damaged("a face has fewer corners than it says: it may be truncated")
     corners = [word for row, count in zip(face_rows, counts.tolist(), strict=True) for word in row[1 : 1 + count]]
-    return assemble(vertices, numbers(corners, "vertex ids", int), np.asarray(counts))
+    return Elements(vertices, numbers(corners, "vertex ids", int), counts)
 
 
 def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
@@ -208,12 +216,11 @@ def _corner_count(word: str) -> int:
     return int(word) if word.isdecimal() and len(word) < 19 else 0
 
 
-def write_off(shape: SurfaceShape, path: PathLike) -> bytes:
+def write_off(shape: Elements, path: PathLike) -> bytes:
     """OFF text; oriented points as NOFF."""
-    points, faces = points_of(shape), face_lists(shape)
-    normals = shape.normals if isinstance(shape, PointCloud) else None
-    columns = points if normals is None else np.hstack([points, normals])
-    rows = ["OFF" if normals is None else "NOFF", f"{len(points)} {len(faces)} 0"]
+    columns = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
+    rows = ["OFF" if shape.normals is None else "NOFF", f"{len(columns)} {len(shape.counts)} 0"]
     rows += [" ".join(map(repr, row)) for row in columns.tolist()]
-    rows += [" ".join(map(str, [len(face), *face])) for face in faces]
+    corners = _rows_of_words(list(map(str, shape.corners.tolist())), shape.counts)
+    rows += [f"{count} {row}" for count, row in zip(shape.counts.tolist(), corners, strict=True)]
     return ("\n".join(rows) + "\n").encode()

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.foreign import SurfaceShape, assemble, faces_of, points_of
-from ..domains.point_cloud import PointCloud
+from ..domains.exchange import Elements
 from ..errors import FileFormatError
 from ..fields.files import save_parts
 from .files import PathLike, contents, damaged, ensure_writable, numbers, replacing
@@ -53,49 +52,42 @@ class _Element:
         self.properties[name] = kind
 
 
-def read_ply(path: PathLike) -> SurfaceShape:
-    """The faces of a PLY file, including triangle strips; or its points, with ``nx ny nz`` and ``area`` if present."""
+def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
+    """The faces of a PLY file, including triangle strips; or its points, with ``nx ny nz`` and ``area`` if present.
+
+    `names` are further properties of the vertices that are wanted, where there are such.
+    """
     tables = _tables(path)
     vertex = {name: column for name, column in tables.get("vertex", {}).items() if not isinstance(column, tuple)}
     if not {"x", "y", "z"} <= vertex.keys():
         raise FileFormatError("there is no element 'vertex' with x, y and z: this holds no shape")
     vertices = _columns(vertex, "xyz")
+    values = {name: vertex[name] for name in names if name in vertex}
     face = tables.get("face", {})
     lists = face.get("vertex_indices", face.get("vertex_index"))
     if lists is not None and not isinstance(lists, tuple):
         raise damaged("the vertex ids of faces are no lists")
     if lists is not None and len(lists[1]):
-        return assemble(vertices, *lists)
+        return Elements(vertices, corners=lists[0], counts=lists[1], values=values)
     strips = next((column for column in tables.get("tristrips", {}).values() if isinstance(column, tuple)), None)
     if strips is not None and len(strips[0]) >= 3:
         faces = _unrolled(strips[0])
-        return assemble(vertices, faces.ravel(), np.full(len(faces), 3))
+        return Elements(vertices, faces.ravel(), np.full(len(faces), 3), values=values)
     normals = _columns(vertex, ["nx", "ny", "nz"]) if {"nx", "ny", "nz"} <= vertex.keys() else None
-    return PointCloud(vertices, normals, vertex.get("area"))
+    return Elements(vertices, normals=normals, areas=vertex.get("area"), values=values)
 
 
-def read_ply_values(path: PathLike, name: str) -> NDArray[np.float64] | None:
-    """A property of the vertices, or None where there is none of that name."""
-    column = _tables(path).get("vertex", {}).get(name)
-    return None if column is None or isinstance(column, tuple) else np.asarray(column, dtype=np.float64)
-
-
-def write_ply(shape: SurfaceShape, path: PathLike) -> bytes:
-    """Binary PLY in double precision; normals and areas of points are properties of the vertices."""
-    values: dict[str, NDArray[np.floating]] = {}
-    if isinstance(shape, PointCloud) and shape.normals is not None:
-        values = dict(zip(("nx", "ny", "nz"), shape.normals.T, strict=True))
-    if isinstance(shape, PointCloud) and shape.areas is not None:
-        values["area"] = shape.areas
-    return ply_of(shape, values)
-
-
-def ply_of(
-    shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]], colors: NDArray[np.uint8] | None = None
-) -> bytes:
-    """Binary PLY in double precision, with named values at each vertex, and its colour."""
-    (corners, counts), names, channels = faces_of(shape), ["x", "y", "z", *values], 0 if colors is None else 3
-    columns = np.column_stack([points_of(shape), *values.values()])
+def write_ply(shape: Elements, path: PathLike, colors: NDArray[np.uint8] | None = None) -> bytes:
+    """Binary PLY in double precision; normals, areas, values and colours are properties of the vertices."""
+    given: list[tuple[list[str], NDArray[Any] | None]] = [
+        (["x", "y", "z"], shape.points),
+        (["nx", "ny", "nz"], shape.normals),
+        (["area"], shape.areas),
+        *(([name], values) for name, values in shape.values.items()),
+    ]
+    corners, counts, channels = shape.corners, shape.counts, 0 if colors is None else 3
+    names = [name for own, values in given for name in own if values is not None]
+    columns = np.column_stack([values for _, values in given if values is not None])
     table = np.zeros(len(columns), dtype=[("numbers", "<f8", len(names)), ("color", "u1", channels)])
     table["numbers"] = columns
     if colors is not None:

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.foreign import SurfaceShape
-from ..domains.point_cloud import PointCloud
+from ..domains.exchange import Elements
 from ..errors import FileFormatError
 from .files import PathLike, contents, refuse_kind, text
 
@@ -70,21 +69,21 @@ def write_point_lists(lists: Sequence[tuple[NDArray[np.float64], bool]]) -> str:
     return "\n".join(blocks)
 
 
-def read_xyz(path: PathLike) -> PointCloud:
+def read_xyz(path: PathLike) -> Elements:
     """Lines of 3 numbers (positions) or 6 (positions and normals)."""
     table = np.concatenate(read_rows(path, (3, 6)))
-    return PointCloud(table[:, :3], table[:, 3:] if table.shape[1] == 6 else None)
+    return Elements(table[:, :3], normals=table[:, 3:] if table.shape[1] == 6 else None)
 
 
-def write_xyz(shape: SurfaceShape, path: PathLike) -> bytes:
+def write_xyz(shape: Elements, path: PathLike) -> bytes:
     """One line per point."""
-    if not isinstance(shape, PointCloud):
-        raise refuse_kind(shape, path, "points", ".obj or .ply")
+    if shape.kind != "PointCloud":
+        raise refuse_kind(shape.kind, path, "points", ".obj or .ply")
     table = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
     return "".join(" ".join(map(repr, row)) + "\n" for row in table.tolist()).encode()
 
 
-def read_pcd(path: PathLike) -> PointCloud:
+def read_pcd(path: PathLike) -> Elements:
     """Points of a file with DATA ascii or binary; those without a position (NaN), as scanners write them, left out."""
     content = contents(path)
     header: dict[str, list[str]] = {}
@@ -105,7 +104,7 @@ def read_pcd(path: PathLike) -> PointCloud:
     names = [f"normal_{axis}" for axis in "xyz"]
     normals = np.column_stack([table[name] for name in names]) if set(names) <= table.keys() else None
     whole = normals is not None and np.isfinite(normals[known]).all()
-    return PointCloud(points[known], normals[known] if normals is not None and whole else None)
+    return Elements(points[known], normals=normals[known] if normals is not None and whole else None)
 
 
 def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.float64]]:

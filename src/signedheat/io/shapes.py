@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..domains.digital_surface import DigitalSurface
-from ..domains.exchange import save_shape
-from ..domains.foreign import ForeignShape, SurfaceShape, as_shape
+from ..domains.exchange import Elements, save_shape
+from ..domains.foreign import ForeignShape, as_shape, elements, shape_of
 from ..domains.kinds import Shape
 from ..domains.tet_mesh import TetMesh
 from ..memory import refuse_beyond_memory
@@ -20,7 +20,7 @@ from .tets import TET_FORMATS, read_tets, write_tets
 from .voxels import read_volume
 from .vtk_xml import read_vtp, write_vtp
 
-READERS: dict[str, Callable[[PathLike], Shape]] = {
+READERS: dict[str, Callable[[PathLike], Elements | Shape]] = {
     ".3mf": read_3mf,
     ".e57": read_e57,
     ".glb": read_glb,
@@ -43,7 +43,7 @@ READERS: dict[str, Callable[[PathLike], Shape]] = {
     **dict.fromkeys(TET_FORMATS, read_tets),
 }
 
-WRITERS: dict[str, Callable[[SurfaceShape, PathLike], bytes]] = {
+WRITERS: dict[str, Callable[[Elements, PathLike], bytes]] = {
     ".obj": write_obj,
     ".off": write_off,
     ".pc": write_pc,
@@ -98,7 +98,8 @@ def read(path: PathLike) -> Shape:
     """
     read_shape = format_for(path, READERS, "a shape")
     with reading(path):
-        shape = read_shape(path)
+        found = read_shape(path)
+        shape = shape_of(found) if isinstance(found, Elements) else found
         faces = getattr(shape, "n_faces", 0) or len(getattr(shape, "corners", ()))
         if faces >= MANY:
             refuse_beyond_memory(
@@ -137,7 +138,7 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
     if isinstance(shape, DigitalSurface):
         shape = shape.squares
     with replacing(path) as temporary:
-        temporary.write_bytes(write(shape, path))
+        temporary.write_bytes(write(elements(shape), path))
 
 
 @save_shape.provide

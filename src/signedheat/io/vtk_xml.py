@@ -10,7 +10,7 @@ import base64
 import binascii
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
@@ -20,23 +20,12 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.foreign import SurfaceShape, assemble, faces_of, points_of
-from ..domains.point_cloud import PointCloud
+from ..domains.exchange import Elements
 from ..errors import FileFormatError
 from .files import PathLike, contents, damaged, ensure_fits, numbers, unpacked
 
-_TYPES = {
-    "Int8": "i1",
-    "UInt8": "u1",
-    "Int16": "i2",
-    "UInt16": "u2",
-    "Int32": "i4",
-    "UInt32": "u4",
-    "Int64": "i8",
-    "UInt64": "u8",
-    "Float32": "f4",
-    "Float64": "f8",
-}
+_TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
+_TYPES |= {"Float32": "f4", "Float64": "f8"}
 _NAMES = {code: name for name, code in _TYPES.items()}
 KINDS = {
     1: "vertex",
@@ -119,25 +108,17 @@ def read_vti(
     return images[0], origin[:dimension], spacing[:dimension], images[1] if len(images) > 1 else None
 
 
-def write_vtp(shape: SurfaceShape, path: PathLike) -> bytes:
-    """Polygons, or points with normals as point data."""
-    values: dict[str, NDArray[np.floating]] = {}
-    if isinstance(shape, PointCloud):
-        columns = {"Normals": shape.normals, "area": shape.areas}
-        values = {name: column for name, column in columns.items() if column is not None}
-    return vtp_of(shape, values, scalars=None)
-
-
-def vtp_of(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]], scalars: str | None = "") -> bytes:
-    """Polygons or points with named values at each vertex; ParaView shows `scalars`, by default the first of them."""
-    points, (corners, counts) = points_of(shape), faces_of(shape)
+def write_vtp(shape: Elements, path: PathLike) -> bytes:
+    """Polygons, or points with normals and areas, with named values at each; ParaView shows the first of these."""
+    points, corners, counts = shape.points, shape.corners, shape.counts
+    given = {"Normals": shape.normals, "area": shape.areas, **shape.values}
     group = "Polys" if len(counts) else "Verts"
     if not len(counts):
         corners, counts = np.arange(len(points)), np.ones(len(points), dtype=np.int64)
     writer = _Writer()
-    arrays = "".join(writer.array(name, column) for name, column in values.items())
-    shown = "" if scalars is None else f' Scalars="{scalars or next(iter(values))}"'
-    data = f"<PointData{shown}>{arrays}</PointData>" if values else ""
+    arrays = "".join(writer.array(name, column) for name, column in given.items() if column is not None)
+    shown = "".join(f' Scalars="{name}"' for name in [*shape.values][:1])
+    data = f"<PointData{shown}>{arrays}</PointData>" if arrays else ""
     xyz = f"<Points>{writer.array('Points', points)}</Points>"
     ends = np.cumsum(counts)
     cells = f"<{group}>{writer.array('connectivity', corners)}{writer.array('offsets', ends)}</{group}>"
@@ -147,12 +128,14 @@ def vtp_of(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]], scal
     return writer.file("PolyData", f"<PolyData>{piece}</PolyData>")
 
 
-def read_vtp(path: PathLike) -> SurfaceShape:
-    """The polygons of all pieces, or the points if there is no polygon."""
+def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
+    """The polygons of all pieces, or the points if there is no polygon.
+
+    `names` are further values at the points that are wanted, where all pieces have them.
+    """
     root, arrays = parse(path, "PolyData")
     points, corners, counts, n_points = [], [], [], 0
-    normals: list[NDArray[Any]] = []
-    areas: list[NDArray[Any]] = []
+    found: dict[str, list[NDArray[Any]]] = {name: [] for name in ("Normals", "area", *names)}
     for piece in root.iterfind("PolyData/Piece"):
         table = {(group.tag, element.get("Name")): element for group in piece for element in group.iter("DataArray")}
         if arrays.count(piece, "NumberOfStrips"):
@@ -168,32 +151,21 @@ def read_vtp(path: PathLike) -> SurfaceShape:
         n_corners = int(offsets[-1]) if n_faces else 0
         corners.append(arrays.of(table.get(("Polys", "connectivity")), n_corners).astype(np.int64) + n_points)
         counts.append(steps)
-        has_faces = bool(n_faces)  # data at the points matter to points alone
-        for name, columns, found in (("Normals", 3, normals), ("area", 1, areas)):
-            if not has_faces and (element := table.get(("PointData", name))) is not None:
-                found.append(arrays.of(element, columns * n_own))
+        for name, parts in found.items():  # normals and areas matter to points alone
+            element = None if n_faces and name not in names else table.get(("PointData", name))
+            if element is not None:
+                parts.append(arrays.of(element, (3 if name == "Normals" else 1) * n_own))
         points.append(arrays.of(xyz, 3 * n_own).astype(np.float64).reshape(-1, 3))
         n_points += n_own
     if not n_points:
         raise FileFormatError("there are no points: the file holds no shape")
-    positions = np.concatenate(points)
-    if any(len(c) for c in counts):
-        return assemble(positions, np.concatenate(corners), np.concatenate(counts))
-    directions = np.concatenate(normals).reshape(-1, 3) if normals else None
-    return PointCloud(positions, directions, np.concatenate(areas) if areas else None)
-
-
-def read_vtp_values(path: PathLike, name: str) -> NDArray[np.float64] | None:
-    """An array of the points of all pieces, or None where one lacks it."""
-    root, arrays = parse(path, "PolyData")
-    found = []
-    for piece in root.iterfind("PolyData/Piece"):
-        data = piece.iterfind("PointData/DataArray")
-        element = next((element for element in data if element.get("Name") == name), None)
-        if element is None:
-            return None
-        found.append(arrays.of(element, arrays.count(piece, "NumberOfPoints")))
-    return np.concatenate(found).astype(np.float64) if found else None
+    values = {name: np.concatenate(found[name]) for name in names if len(found[name]) == len(points)}
+    faces = np.concatenate(corners), np.concatenate(counts)
+    if len(faces[1]):
+        return Elements(np.concatenate(points), *faces, values=values)
+    normals = np.concatenate(found["Normals"]).reshape(-1, 3) if found["Normals"] else None
+    areas = np.concatenate(found["area"]) if found["area"] else None
+    return Elements(np.concatenate(points), normals=normals, areas=areas, values=values)
 
 
 @dataclass(frozen=True)

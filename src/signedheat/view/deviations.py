@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.foreign import elements
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable, extension, replacing
-from ..io.ply import ply_of
+from ..io.ply import write_ply
 from ..solids.deviation import Deviation, save_deviation
 from .drawing import draw
 from .figures import INSIDE_TO_OUTSIDE, PICTURE_FORMATS, picture
@@ -23,7 +24,8 @@ def _(found: object, path: PathLike) -> None:
         return _draw(found, path)
     with replacing(path) as temporary:
         if extension(path) == ".ply":
-            temporary.write_bytes(ply_of(found.scan, {"deviation": found.distances}, colors(found.distances, found)))
+            scan = elements(found.scan, {"deviation": found.distances})
+            temporary.write_bytes(write_ply(scan, path, colors(found.distances, found)))
         else:
             rows, names = np.column_stack([found.points, found.distances, found.nearest]), "x,y,z,deviation"
             np.savetxt(temporary, rows, "%.9g", ",", header=f"{names},nearest_x,nearest_y,nearest_z", comments="")
