@@ -9,13 +9,24 @@ from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold
 from signedheat import samples
 from signedheat.errors import OutsideError
+from signedheat.geometry.edges import edge_table
 from signedheat.geometry.self_intersections import self_intersections
+from signedheat.solids import simplification
 from signedheat.solids.complete import complete
+from signedheat.solids.simplification import is_within
 
 
 def turned(mesh, seed=0):
     turn = scipy.spatial.transform.Rotation.random(random_state=seed).as_matrix()
     return sh.TriangleMesh(mesh.vertices @ turn.T, mesh.faces)
+
+
+def divided(mesh):
+    """Each face into four."""
+    table = edge_table(mesh.faces)
+    (a, b, c), (p, q, r) = mesh.faces.T, (len(mesh.vertices) + table.face_edges).T
+    faces = np.concatenate([np.stack(each, 1) for each in ((a, p, r), (p, b, q), (r, q, c), (p, q, r))])
+    return sh.TriangleMesh(np.concatenate([mesh.vertices, mesh.vertices[table.vertices].mean(axis=1)]), faces)
 
 
 def crumpled(seed):
@@ -182,3 +193,28 @@ def test_simplified_surfaces_are_closed_and_within_the_tolerance(name):
         assert np.abs(complete(other).distance(places)).max() <= 0.01 * (1 + 1e-9)
     with pytest.raises(sh.errors.SignedHeatError, match="tolerance"):
         solid.surface(tolerance=-1)
+
+
+def test_distances_between_surfaces_are_proven_whichever_way_they_are_divided():
+    coarse = SHAPES["box"]()
+    fine = coarse
+    for _ in range(4):
+        fine = divided(fine)
+    up = np.array([0.0, 0.0, 0.01])
+    for one, other in ((fine, coarse), (coarse, fine)):
+        assert is_within(one, other, 1e-9)
+        moved = sh.TriangleMesh(other.vertices + up, other.faces)
+        assert is_within(one, moved, 0.0101)
+        assert not is_within(one, moved, 0.005)
+    lost = sh.TriangleMesh(fine.vertices, fine.faces[4:])  # a hole of some triangles
+    assert is_within(lost, fine, 1e-9)
+    assert not is_within(fine, lost, 1e-3)
+    assert not is_within(coarse, lost, 1e-3)
+
+
+def test_surfaces_that_are_not_simplified_are_returned_with_a_warning(monkeypatch):
+    pytest.importorskip("manifold3d")
+    monkeypatch.setattr(simplification, "ATTEMPTS", 0)  # as where none of them succeeds
+    surface = samples.sphere(2)
+    with pytest.warns(sh.errors.InexactWarning, match="as it was"):
+        assert simplification.simplified(surface, 0.08) is surface

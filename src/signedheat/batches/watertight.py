@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from ..domains.digital_surface import DigitalSurface
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import positive_number
-from ..errors import GeometryError, SourceError
+from ..errors import GeometryError, InexactWarning, SourceError
 from ..geometry.components import element_components
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
@@ -75,9 +76,11 @@ class Watertight:
         """Make it of one shape, in a file that begins with `stem`; figures, and all notes under "notes"."""
         shape = read(path)
         solid = complete(shape.smooth_surface if isinstance(shape, DigitalSurface) else shape)
-        surface, way = self.closed(solid)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", InexactWarning)
+            surface, way = self.closed(solid)
         save(surface, f"{stem}{self.surfaces}")
-        notes = [str(note) for note in solid.diagnostics.notes]
+        notes = [str(note) for note in solid.diagnostics.notes] + [str(each.message) for each in caught]
         return {"way": way, **figures_of(surface, solid, 0.5 * (self.thickness or 0.0)), "notes": notes}
 
     def closed(self, solid: Solid) -> tuple[TriangleMesh, str]:

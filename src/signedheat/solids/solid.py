@@ -241,7 +241,7 @@ class Solid(Frozen, ShortRepr):
             triangles. Edges are divided where those of the completion are finer. Bodies that touch share edges.
         tolerance : float, optional
             Simplify the surface, by manifold3d: no point of the result is farther from it than this, nor the converse.
-            Small tolerances take long: a fiftieth of a cell half a minute for 10,000 triangles with large flat parts.
+            Where manifold3d has no such result the surface stays as it was, with an `InexactWarning`.
         resolution : int
             Nodes along the longest side of a grid around the solid, and around the surface.
         spacing : float or (3,) float, optional
