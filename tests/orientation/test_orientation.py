@@ -285,6 +285,74 @@ def test_orientation_is_not_carried_on_where_three_pages_meet():
     assert (found.nonmanifold_edges, found.n_parts) == (1, 3)
 
 
+def walls_of_cells(solid):
+    """All walls, two triangles each, of the unit cells of a grid where those meet other cells or the outside.
+
+    Returns the mesh, and of each face whether it bounds something; those that do face outwards.
+    """
+    cells = np.pad(solid, 1)
+    corners = np.stack(np.meshgrid(*(np.arange(n + 1) for n in solid.shape), indexing="ij"), axis=-1).reshape(-1, 3)
+    ids = np.arange(len(corners)).reshape(np.array(solid.shape) + 1)
+    faces, bounding = [], []
+    for axis in range(3):
+        below, above = np.moveaxis(cells, axis, 0)[:-1, 1:-1, 1:-1], np.moveaxis(cells, axis, 0)[1:, 1:-1, 1:-1]
+        at = np.moveaxis(ids, axis, 0)
+        for i, j, k in np.argwhere(below | above):
+            a, b, c, d = at[i, j, k], at[i, j + 1, k], at[i, j + 1, k + 1], at[i, j, k + 1]
+            square = [[a, b, c], [a, c, d]]  # towards larger coordinates, or for the second axis smaller ones
+            if bool(above[i, j, k] and not below[i, j, k]) == (axis != 1):
+                square = [face[::-1] for face in square]
+            faces += square
+            bounding += 2 * [bool(below[i, j, k] != above[i, j, k])]
+    return sh.TriangleMesh(corners.astype(float), faces), np.array(bounding)
+
+
+@pytest.mark.parametrize("shape", [(2, 1, 1), (3, 3, 3), (4, 4, 4), (7, 5, 2)])
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_walls_between_the_cells_of_a_whole_complex_bound_nothing(shape, share):
+    mesh, bounding = walls_of_cells(np.ones(shape, dtype=bool))
+    rng = np.random.default_rng(1)
+    turn, order = np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.permutation(mesh.n_faces)
+    turn *= np.linalg.det(turn)
+    given = sh.TriangleMesh(mesh.vertices @ turn, mesh.faces[order])
+    which = rng.random(mesh.n_faces) < share
+    found = sh.orientation(turned(given, which))
+    np.testing.assert_array_equal(found.inner, ~bounding[order])
+    np.testing.assert_array_equal(found.turned, which & ~found.inner)
+
+
+def test_cells_may_be_any_and_leave_a_notch():
+    solid = np.ones((3, 3, 2), dtype=bool)
+    solid[1, 1, 1] = solid[0, 0, 0] = solid[2, 2] = False
+    mesh, bounding = walls_of_cells(solid)
+    which = np.random.default_rng(0).random(mesh.n_faces) < 0.5
+    found = sh.orientation(turned(mesh, which))
+    np.testing.assert_array_equal(found.inner, ~bounding)
+    np.testing.assert_array_equal((found.turned == which)[bounding], True)
+
+
+@pytest.mark.parametrize("cavity", [True, False])
+def test_a_cell_that_all_walls_face_into_is_a_cavity_if_the_outside_faces_outwards(cavity):
+    mesh, bounding = walls_of_cells(np.ones((5, 5, 5), dtype=bool))
+    centers = mesh.vertices[mesh.faces].mean(axis=1) - 2.5
+    room = (np.abs(centers) < 0.7).all(axis=1) & (np.abs(centers).max(axis=1) > 0.45)
+    partition = (np.abs(centers[:, 0] - 0.5) < 1e-9) & ~room & ~bounding
+    kept = bounding | room | partition  # a box, a room in it, and a wall of one side of it that runs through the box
+    outwards = np.einsum("ij,ij->i", centers, mesh.face_area_vectors) > 0
+    given = turned(sh.TriangleMesh(mesh.vertices, mesh.faces[kept]), (room & (outwards == cavity))[kept])
+    found = sh.orientation(given)
+    assert found.cavities == cavity
+    np.testing.assert_array_equal(found.inner, (partition if cavity else partition | room)[kept])
+    assert found.turned_faces == 0
+
+
+def test_faces_on_each_other_make_no_complex():
+    """Where faces overlap around an edge, nobody knows which of them is next."""
+    mesh, bounding = walls_of_cells(np.ones((2, 1, 1), dtype=bool))
+    again = samples.union(mesh, box((0, 0, 1), (1, 1, 2)))
+    assert not sh.orientation(sh.TriangleMesh(again.vertices, again.faces)).inner[bounding.sum() :][-12:].any()
+
+
 def test_polygons_stay_polygons():
     corners = box((0, 0, 0), (1, 2, 3)).vertices
     quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]

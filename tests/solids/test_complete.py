@@ -248,6 +248,26 @@ def test_balls_that_overlap_are_cut_where_they_meet():
     assert places.distances[0] == pytest.approx(-np.sqrt(0.75), abs=3e-3)
 
 
+def test_a_block_of_cells_is_solid_whichever_way_its_walls_face():
+    n = 4
+    squares = np.stack(np.meshgrid(*[np.arange(n + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    triangles = []
+    for one, other in ((0, 1), (1, 2), (2, 0)):
+        at = squares[(squares[:, [one, other]] < n).all(axis=1)].astype(float)
+        u, v = np.eye(3)[one], np.eye(3)[other]
+        triangles += [np.stack([at, at + u, at + u + v], axis=1), np.stack([at, at + u + v, at + v], axis=1)]
+    triangles = np.concatenate(triangles)
+    backwards = np.random.default_rng(0).random(len(triangles)) < 0.5
+    triangles[backwards] = triangles[backwards, ::-1]
+    vertices, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    points = np.random.default_rng(1).uniform(-1, n + 1, (3000, 3))
+    whole = sh.complete(box((n, n, n), n=1))
+    for completion in ("lids", "heat"):
+        solid = sh.complete((vertices, faces.reshape(-1, 3)), completion=completion)
+        np.testing.assert_allclose(solid.distance(points), whole.distance(points), atol=1e-12)
+        assert (solid.origins >= 0).all()
+
+
 def test_closed_shapes_are_their_faces():
     for mesh in (samples.sphere(3), samples.torus(), samples.torus(1.0, 0.1)):
         solid = sh.complete(mesh)

@@ -20,7 +20,7 @@ Mesh = TriangleMesh | PolygonMesh
 class MeshFaces:
     """Faces of triangle and polygon meshes alike, and the triangles that they are made of.
 
-    Those that stand apart hang together with none that they do not agree with as given.
+    Those that stand apart hang together with none that they do not agree with as given; inner ones bound nothing.
     """
 
     positions: NDArray[np.float64]
@@ -31,6 +31,7 @@ class MeshFaces:
     bounds: NDArray[np.float64]
     unit: float
     apart: NDArray[np.bool_] | None = None
+    inner: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(cls, shape: Mesh) -> MeshFaces:
@@ -61,7 +62,7 @@ class MeshFaces:
     @cached_property
     def surface(self) -> SurfaceParts:
         """The faces' parts."""
-        return SurfaceParts(self.positions, self.corners, self.offsets, self.measures[0], self.apart)
+        return SurfaceParts(self.positions, self.corners, self.offsets, self.measures[0], self.apart, self.inner)
 
     def normals(self, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
         """(p, 3) unit normals of the faces, some of them turned; zero without area."""

@@ -14,6 +14,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..frozen import Frozen
 from ..reprs import ShortRepr
+from .inner_walls import inner_walls
 from .mesh_faces import Mesh, MeshFaces
 from .parts import LEAST_CLOSED, PartOrientation, Parts, clear, orient_parts
 from .points import orient_triangles
@@ -59,12 +60,14 @@ class Orientation(Frozen, ShortRepr):
     turned : (k,) bool
         Which of them were turned.
     parts : (k,) int
-        Which of them hang together across edges of two faces; −1 for faces on fewer than three places.
+        Which of them hang together across edges of two faces; −1 for faces on fewer than three places, and inner walls.
     walls : (k,) bool
         Faces of doubled walls.
     undecided : (k,) bool
         Faces of sheets and other parts for which no side is outside: they agree with their neighbours, and most of each
         part's area is as it was given.
+    inner : (k,) bool
+        Walls between cells of whole complexes (see `inner_walls`), which bound nothing: left as they are.
     n_parts, closed_parts : int
         Parts, and those of which every edge has two faces.
     turned_parts, turned_faces, turned_area : int, int, float
@@ -91,6 +94,7 @@ class Orientation(Frozen, ShortRepr):
     parts: NDArray[np.int64]
     walls: NDArray[np.bool_]
     undecided: NDArray[np.bool_]
+    inner: NDArray[np.bool_]
     n_parts: int
     closed_parts: int
     turned_parts: int
@@ -122,12 +126,13 @@ class Orientation(Frozen, ShortRepr):
 def orientation(shape: Mesh | ForeignShape) -> Orientation:
     """Orient a mesh, and tell what was turned, merged and left.
 
-    Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Across edges of two faces
-    orientation is carried on, and each part so found takes that of the most of its area. Lines laid through the whole
-    shape then tell which way each part faces (`orient_parts`). Small pieces that touch other parts at corners face as
-    they do; of those that touch nothing, each turns only if its neighbours clearly disagree with it. Where they are a
-    tenth of the shape or more, and lines do not leave it as often as they enter it, points on them tell which way they
-    face, all together (`orient_triangles`): that is taken if lines then find fewer contradictions.
+    Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Walls between cells of a
+    whole complex are left out (`inner_walls`). Across edges of two faces orientation is carried on, and each part so
+    found takes that of the most of its area. Lines laid through the whole shape then tell which way each part faces
+    (`orient_parts`). Small pieces that touch other parts at corners face as they do; of those that touch nothing, each
+    turns only if its neighbours clearly disagree with it. Where they are a tenth of the shape or more, and lines do not
+    leave it as often as they enter it, points on them tell which way they face, all together (`orient_triangles`): that
+    is taken if lines then find fewer contradictions.
 
     A part that is there twice, once facing each way, is a doubled wall: both its sides stay. If it is closed, or holes
     make up less than a ninth of its area, it is a solid drawn from both sides, and one side goes.
@@ -163,6 +168,9 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
             remedy="pass a TriangleMesh or PolygonMesh",
         )
     faces = MeshFaces.of(shape)
+    n_nonmanifold = int((faces.surface.pairs.counts > 2).sum())
+    if n_nonmanifold:
+        faces = _without_inner_walls(faces)
     lines, crossed = _lines(faces)
     faces = _bodies_apart(faces, lines, crossed)
     surface = faces.surface
@@ -193,7 +201,17 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
         together = _turned_together(faces, turned, small, lines, crossed)
         if together is not None:
             turned, undecided = together, undecided & ~small
-    return _oriented(shape, surface, found, turned, wrong, walls, undecided)
+    return _oriented(shape, surface, found, turned, wrong, walls, undecided, n_nonmanifold)
+
+
+def _without_inner_walls(faces: MeshFaces) -> MeshFaces:
+    """Faces of which those are left out that have a cell of a whole complex on either side."""
+    surface = faces.surface
+    normals = faces.normals(np.zeros(surface.n_faces, dtype=bool))
+    inner = inner_walls(
+        faces.positions, surface.pairs, surface.tails, surface.heads, surface.owners, normals, *faces.measures
+    )
+    return replace(faces, inner=inner) if inner.any() else faces
 
 
 def _bodies_apart(faces: MeshFaces, lines: LineCrossings, crossed: NDArray[np.int64]) -> MeshFaces:
@@ -354,10 +372,12 @@ def _oriented(
     wrong: NDArray[np.bool_],
     walls: NDArray[np.bool_],
     undecided: NDArray[np.bool_],
+    n_nonmanifold: int,
 ) -> Orientation:
     """Of the copies of each face, keep one, or one facing each way in doubled walls; and count."""
     first = np.where(surface.first >= 0, surface.first, np.arange(surface.n_faces))
-    parts = np.where(surface.first >= 0, surface.orientation.parts[first], -1)
+    inner = np.zeros(surface.n_faces, dtype=bool) if surface.inner is None else surface.inner[first]
+    parts = np.where((surface.first >= 0) & ~inner, surface.orientation.parts[first], -1)
     flipped = turned[first] != surface.reversed  # a copy that runs the other way must turn where the first must not
     if surface.is_first.all():
         kept = np.arange(surface.n_faces)
@@ -376,13 +396,14 @@ def _oriented(
         parts=parts,
         walls=two_sided,
         undecided=sheet,
+        inner=inner[kept],
         n_parts=int(surface.is_part.sum()),
         closed_parts=int((surface.is_part & surface.orientation.closed).sum()),
         turned_parts=int(wrong.sum()),
         turned_faces=int(flipped.sum()),
         turned_area=float(areas[flipped].sum()) / total,
         inconsistent_edges=int(surface.orientation.disagreeing),
-        nonmanifold_edges=int((surface.pairs.counts > 2).sum()),
+        nonmanifold_edges=n_nonmanifold,
         nonorientable_parts=int((surface.is_part & ~surface.orientation.orientable).sum()),
         undecided_parts=int(undecided.sum()),
         undecided_area=float(areas[sheet].sum()) / total,

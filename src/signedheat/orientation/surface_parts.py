@@ -39,6 +39,8 @@ class SurfaceParts:
         Areas of the faces.
     apart : (p,) bool, optional
         Faces that hang together with none that they do not agree with as given.
+    inner : (p,) bool, optional
+        Faces that bound nothing, and are left out, too.
     """
 
     vertices: NDArray[np.float64]
@@ -46,6 +48,7 @@ class SurfaceParts:
     offsets: NDArray[np.int64]
     areas: NDArray[np.float64]
     apart: NDArray[np.bool_] | None = None
+    inner: NDArray[np.bool_] | None = None
 
     @property
     def n_faces(self) -> int:
@@ -63,6 +66,11 @@ class SurfaceParts:
         if (self.places == np.arange(len(self.places))).all():
             return self.corners
         return self.places[self.corners]
+
+    @property
+    def heads(self) -> NDArray[np.int64]:
+        """(c,) place of the next corner, where the halfedge ends."""
+        return self.tails[self._following]
 
     @cached_property
     def owners(self) -> NDArray[np.int32]:
@@ -125,8 +133,9 @@ class SurfaceParts:
 
     @cached_property
     def is_first(self) -> NDArray[np.bool_]:
-        """(p,) whether a face is the first on its corners."""
-        return np.equal(self.first, np.arange(self.n_faces))
+        """(p,) whether a face is the first on its corners, and not left out."""
+        first = np.equal(self.first, np.arange(self.n_faces))
+        return first if self.inner is None else first & ~self.inner
 
     @cached_property
     def copies(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -150,8 +159,7 @@ class SurfaceParts:
         joined = np.append(by_vertex.counts == 2, False)  # the last for halfedges that are left out
         paired = joined[by_vertex.edges]
         joined = joined[:-1]
-        heads = self.tails[self._following]
-        by_place = pair_halfedges(self.tails, heads, len(self.vertices), used & ~paired)
+        by_place = pair_halfedges(self.tails, self.heads, len(self.vertices), used & ~paired)
         numbers = np.append(np.cumsum(joined, dtype=np.int32) - np.int32(1), np.int32(-1))
         rest = np.where(by_place.edges >= 0, by_place.edges + np.int32(joined.sum()), np.int32(-1))
         return HalfedgePairs(

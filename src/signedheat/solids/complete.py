@@ -117,7 +117,8 @@ def complete(
         if isinstance(turned, PointCloud):
             solid = _from_points(turned, method)
         else:
-            solid = completed(turned.triangulation, completion, keep_overlaps, method)
+            inner = found.inner[_owners(turned)] if found else None
+            solid = completed(turned.triangulation, completion, keep_overlaps, method, inner)
     names = None
     if isinstance(turned, TriangleMesh | PolygonMesh):
         names = _owners(turned) if found is None else found.faces[_owners(turned)]
@@ -195,23 +196,31 @@ class Surface:
     closing: bool
 
 
-def completed(mesh: TriangleMesh, completion: Literal["lids", "heat"], keep_overlaps: bool, method: Heat) -> Solid:
-    """The solid that oriented triangles are; its origins are theirs."""
+def completed(
+    mesh: TriangleMesh,
+    completion: Literal["lids", "heat"],
+    keep_overlaps: bool,
+    method: Heat,
+    inner: NDArray[np.bool_] | None = None,
+) -> Solid:
+    """The solid that oriented triangles are, of which inner ones bound nothing; its origins are theirs."""
     vertices = mesh.vertices
     ids = welded(vertices, roundoff(vertices))[mesh.faces]
     a, b, c = ids.T
     proper = np.flatnonzero((a != b) & (b != c) & (c != a))
-    given = Surface(vertices[mesh.faces[proper]], ids[proper], proper, True)
+    every = Surface(vertices[mesh.faces[proper]], ids[proper], proper, True)
+    bounding = np.ones(len(proper), dtype=bool) if inner is None else ~inner[proper]
+    given, walls = _some(every, bounding, True), [_some(every, ~bounding, False)]
     if not parts.face_areas(given.triangles).any():
         raise SourceError("no face of the shape has an area", element="shape")
     if completion == "heat":
-        return united(_by_heat(given, method), keep_overlaps)
+        return united(_by_heat(given, method) + walls, keep_overlaps)
     lost = lost_faces(vertices, given.ids)
     ends = wall_ends(vertices, np.concatenate([given.ids, lost]))
     surfaces = _by_lids(given, np.concatenate([lost, ends]), vertices, method)
     restored = float(parts.face_areas(vertices[lost]).sum() / parts.face_areas(given.triangles).sum())
     notes = [FacesRestored(len(lost), restored / (1 + restored))] if len(lost) else []
-    return united(surfaces, keep_overlaps, notes)
+    return united(surfaces + walls, keep_overlaps, notes)
 
 
 def _by_lids(given: Surface, added: NDArray[np.int64], vertices: NDArray[np.float64], method: Heat) -> list[Surface]:

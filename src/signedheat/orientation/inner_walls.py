@@ -1,0 +1,110 @@
+"""Which walls of a whole complex of cells bound nothing, since cells lie on both sides of them.
+
+Each face has two sides. Around an edge, in order of angle, the sides of neighbouring faces that look at each other
+bound the same region of space; so all sides fall into shells, the whole boundary of a region each. Which way the faces
+run does not matter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..geometry.components import connected_components
+from ..geometry.edges import HalfedgePairs
+
+SAME_ANGLE = 1e-6
+"""Radians between faces around an edge up to which their order is unknown: they lie on each other, but for rounding."""
+MOSTLY = 0.9
+"""Share of its area that must face into a cell to make it a cavity, if as much of the outside faces outwards: chance
+turns all six walls of a cell inwards, and so all of that, once in 64 times."""
+
+
+def inner_walls(
+    positions: NDArray[np.float64],
+    pairs: HalfedgePairs,
+    tails: NDArray[np.int64],
+    heads: NDArray[np.int64],
+    owners: NDArray[np.integer],
+    normals: NDArray[np.float64],
+    areas: NDArray[np.float64],
+    volumes: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """(p,) faces with a cell on either side; of whole complexes only, in which each edge has two faces or more.
+
+    A complex whose faces run along each edge as often one way as the other is the boundary of something as it is, and
+    none of its faces is inner. Where the outside of a complex was given facing outwards, cells are cavities that their
+    walls face into.
+
+    Parameters
+    ----------
+    positions : (n, 3) float
+        Of vertices.
+    pairs : HalfedgePairs
+        Which halfedges meet.
+    tails, heads, owners : (h,) int
+        Vertices at which each halfedge begins and ends, and its face.
+    normals : (p, 3) float
+        Unit normals; zero without area.
+    areas, volumes : (p,) float
+        Areas, and signed volumes of cones from the faces to one point.
+    """
+    n = len(normals)
+    used = np.flatnonzero(pairs.edges >= 0)
+    forward = tails[used] < heads[used]
+    angles = _angles(positions, tails[used], heads[used], forward, normals[owners[used]])
+    order = np.lexsort((angles, pairs.edges[used]))
+    halfedges, forward, angles = used[order], forward[order], angles[order]
+    edges, faces = pairs.edges[halfedges], owners[halfedges]
+    last = np.append(edges[1:] != edges[:-1], True)
+    first = np.append(True, last[:-1])
+    following = np.arange(1, len(edges) + 1)
+    following[last] = np.flatnonzero(first)
+
+    complexes = connected_components(n, faces, faces[following])
+    gaps = np.where(last, 2 * np.pi, 0.0) + angles[following] - angles
+    many = pairs.counts[edges] > 2
+    broken = (pairs.counts[edges] == 1) | (many & ~(gaps > SAME_ANGLE))  # also where an angle is no number
+    balance = np.bincount(edges, np.where(forward, 1, -1), len(pairs.counts))
+    qualified = np.zeros((2, n), dtype=bool)
+    qualified[0, complexes[faces[many]]] = qualified[1, complexes[faces[balance[edges] != 0]]] = True
+    qualified[:, complexes[faces[broken]]] = False
+    chosen = (qualified[0] & qualified[1])[complexes]
+
+    # sides of faces: 2 f is the one that the normal points to, 2 f + 1 the other
+    ahead, behind = 2 * faces + ~forward, 2 * faces + forward
+    shells = connected_components(2 * n, ahead, behind[following]).reshape(n, 2)
+    inside = np.bincount(shells.ravel(), np.stack([-volumes, volumes], axis=1).ravel()) > 0
+    cavities = _cavities(shells, inside, np.where(chosen, areas, 0.0))
+    front, back = shells.T
+    inner: NDArray[np.bool_] = chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
+    return inner
+
+
+def _angles(
+    positions: NDArray[np.float64],
+    tails: NDArray[np.int64],
+    heads: NDArray[np.int64],
+    forward: NDArray[np.bool_],
+    normals: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Angles of faces around their edges, right-handed about the direction from the lower vertex to the higher."""
+    along = positions[heads] - positions[tails]
+    along /= np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
+    into = np.cross(normals, along)
+    along *= np.where(forward, 1.0, -1.0)[:, None]
+    least = np.eye(3)[np.abs(along).argmin(axis=1)]
+    aside = np.cross(along, least)
+    across = np.cross(along, aside)
+    x, y = (into * aside).sum(axis=1), (into * across).sum(axis=1)
+    return np.where((x != 0) | (y != 0), np.arctan2(y, x), np.nan)
+
+
+def _cavities(shells: NDArray[np.int64], inside: NDArray[np.bool_], areas: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which shells are those of cavities: faces face into them, where the whole complex was given facing outwards."""
+    front, back = shells.T
+    outer = inside[front] != inside[back]
+    if areas[outer & inside[back]].sum() < MOSTLY * areas[outer].sum():
+        return np.zeros(len(inside), dtype=bool)
+    facing_in = np.bincount(front, areas, len(inside))
+    return inside & (facing_in >= MOSTLY * (facing_in + np.bincount(back, areas, len(inside))))
