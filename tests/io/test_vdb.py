@@ -4,8 +4,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from shapes.grid_cases import sphere
-from signedheat.io.vdb import write_vdb
-from signedheat.io.vdb_reader import read_vdb
+from signedheat.io.vdb import read_vdb, write_vdb
 
 
 @pytest.fixture(scope="module")

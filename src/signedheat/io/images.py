@@ -35,7 +35,7 @@ from .files import (
     unpacked,
     with_messages,
 )
-from .vdb_reader import read_vdb_image
+from .vdb import read_vdb_image
 from .vtk_xml import read_vti
 
 NIBABEL = ("nibabel", "NIfTI files")
