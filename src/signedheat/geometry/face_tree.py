@@ -21,11 +21,11 @@ from ..compiled import compiled
 from ..parallel import n_threads
 from .box_tree import LEAF, BoxTree
 from .face_features import FaceFeatures, Links, Normals
-from .nearest import descend, foot_on_triangle
+from .nearest import foot_on_triangle, nearest_faces
 
 RUN = 512
 """Points after which a search starts anew."""
-TOGETHER = 8 * RUN
+PART = 8 * RUN
 """Points that one thread takes at a time."""
 DISC_LEVELS = 8
 """Levels of the tree, from the leaves up, that have discs."""
@@ -72,10 +72,10 @@ class FaceTree:
         distances = np.empty(len(points))
 
         def part(start: int) -> None:
-            here = slice(start, start + TOGETHER)
+            here = slice(start, start + PART)
             distances[here] = self._distances(points[here])
 
-        _on_threads(part, range(0, len(points), TOGETHER))
+        _on_threads(part, range(0, len(points), PART))
         return distances
 
     def search(self, points: NDArray[np.float64]) -> NearestFaces:
@@ -110,9 +110,7 @@ class FaceTree:
 
     def nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Nearest faces of points, and the squares of their distances."""
-        faces, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
-        descend(self.features.rows, self.tree.bounds, self.discs, self.tree.items, points, RUN, faces, squares)
-        return faces, squares
+        return nearest_faces(self.features.rows, self.tree, self.discs, points, RUN)
 
 
 def _on_threads(part: Callable[[int], None], starts: range) -> None:

@@ -16,6 +16,10 @@ from .box_tree import LEAF, BoxTree
 HEIGHT = 1e-14
 """Height of a triangle over its length up to which it has none: rounding would say where it lies, and its normal."""
 
+TOGETHER = 8
+"""Points that go down a tree together. With 16 a million take a tenth less on 20,000 faces, and a tenth more on 1.3
+million, whose boxes are smaller than what 16 points at random are apart; with 4 half as much again."""
+
 
 @compiled
 def triangle_rows(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -234,9 +238,18 @@ class TriangleTree:
         ([0, 0], [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]])
         """
         points = np.ascontiguousarray(points)
-        found, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
-        descend(self.rows, self.tree.bounds, self._no_discs, self.tree.items, points, len(points), found, squares)
+        found, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, TOGETHER * max(len(points), 1))
         return found.astype(np.int64), barycentric_on_triangles(self.rows, found, points)
+
+
+def nearest_faces(
+    rows: NDArray[np.float64], tree: BoxTree, discs: NDArray[np.float64], points: NDArray[np.float64], run: int
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """(n,) nearest face of each of (n, 3) points, and the square of its distance: see `descend`."""
+    faces, squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
+    best = np.empty(min(max(len(points), 1), TOGETHER))
+    descend(rows, tree.bounds, discs, tree.items, points, run, best, faces, squares)
+    return faces, squares
 
 
 @compiled
@@ -247,12 +260,14 @@ def descend(
     items: NDArray[np.int64],
     points: NDArray[np.float64],
     run: int,
+    best: NDArray[np.float64],
     out_faces: NDArray[np.int32],
     out_squares: NDArray[np.float64],
 ) -> None:
     """Nearest face of each point, and the square of its distance, down a tree of boxes.
 
-    Every `run` points the search starts anew, in between from the face before. Where a node has a disc
+    Points that follow each other go down together, where any of them may find something nearer, so that processors do
+    several at once. Every `run` points the search starts anew, in between from the face before. Where a node has a disc
     (`FaceTree.discs`) that is farther than its box, it counts. All in one function, since calls cost as much as boxes.
 
     Parameters
@@ -266,53 +281,114 @@ def descend(
     points : (n, 3) float
         Positions.
     run : int
-        See above.
+        See above; a multiple of how many points go together.
+    best : (k,) float
+        As long as there are points that go together. The compiler must not know how many: it does few one by one.
     out_faces, out_squares : (n,)
         What is found.
     """
-    leaves = len(bounds) // 2
-    stack, gaps = np.empty(64, dtype=np.int64), np.empty(64)
-    face = np.int64(0)
-    for p in range(len(points)):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        best, depth, node = np.inf, 0, np.int64(1)
-        if p % run != 0:
-            best, _, _, _, _ = foot_on_triangle(rows, face, x, y, z)
-        while node > 0:
-            while 0 < node < leaves:
-                near, gap, other = np.int64(0), np.inf, np.inf
-                for child in range(2 * node, 2 * node + 2):
-                    a = max(bounds[child, 0] - x, x - bounds[child, 3], 0.0)
-                    b = max(bounds[child, 1] - y, y - bounds[child, 4], 0.0)
-                    c = max(bounds[child, 2] - z, z - bounds[child, 5], 0.0)
-                    square = a * a + b * b + c * c
-                    if square < best and discs[child, 7] >= 0.0:
-                        px, py, pz = x - discs[child, 0], y - discs[child, 1], z - discs[child, 2]
-                        along = px * discs[child, 3] + py * discs[child, 4] + pz * discs[child, 5]
-                        height = max(abs(along) - discs[child, 7], 0.0)
-                        outside = np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0)) - discs[child, 6]
-                        flat = height * height + (outside * outside if outside > 0.0 else 0.0)
-                        square = max(square, flat)
-                    if square < gap:
-                        near, gap, other = child, square, gap
-                    else:
-                        other = square
-                if not gap < best:
-                    node = np.int64(0)
-                    break
-                if other < best:
-                    stack[depth], gaps[depth] = near ^ 1, other
-                    depth += 1
-                node = near
-            if node >= leaves:
-                for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
-                    if items[k] >= 0:
-                        square, _, _, _, _ = foot_on_triangle(rows, items[k], x, y, z)
-                        if square < best:
-                            best, face = square, items[k]
-            node = np.int64(0)
-            while depth > 0 and node == 0:
+    leaves, together, middle = len(bounds) // 2, len(best), len(best) // 2
+    places, which = np.empty((3, together)), np.zeros(together, dtype=np.int64)
+    stack, gaps = np.empty(66, dtype=np.int64), np.zeros((66, together))
+    for begin in range(0, len(points), together):
+        last = which[together - 1]
+        for k in range(together):
+            p = min(begin + k, len(points) - 1)
+            places[0, k], places[1, k], places[2, k] = points[p, 0], points[p, 1], points[p, 2]
+            best[k], which[k], gaps[0, k] = np.inf, last, 0.0
+        stack[0], depth, begun = 1, 1, begin % run == 0
+        while depth > 0:
+            node, first, end = np.int64(0), np.int64(0), np.int64(0)  # of faces to be looked at
+            if begun:
                 depth -= 1
-                if gaps[depth] < best:
-                    node = stack[depth]
-        out_faces[p], out_squares[p] = face, best
+                node, some = stack[depth], 0
+                for k in range(together):
+                    some += 1 if gaps[depth, k] < best[k] else 0
+                if some == 0:
+                    continue
+            while 0 < node < leaves:
+                kept = 0
+                for side in range(2):
+                    child, row = 2 * node + side, depth + side
+                    ax, ay, az = bounds[child, 0], bounds[child, 1], bounds[child, 2]
+                    bx, by, bz = bounds[child, 3], bounds[child, 4], bounds[child, 5]
+                    some = 0
+                    for k in range(together):
+                        x, y, z = places[0, k], places[1, k], places[2, k]
+                        dx = ax - x if ax - x > x - bx else x - bx
+                        dx = dx if dx > 0.0 else 0.0
+                        dy = ay - y if ay - y > y - by else y - by
+                        dy = dy if dy > 0.0 else 0.0
+                        dz = az - z if az - z > z - bz else z - bz
+                        dz = dz if dz > 0.0 else 0.0
+                        square = dx * dx + dy * dy + dz * dz
+                        gaps[row, k] = square
+                        some += 1 if square < best[k] else 0
+                    if some > 0 and discs[child, 7] >= 0.0:
+                        ax, ay, az = discs[child, 0], discs[child, 1], discs[child, 2]
+                        nx, ny, nz = discs[child, 3], discs[child, 4], discs[child, 5]
+                        radius, thick = discs[child, 6], discs[child, 7]
+                        some = 0
+                        for k in range(together):
+                            x, y, z = places[0, k] - ax, places[1, k] - ay, places[2, k] - az
+                            along = x * nx + y * ny + z * nz
+                            height = abs(along) - thick
+                            height = height if height > 0.0 else 0.0
+                            across = x * x + y * y + z * z - along * along
+                            outside = np.sqrt(across if across > 0.0 else 0.0) - radius
+                            outside = outside if outside > 0.0 else 0.0
+                            flat = height * height + outside * outside
+                            square = gaps[row, k]
+                            square = flat if flat > square else square
+                            gaps[row, k] = square
+                            some += 1 if square < best[k] else 0
+                    kept += 1 + side if some > 0 else 0
+                node = 2 * node + 1 if kept == 2 else 2 * node if kept > 0 else np.int64(0)
+                if kept == 3:  # that which is nearer to one of the points first
+                    if gaps[depth, middle] <= gaps[depth + 1, middle]:
+                        for k in range(together):
+                            gaps[depth, k] = gaps[depth + 1, k]
+                    else:
+                        node += 1
+                    stack[depth] = node ^ 1
+                    depth += 1
+            if node > 0:
+                first, end = (node - leaves) * LEAF, (node - leaves + 1) * LEAF
+            elif not begun:
+                end = np.int64(1)
+            for item in range(first, end):
+                f = items[item] if begun else last
+                if f < 0:
+                    continue
+                ax, ay, az = rows[f, 0], rows[f, 1], rows[f, 2]
+                ux, uy, uz = rows[f, 3], rows[f, 4], rows[f, 5]
+                vx, vy, vz = rows[f, 6], rows[f, 7], rows[f, 8]
+                nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+                one, two, three = rows[f, 9], rows[f, 12], rows[f, 15]
+                c, d, g, h = rows[f, 10], rows[f, 11], rows[f, 13], rows[f, 14]
+                for k in range(together):  # as in `away_from_triangle`
+                    x, y, z = places[0, k] - ax, places[1, k] - ay, places[2, k] - az
+                    p, q, up = x * ux + y * uy + z * uz, x * vx + y * vy + z * vz, x * nx + y * ny + z * nz
+                    r = p - one
+                    beyond = -q if -q > q * c - p * d else q * c - p * d
+                    beyond = beyond if beyond > r * h - q * g else r * h - q * g
+                    t = p if p > 0.0 else 0.0
+                    t = t if t < one else one
+                    square = (p - t) * (p - t) + q * q
+                    t = p * c + q * d
+                    t = t if t > 0.0 else 0.0
+                    t = t if t < two else two
+                    other = (p - t * c) * (p - t * c) + (q - t * d) * (q - t * d)
+                    square = other if other < square else square
+                    t = r * g + q * h
+                    t = t if t > 0.0 else 0.0
+                    t = t if t < three else three
+                    other = (r - t * g) * (r - t * g) + (q - t * h) * (q - t * h)
+                    square = other if other < square else square
+                    square = up * up + (0.0 if beyond < 0.0 else square)
+                    nearer = square < best[k]
+                    best[k] = square if nearer else best[k]
+                    which[k] = f if nearer else which[k]
+            begun = True
+        for k in range(min(together, len(points) - begin)):
+            out_faces[begin + k], out_squares[begin + k] = which[k], best[k]
