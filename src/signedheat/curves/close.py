@@ -135,7 +135,7 @@ def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints
 def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list[Curve]:
     """The zero set of a field as curves: those that follow or complete the given ones.
 
-    Where a curve runs along the rim of the surface, φ has one sign beside it, and is zero up to rounding on it: there
+    Where a curve runs along the rim of the surface, φ has one sign next to it, and is zero up to rounding on it: there
     the rim counts as the other side. Loops that are shorter than what they would complete are left out.
     """
     if not isinstance(field.domain, TriangleMesh):
@@ -154,7 +154,7 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
 
 
 def beyond_the_rim(triangles: IntrinsicMesh, values: NDArray[np.float64]) -> None:
-    """Give zeros in rows along the rim the sign of the rim beyond both ends; without such, that not found beside."""
+    """Give zeros in rows along the rim the sign of the rim beyond both ends; else the one that neighbours lack."""
     least = ZERO * float(triangles.lengths_of_edges.mean())
     zero, ends = np.abs(values) <= least, triangles.edges.vertices
     rim = ends[triangles.edges.face_counts == 1]
@@ -162,16 +162,16 @@ def beyond_the_rim(triangles: IntrinsicMesh, values: NDArray[np.float64]) -> Non
     in_row = np.zeros(len(values), dtype=bool)
     in_row[rim[zero[rim]]] = True
 
-    def signs_beside(edges: NDArray[np.int64]) -> NDArray[np.float64]:
+    def neighbor_signs(edges: NDArray[np.int64]) -> NDArray[np.float64]:
         """Sum of the signs at the other ends of edges from each row."""
         tail, head = np.concatenate([edges, edges[:, ::-1]]).T
         out = in_row[tail] & ~zero[head]
         sums: NDArray[np.float64] = np.bincount(row[tail[out]], np.sign(values[head[out]]), len(values)).astype(float)
         return sums
 
-    beyond, beside = signs_beside(rim), signs_beside(ends)
+    beyond, nearby = neighbor_signs(rim), neighbor_signs(ends)
     long = np.bincount(row[in_row], minlength=len(values)) > 1
-    side = np.where(np.abs(beyond) > 1, np.sign(beyond), np.where(long, -np.sign(beside), 0.0))[row]
+    side = np.where(np.abs(beyond) > 1, np.sign(beyond), np.where(long, -np.sign(nearby), 0.0))[row]
     chosen = in_row & (side != 0)
     values[chosen] = least * side[chosen]
 

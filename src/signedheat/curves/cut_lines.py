@@ -1,6 +1,6 @@
 """The lines along which a function jumps: found among jumps everywhere, then as few of them as slopes need, unforked.
 
-The least cost of Eq. 16 leads the jumps that some directions ask for along branching lines, and some along lines of
+The least cost of Eq. 16 leads the jumps that follow from some directions along branching lines, and some along lines of
 their own. Without a branch the function that continues across it still follows most directions.
 """
 
@@ -24,7 +24,7 @@ TWIG = 5.0
 """A branch of a cut whose jump is nowhere this many times that side is none, unless the cut itself is as low."""
 
 HARDLY_WORSE = 1.1
-"""Error of slopes, beside that with all lines, up to which fewer lines are worth more."""
+"""Error of slopes, relative to that with all lines, up to which fewer lines are worth more."""
 
 
 class Opened(NamedTuple):

@@ -21,7 +21,7 @@ from ..parallel import n_threads
 from .strokes import REWARD, Inside, Strokes
 
 AS_GIVEN = 0.5
-"""What turning a stroke costs, beside its length."""
+"""What turning a stroke costs, relative to its length."""
 WEAKLY = 0.02
 """The same if sides are smooth, for a stroke of mean length. Of two that follow each other, with a gap of half of their
 length, the energy is less by 0.05."""
@@ -42,9 +42,9 @@ SINGLY = 16
 FOLLOWING = 0.045
 """How far strokes agree that follow each other with a gap as long as both, on a plane: ln(4/3) / 2π."""
 FEW = 0.3
-"""Share of the length of all strokes below which whole loops are turned without doubt."""
+"""Share of the length of all strokes below which whole loops are turned without a warning."""
 NEARLY = 0.06
-"""Cost, beside the length of all strokes, by which a rival may be dearer that is nearly as good."""
+"""Cost, relative to the length of all strokes, by which a rival may be dearer that is nearly as good."""
 OTHERWISE = 0.05
 """Share of the area on whose side two ways differ that are not the same."""
 
@@ -60,7 +60,7 @@ class Pieces:
     movable : (k,) bool
         Whether each is a piece: open, and not from boundary to boundary of the surface.
     strokes : Strokes
-        What they tell.
+        The energy of the sets that they may bound.
     """
 
     numbers: NDArray[np.int64]
@@ -114,7 +114,7 @@ class Decision:
         return mostly_loose(self.pieces.strokes, self.best)
 
     @property
-    def broken_in_vain(self) -> bool:
+    def ends_agree_in_vain(self) -> bool:
         """Whether most of the length bounds nothing although there are pieces that follow each other."""
         if not self.bounds_nothing:
             return False
@@ -131,7 +131,7 @@ class Decision:
     def turned_loops(self) -> NDArray[np.int64]:
         """Numbers of the pieces that are turned against most of the length of their own loop.
 
-        None if they are few, or if there are complete curves, not against their own loop, that tell how others face.
+        None if they are few, or if there are complete curves, not against their own loop, which show how others face.
         """
         strokes, best = self.pieces.strokes, self.best
         triangles = strokes.surface.triangles
@@ -140,9 +140,9 @@ class Decision:
         loop = connected_components(triangles.n_vertices, *crossed[:, [0, 1, 1, 2]].reshape(-1, 2).T)
         at_loop = np.zeros(triangles.n_vertices, dtype=bool)
         at_loop[crossed] = True
-        beside = strokes.means.tocoo()
-        chosen = at_loop[beside.col]
-        at = beside.row[chosen], loop[beside.col[chosen]]
+        nearby = strokes.means.tocoo()
+        chosen = at_loop[nearby.col]
+        at = nearby.row[chosen], loop[nearby.col[chosen]]
         count = sparse.csr_matrix((np.ones(len(at[0])), at), shape=(len(best.signs), triangles.n_vertices))
         own = np.asarray(count.argmax(axis=1)).ravel()
         explained = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
@@ -189,7 +189,7 @@ def decide(pieces: Pieces) -> Decision:
 
     A cut gives the sides for directions, and sides give directions: from several starts both are improved in turn, then
     by turning strokes one by one. Where more of the curves is gone than there is, only ends that are near each other
-    tell anything, and sides are taken to be smooth.
+    are evidence, and sides are taken to be smooth.
     """
     strokes, movable = pieces.strokes, pieces.movable
     k = len(movable)
@@ -249,7 +249,7 @@ def loose(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> list[
 
 
 def groups_among(strokes: Strokes, rows: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Some of the strokes in groups that tell most about each other, the longest ones; not all of them together."""
+    """Some of the strokes in groups that depend most on each other, the longest ones; not all of them together."""
     if len(rows) < 2:
         return []
     tails, heads = np.triu_indices(len(rows), 1)

@@ -101,13 +101,13 @@ def distance_to_pieces(
     if turn.any() or len(left_out):
         note = CurvesTaken(np.flatnonzero(turn), left_out)
         field = replace(field, diagnostics=field.diagnostics.noting(note))
-    warn_of_doubt(decision, field, listed)
+    warn_of_guesses(decision, field, listed)
     return field, taken
 
 
-def warn_of_doubt(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> None:
+def warn_of_guesses(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> None:
     """Warn if what the pieces bound is a guess."""
-    if decision.broken_in_vain:
+    if decision.ends_agree_in_vain:
         warn_user(
             "most of the curves bound nothing together: which side is which away from them is a guess. Draw what is "
             "missing, or turn curves that face the wrong way; as_oriented=True takes curves as they are",

@@ -26,7 +26,7 @@ from ..geometry.components import connected_components
 from ..linear import factorize
 
 LOOSE = 0.15
-"""Gap from which constants are asked whether they leave a cut. Without one, what is left is below the triangles."""
+"""Gap from which on it is checked whether constants leave a cut. Without one, what is left is below the triangles."""
 _LOOK = 25  # rounds between two evaluations of the gap
 _RELAXATION = 1.6
 _THRESHOLD = 4.0  # initial threshold of the proximal step, relative to a typical difference

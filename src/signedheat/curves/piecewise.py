@@ -3,7 +3,7 @@
 In Eq. 16 φ is linear in every face with gradient exactly Y, so it is known up to one constant per face. Where Y is
 integrable, the constants make φ continuous across edges; elsewhere φ jumps, and the weighted L1 norm concentrates the
 jumps on a cut that is short and runs where Y is not integrable. The cut is then made clean (`cut_lines`), and φ smooth
-beside it (`piecewise_slopes.smoothed`).
+near it (`piecewise_slopes.smoothed`).
 """
 
 from __future__ import annotations
@@ -190,7 +190,7 @@ def piecewise_distance(
 
 
 def part_of(progress: Progress | None, start: float, stop: float, step: str) -> Callable[[float], None] | None:
-    """What is told the fraction done of a part of one step."""
+    """What is called with the fraction done of a part of one step."""
     return None if progress is None else lambda share: progress(start + (stop - start) * share, step)
 
 
@@ -226,7 +226,7 @@ def _retriangulated(
     sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]],
     intrinsic: bool | Literal["auto"],
 ) -> tuple[TriangleMesh | PolygonMesh | IntrinsicTriangulation, SurfaceDiscretization]:
-    """The domain, or the intrinsic triangulation of it that bad triangles or unoriented curves ask for."""
+    """The domain, or the intrinsic triangulation of it that bad triangles or unoriented curves need."""
     discretization = _lowered(domain)
     if isinstance(domain, IntrinsicTriangulation):
         return domain, conforming(discretization, sources)

@@ -23,7 +23,7 @@ from ..progress import Progress, within
 from ..solver import SignedHeatSolver, as_list
 
 NEAR = 1.5
-"""Cells from a line within which it tells the side itself: φ is smooth over about a cell."""
+"""Cells from a line within which it decides the side itself: φ is smooth over about a cell."""
 
 
 def distance_to_lines(
@@ -39,8 +39,8 @@ def distance_to_lines(
 ) -> GridField:
     """Signed distance to polylines in the plane: see `signed_distance`, which calls this.
 
-    The signed heat method tells the sides, and its zero set stands where lines are missing. On grids with solid nodes,
-    and in other dimensions than two, φ is returned as the method gives it.
+    The signed heat method decides the sides, and its zero set completes the lines. On grids with solid nodes, and in
+    other dimensions than two, φ is returned as the method gives it.
     """
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(

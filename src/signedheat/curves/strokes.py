@@ -1,4 +1,4 @@
-"""What strokes tell about the sides of a surface: the energy of an inside, and its least."""
+"""The energy of an inside that strokes bound, and the inside where it is least."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from ..linear import factorize
 from ..lowering.surface.discretization import SurfaceDiscretization
 
 REWARD = 1.0
-"""What explaining a stroke is worth, beside its length: less than 1, since a line round a stroke is as long again. From
-0.8 to 1.0 the table of damaged curves stays as it is."""
+"""What explaining a stroke is worth, relative to its length: at most 1, since a line round a stroke is as long again.
+From 0.8 to 1.0 the table of damaged curves stays as it is."""
 RINGS = 1
-"""Rings of vertices on either side of a stroke that tell at least whether it is explained."""
+"""Rings of vertices on either side of a stroke from which at least it is seen whether it is explained."""
 EDGES, OF_ALL, OF_ONE = 2.0, 0.01, 0.05
-"""How far from a stroke sides tell whether it is explained, so that strokes that were drawn again beside it are one: in
+"""How far from a stroke sides count for whether it is explained, so that strokes drawn again next to it are one: in
 edges of the mesh, but no more of the length of all strokes; and of its own."""
 STAIRS = 0.92
-"""Length of a line beside that of the edges' duals that it cuts."""
+"""Length of a line relative to that of the edges' duals that it cuts."""
 LEVEL = 1e-6
 """Height above a segment, relative to its face, up to which a corner is on it."""
 AHEAD = 0.2
@@ -76,7 +76,7 @@ class Strokes:
     fluxes : (k, n) sparse
         Integrals along each stroke of the slopes of hat functions towards its left.
     width : float
-        Distance up to which strokes beside each other are drawn for one.
+        Distance up to which strokes next to each other count as one.
     """
 
     surface: SurfaceDiscretization
@@ -101,8 +101,8 @@ class Strokes:
         crossed.eliminate_zeros()
         areas = areas_of_vertices(triangles)
         width = min(EDGES * edge, OF_ALL * float(lengths.sum()))
-        beside = widened(triangles, seen, np.maximum(OF_ONE * lengths, width))
-        left, right = (_means(beside.multiply(beside * side > 0), areas) for side in (1, -1))
+        around = widened(triangles, seen, np.maximum(OF_ONE * lengths, width))
+        left, right = (_means(around.multiply(around * side > 0), areas) for side in (1, -1))
         means = sparse.csr_matrix(0.5 * (left - right))
         return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width)
 
@@ -210,7 +210,7 @@ def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> spar
     heights = (np.conj(step) * corners).imag / np.abs(step) * placed.sides[rows, None]
     size = triangles.edge_lengths[faces].max(axis=1, keepdims=True)
     sines = np.abs(heights) / np.maximum(gaps, 1e-300)
-    steps_away = np.rint(gaps / (LEVEL * size))  # rounding must not tell which of two segments is nearer
+    steps_away = np.rint(gaps / (LEVEL * size))  # rounding must not decide which of two segments is nearer
     sides = np.where(np.abs(heights) <= LEVEL * size, 0.0, np.sign(heights))
     keys = (owners[rows, None] * triangles.n_vertices + triangles.corner_vertices[faces]).ravel()
     order = np.lexsort((-sines.ravel(), steps_away.ravel(), keys))
@@ -232,8 +232,8 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, widths: NDArray[n
     )
     found = sparse.coo_matrix(seen)
     taken = np.sort(found.row.astype(np.int64) * n + found.col)
-    beside = found.data != 2
-    stroke, vertex, side = found.row[beside].astype(np.int64), found.col[beside], found.data[beside] - 2
+    off = found.data != 2
+    stroke, vertex, side = found.row[off].astype(np.int64), found.col[off], found.data[off] - 2
     far, chosen, ring = np.zeros(len(stroke)), [(stroke, vertex, side)], 1
     while len(stroke):
         which, at = members_of(neighbors.indptr, np.arange(neighbors.nnz), vertex)

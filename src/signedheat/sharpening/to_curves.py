@@ -26,13 +26,13 @@ from ..progress import Progress
 from ..solver import as_list
 
 FAR = 1.0
-"""Triangle sizes: what the zero set has farther from any curve stands in for missing curve."""
+"""Triangle sizes: what the zero set has farther from any curve completes the curves."""
 
 ROUGHLY = 1e-4
 """Tolerance of distances that are compared only, of which differences below a thousandth do not count."""
 
 INVENTED = 0.05
-"""Share of the zero set, apart from curves without an end, from which these are told to bound nothing."""
+"""Share of the zero set, apart from curves without an end, from which there is a warning that these bound nothing."""
 
 FALSE_ZERO_WIDTH = 4.0
 """Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
@@ -49,7 +49,7 @@ class CurvesThere:
     distance : (n,) float
         Of every vertex to them.
     sides : CurveSides
-        What the oriented ones tell.
+        Those of the oriented ones.
     windows : int
         A measure of the work.
     """
@@ -74,9 +74,9 @@ class ToCurves:
     """A method of sharpening: distance to curves and points, and to the zero set of φ where oriented ones are missing.
 
     1. Exact distance to the curves themselves.
-    2. Sides: in regions that curves bound, and at vertices beside a curve, the curve tells; elsewhere φ does.
+    2. Sides: in regions that curves bound, and at vertices next to a curve, the curve decides; elsewhere φ does.
     3. The zero set of φ, in regions that no curve bounds, where it is farther from any curve than the triangles there
-       are large, or beyond the free end of one: it stands in for missing curve.
+       are large, or beyond the free end of one: it completes the curves.
     4. The smaller of both distances, with the sides of 2.
 
     Attributes
@@ -123,8 +123,8 @@ def sharpened_to_curves(
     if not any(part.oriented for part in parts):
         return np.where(np.isnan(values), np.nan, distance), (note_on_searches(triangles, *counts),)
     sides, known = there.sides, there.sides.regions != 0
-    beside = sides.reach <= distance * (1 + 1e-9)
-    side = np.where(known, sides.regions, np.where(beside, sides.nearby, 0))
+    nearest = sides.reach <= distance * (1 + 1e-9)
+    side = np.where(known, sides.regions, np.where(nearest, sides.nearby, 0))
     turned = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
     values = np.where(turned, np.copysign(distance, side), values)
     missing, more = missing_parts(triangles, values, parts, there, spacing, tolerance, report)
@@ -156,7 +156,7 @@ def missing_parts(
     tolerance: float,
     report: Report | None,
 ) -> tuple[PlacedSegments, list[int]]:
-    """The parts of the zero set of φ that stand in for missing curve; and the number of windows of each search."""
+    """The parts of the zero set of φ that complete the curves; and the number of windows of each search."""
     size = np.sqrt(2 * triangles.face_areas)
     corners = triangles.corner_vertices
     apart = there.distance[corners].mean(axis=1) > FAR * size
@@ -182,12 +182,12 @@ def missing_parts(
 
 
 def without_false_zeros(
-    triangles: IntrinsicMesh, values: NDArray[np.float64], beside: NDArray[np.bool_], sided: NDArray[np.int64]
+    triangles: IntrinsicMesh, values: NDArray[np.float64], near: NDArray[np.bool_], sided: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Values with NaN along those parts of the zero set that are due to unoriented sources.
 
     φ is zero at such a source only on average, so it may change sign around it. A connected part of the zero set that
-    lies entirely beside the source, and at no vertex of an oriented curve, is due to the source alone.
+    lies entirely near the source, and at no vertex of an oriented curve, is due to the source alone.
     """
     signs = np.sign(values)[triangles.corner_vertices]
     crossed = np.flatnonzero((signs.min(axis=1) < 0) & (signs.max(axis=1) > 0))
@@ -199,7 +199,7 @@ def without_false_zeros(
     is_sided = np.zeros(len(values), dtype=bool)
     is_sided[sided] = True
     own = np.ones(line.max(initial=-1) + 1, dtype=bool)
-    own[line[(~beside[corners] | is_sided[corners]).any(axis=1)]] = False
+    own[line[(~near[corners] | is_sided[corners]).any(axis=1)]] = False
     result = values.copy()
     result[corners[own[line]]] = np.nan
     answer: NDArray[np.float64] = result
