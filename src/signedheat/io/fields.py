@@ -33,6 +33,7 @@ from .meshes import write_obj
 from .ply import read_ply, write_ply
 from .tets import TET_FIELD_FORMATS, load_cells, store_cells
 from .vdb import write_vdb
+from .vtk_hdf import image_in_hdf, write_vtkhdf
 from .vtk_xml import read_vtp, write_vti, write_vtp
 
 CONVENTION = (
@@ -46,8 +47,10 @@ OF_BANDS = (
 CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
 BYTES_PER_NODE = 20.0
 """Of bands written whole: values, their copy in the order of the file, and what is written."""
-_NEEDED = {".nrrd": ("nrrd", "NRRD files")}
-_DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
+HDF = ".vtkhdf"
+"""Of files that are written, and not read."""
+_NEEDED = {".nrrd": ("nrrd", "NRRD files"), HDF: ("h5py", "VTKHDF files")}
+_DIMENSIONS = {".vti": (1, 2, 3), HDF: (2, 3), ".vdb": (3,)}
 """Numbers of axes that a format supports; the others support any number."""
 
 
@@ -57,7 +60,12 @@ def _(field: object, path: PathLike) -> None:
         save_field(field, path)
     elif isinstance(field, TetField):
         format_for(path, dict.fromkeys(TET_FIELD_FORMATS), "a field on tets")
-        store_cells(field.mesh.to_meshio({NAME: field.values}), path)
+        if extension(path) == HDF:
+            tets = Elements(field.mesh.vertices, tets=field.mesh.tets, values={NAME: field.values})
+            with replacing(path) as temporary:
+                temporary.write_bytes(write_vtkhdf(tets, path))
+        else:
+            store_cells(field.mesh.to_meshio({NAME: field.values}), path)
     elif isinstance(field, VertexField):
         write = format_for(path, {".npz": None, ".obj": write_obj, **VALUE_FORMATS}, "a field on a surface")
         simple = on_simple_surface(field)
@@ -73,7 +81,7 @@ def save_field(field: GridField, path: PathLike) -> None:
     """Write a field on a grid, in the format given by the extension.
 
     ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
-    same name next to it, ``.vdb`` (OpenVDB; single precision).
+    same name next to it, ``.vdb`` (OpenVDB; single precision), ``.vtkhdf`` (VTK's HDF5, which is not read).
 
     Parameters
     ----------
@@ -149,14 +157,14 @@ def load_field(path: PathLike) -> Field:
     ...     bool((load_field(f"{folder}/phi.vti").values == phi.values).all())
     True
     """
-    if extension(path) in TET_FIELD_FORMATS:
+    if extension(path) in TET_FIELD_FORMATS - {HDF}:
         return _load_tet_field(path)
     names = names_in_npz(path) if extension(path) == ".npz" else set()
     if extension(path) in _VALUES or {"values", "vertices"} <= names:
         return load_vertex_field(path)
     if "coarse_values" in names:
         return _load_band(path)
-    image = read_image(path, FIELD_FORMATS, "a field")
+    image = read_image(path, FIELD_FORMATS - {HDF}, "a field")
     if extension(path) == ".npy":
         contents(Path(path).with_suffix(".json"))  # which says where the values are
     with reading(path):
@@ -237,15 +245,19 @@ def _write_npy(field: GridField, path: Path) -> None:
         np.save(file, field.values, allow_pickle=False)
 
 
-def _write_vti(field: GridField, path: Path) -> None:
+def _write_for_vtk(field: GridField, path: Path) -> None:
     """Of a band all nodes of its grid, for ParaView and solvers."""
     grid, convention = field.grid, CONVENTION
-    values: NDArray[np.floating] = field.values
-    others = {} if field.confidence is None else {CONFIDENCE: field.confidence}
+    values: dict[str, NDArray[np.floating]] = {NAME: field.values}
     if field.blocks is not None:
         refuse_beyond_memory(grid, BYTES_PER_NODE, 0.0)
-        values, convention, others = whole_values(field), CLIPPED, {}
-    path.write_bytes(write_vti(values, grid.origin, grid.spacing, NAME, convention, others))
+        values, convention = {NAME: whole_values(field)}, CLIPPED
+    elif field.confidence is not None:
+        values[CONFIDENCE] = field.confidence
+    if extension(path) == HDF:
+        path.write_bytes(image_in_hdf(grid, values))
+    else:
+        path.write_bytes(write_vti(grid.origin, grid.spacing, values, convention))
 
 
 def _write_nrrd(field: GridField, path: Path) -> None:
@@ -288,15 +300,20 @@ def _write_vertex_npz(field: VertexField[SurfaceShape], path: PathLike) -> None:
 
 
 _VALUES: dict[str, Callable[[PathLike, tuple[str, ...]], Elements]] = {".ply": read_ply, ".vtp": read_vtp}
-VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {".ply": write_ply, ".vtp": write_vtp}
+VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {
+    ".ply": write_ply,
+    ".vtp": write_vtp,
+    HDF: write_vtkhdf,
+}
 """Formats of surfaces with values at their vertices."""
 _GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
     ".npy": _write_npy,
     ".npz": _write_npz,
     ".nrrd": _write_nrrd,
     ".vdb": write_vdb,
-    ".vti": _write_vti,
+    ".vti": _write_for_vtk,
+    HDF: _write_for_vtk,
 }
-_BAND_WRITERS = {ending: _GRID_WRITERS[ending] for ending in (".npz", ".vdb", ".vti")}
+_BAND_WRITERS = {ending: _GRID_WRITERS[ending] for ending in (".npz", ".vdb", ".vti", HDF)}
 FIELD_FORMATS, BAND_FORMATS = frozenset(_GRID_WRITERS), frozenset(_BAND_WRITERS)
 VERTEX_FIELD_FORMATS = frozenset({".npz", ".obj", *VALUE_FORMATS})

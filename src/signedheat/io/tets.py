@@ -36,7 +36,7 @@ TETGEN = (".node", ".ele")
 """Extensions of the files of TetGen, which are read and written as a pair."""
 TET_FORMATS = frozenset(MODULES)
 
-TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
+TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtkhdf", ".vtu"})
 
 
 def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:

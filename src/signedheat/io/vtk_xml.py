@@ -13,7 +13,6 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -43,18 +42,14 @@ KINDS = {
 
 
 def write_vti(
-    values: NDArray[Any],
-    origin: NDArray[np.float64],
-    spacing: NDArray[np.float64],
-    name: str,
-    convention: str,
-    others: Mapping[str, NDArray[Any]] = MappingProxyType({}),
+    origin: NDArray[np.float64], spacing: NDArray[np.float64], values: Mapping[str, NDArray[Any]], convention: str
 ) -> bytes:
-    """Image data of up to three axes; a missing axis has one node. `others` are further values at the nodes."""
-    missing = 3 - values.ndim
-    extent = " ".join(f"0 {n - 1}" for n in values.shape + (1,) * missing)
+    """Image data of up to three axes; a missing axis has one node. ParaView shows the first of the values."""
+    name, first = next(iter(values.items()))
+    missing = 3 - first.ndim
+    extent = " ".join(f"0 {n - 1}" for n in first.shape + (1,) * missing)
     writer = _Writer()
-    arrays = "".join(writer.array(key, at.ravel(order="F")) for key, at in {name: values, **others}.items())
+    arrays = "".join(writer.array(key, at.ravel(order="F")) for key, at in values.items())
     attributes = (
         f'WholeExtent="{extent}" Origin="{_words([*origin, *[0.0] * missing])}" '
         f'Spacing="{_words([*spacing, *[1.0] * missing])}" Direction="1 0 0 0 1 0 0 0 1"'
