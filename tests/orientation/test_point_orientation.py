@@ -6,7 +6,8 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.orientation.points import orient_axes, orient_points, orient_triangles
+from signedheat.orientation.points import orient_points
+from signedheat.orientation.soups import orient_triangles
 
 
 def box(size, center=(0.0, 0.0, 0.0)):
@@ -177,13 +178,6 @@ def test_triangles_without_area_keep_their_order():
     corners = np.concatenate([samples.sphere(2).vertices[samples.sphere(2).faces], np.zeros((2, 3, 3))])
     np.testing.assert_array_equal(orient_triangles(corners), np.ones(len(corners)))
     np.testing.assert_array_equal(orient_triangles(np.zeros((5, 3, 3))), np.ones(5))
-
-
-def test_axes_of_samples_get_signs():
-    truth = samples.oriented_points(samples.torus(), 3000)
-    flip = np.where(np.random.default_rng(0).random(3000) < 0.5, -1.0, 1.0)
-    signs = orient_axes(truth.points, truth.normals * flip[:, None])
-    assert (signs == flip).mean() > 0.995
 
 
 def test_distance_to_points_without_normals_is_that_with_them():

@@ -17,8 +17,7 @@ from ..reprs import ShortRepr
 from .inner_walls import inner_walls
 from .mesh_faces import Mesh, MeshFaces
 from .parts import LEAST_CLOSED, PartOrientation, Parts, clear, orient_parts
-from .points import orient_triangles
-from .soups import agreement, disagreeing_with_neighbors, odds_at_corners
+from .soups import agreement, disagreeing_with_neighbors, odds_at_corners, orient_triangles
 from .stabbing_lines import LineCrossings, aimed_lines, joined, stabbing_lines
 from .surface_parts import SurfaceParts
 from .votes import imbalance, votes
@@ -353,7 +352,7 @@ def _turned_together(
     backwards = agreeing[faces.triangle_faces[chosen]]
     corners[backwards] = corners[backwards, ::-1]
     flipped = np.zeros(surface.n_parts, dtype=bool)
-    flipped[of_triangle[chosen]] = orient_triangles(corners, groups=of_triangle[chosen]) < 0
+    flipped[of_triangle[chosen]] = orient_triangles(corners, of_triangle[chosen]) < 0
     together = np.where(loose[surface.orientation.parts], agreeing != flipped[surface.orientation.parts], turned)
     after = unevenness(together)
     if MENDED * before <= after <= before:

@@ -42,8 +42,6 @@ class PlaneFits:
         The points themselves; where they are noisy, their feet on the planes.
     reaches : (n,) float
         Distance to the last neighbour used.
-    deviations : (n,) float
-        Root mean square height of the neighbours over the plane, in reaches.
     n_neighbors : int
         Size of the neighbourhoods.
     noisy : bool
@@ -53,7 +51,6 @@ class PlaneFits:
     axes: NDArray[np.float64]
     places: NDArray[np.float64]
     reaches: NDArray[np.float64]
-    deviations: NDArray[np.float64]
     n_neighbors: int
     noisy: bool
 
@@ -76,9 +73,9 @@ def fit_planes(points: NDArray[np.float64], n_neighbors: int | None = None) -> P
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
     heights, starts = (NOISY_HEIGHTS, 1) if noisy else (CLEAN_HEIGHTS, 5)
-    axes, places, reaches, deviations = planes_near(points, tree, np.arange(len(points)), size, heights, starts)
+    axes, places, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, heights, starts)
     places = points - ((points - places) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
-    return PlaneFits(axes, places, reaches, deviations, size, noisy)
+    return PlaneFits(axes, places, reaches, size, noisy)
 
 
 def noisy_sizes(points: NDArray[np.float64]) -> list[int]:

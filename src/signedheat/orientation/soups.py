@@ -6,6 +6,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from .axes import outward_signs
+from .plane_fits import fit_planes, noise_scale
+
 N_NEIGHBORS = 12
 """Neighbours of a piece that are asked."""
 N_AROUND = 24
@@ -16,6 +19,67 @@ LEAST_AGREEMENT = 0.6
 """How clearly neighbours must agree (1: all their normals along one line, the same way) to turn a piece."""
 AT_CORNERS = 5.0
 """Logarithm of the odds that a small part faces as those do that it touches, all of them parallel to it."""
+
+
+def orient_triangles(
+    corners: NDArray[np.float64], groups: NDArray[np.int64] | None = None, n_samples: int = 20_000
+) -> NDArray[np.float64]:
+    """(m,) signs, −1 for triangles to turn round so that loose triangles, taken together, face outwards.
+
+    Parameters
+    ----------
+    corners : (m, 3, 3) float
+        Corners of triangles, of which nothing is known to be connected. Their order is evidence: weak, and relative; if
+        most are inverted, that is found out.
+    groups : (m,) int, optional
+        Triangles of the same group, which agree with each other, share one sign.
+    n_samples : int
+        Points that stand for the triangles, at least one for each, as many more as their areas ask for.
+
+    Notes
+    -----
+    Groups without area keep their order.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> mesh = samples.sphere(3)
+    >>> corners = mesh.vertices[mesh.faces]
+    >>> corners[::2] = corners[::2, ::-1]
+    >>> signs = orient_triangles(corners)
+    >>> bool((signs[::2] == -1).all() and (signs[1::2] == 1).all())
+    True
+    """
+    vectors = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(vectors, axis=1)
+    members = np.arange(len(corners)) if groups is None else groups
+    signs = np.ones(int(members.max(initial=-1)) + 1)
+    solid = np.flatnonzero(areas > 0)
+    counts = np.maximum(1, np.rint(areas[solid] / max(areas.sum(), np.finfo(float).tiny) * n_samples)).astype(np.int64)
+    owners = np.repeat(np.arange(len(solid)), counts)
+    order = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+    points = _spread(corners[solid][owners], order, counts[owners])
+    distinct = np.sort(np.unique(points, axis=0, return_index=True)[1])
+    points, owners = points[distinct], solid[owners[distinct]]
+    if len(points) >= 4:
+        present, kept = np.unique(members[owners], return_inverse=True)
+        fits = fit_planes(points, noise_scale(points))
+        axes = vectors[owners] / areas[owners, None]
+        signs[present[kept.ravel()]] = outward_signs(fits, axes, True, kept.ravel()).signs
+    return signs[members]
+
+
+def _spread(corners: NDArray[np.float64], order: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The centroid where a triangle has one sample; else samples spread evenly by a sequence of low discrepancy.
+
+    The sequence is that of Roberts (2018), with steps of the inverse plastic number and its square.
+    """
+    plastic = 1.324717957244746
+    u, v = np.mod(0.5 + order / plastic, 1.0), np.mod(0.5 + order / plastic**2, 1.0)
+    root = np.sqrt(u)
+    weights = np.stack([1 - root, root * (1 - v), root * v], axis=1)
+    weights = np.where((counts == 1)[:, None], 1 / 3, weights)
+    return np.asarray((weights[:, :, None] * corners).sum(axis=1))
 
 
 def odds_at_corners(
