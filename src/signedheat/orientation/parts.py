@@ -60,15 +60,12 @@ class PartOrientation:
         Part in which each lies that is hidden in another; −1 for none.
     cavity : (n_parts,) bool
         Which of the nested parts are walls of cavities.
-    votes : Votes
-        What the lines told of the parts as they were.
     """
 
     odds: NDArray[np.float64]
     decided: NDArray[np.bool_]
     nested: NDArray[np.int64]
     cavity: NDArray[np.bool_]
-    votes: Votes
 
 
 def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64]) -> PartOrientation:
@@ -105,7 +102,7 @@ def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64])
     alone = ~parts.fixed & (parts.closed | (nested >= 0) | (~decided & own_known))
     odds = np.where(alone, CERTAIN * own * np.where(cavity, -1, 1), odds)
     odds[parts.fixed] = 0
-    return PartOrientation(odds, (decided | alone) & ~parts.fixed, nested, cavity, found)
+    return PartOrientation(odds, (decided | alone) & ~parts.fixed, nested, cavity)
 
 
 def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -28,8 +28,6 @@ class Votes:
         The same, each part as if it were alone.
     even, even_votes : int
         Crossings of lines with an even number of them, all parts together; votes of entering and leaving in turn.
-    lines, balanced : int
-        Lines that meet the part, and those that enter it as often as they leave it.
     """
 
     crossings: NDArray[np.int64]
@@ -39,8 +37,6 @@ class Votes:
     own_votes: NDArray[np.int64]
     even: NDArray[np.int64]
     even_votes: NDArray[np.int64]
-    lines: NDArray[np.int64]
-    balanced: NDArray[np.int64]
 
 
 def votes(starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray[np.bool_], n_parts: int) -> Votes:
@@ -58,8 +54,8 @@ def votes(starts: NDArray[np.int64], parts: NDArray[np.int64], entering: NDArray
     Examples
     --------
     >>> found = votes(np.array([0, 2, 3]), np.array([0, 0, 1]), np.array([True, False, True]), 2)
-    >>> found.seen_votes.tolist(), found.seen.tolist(), found.balanced.tolist()
-    ([2, 0], [2, 2], [1, 0])
+    >>> found.seen_votes.tolist(), found.seen.tolist()
+    ([2, 0], [2, 2])
     """
     return Votes(*_votes(starts, parts, entering, n_parts))
 
@@ -99,14 +95,11 @@ def _votes(
     NDArray[np.int64],
     NDArray[np.int64],
     NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
 ]:
     crossings, seen, seen_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
     own, own_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
     even, even_votes = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
-    lines, balanced = np.zeros(n_parts, np.int64), np.zeros(n_parts, np.int64)
-    sums, latest = np.zeros(n_parts, np.int64), np.full(n_parts, -1, np.int64)
+    latest = np.full(n_parts, -1, np.int64)
     for line in range(len(starts) - 1):
         begin, end = starts[line], starts[line + 1]
         for k in range(begin, end):
@@ -121,18 +114,14 @@ def _votes(
             elif end - begin == 1:
                 seen[part] += 2
             if latest[part] < begin:  # the first of the part on this line
-                lines[part] += 1
                 own[part] += 2
                 own_votes[part] += vote
-                sums[part] = 0
             latest[part] = k
-            sums[part] += vote
         for k in range(begin, end):
             part = parts[k]
             if latest[part] == k:
                 own_votes[part] -= 1 if entering[k] else -1
-                balanced[part] += sums[part] == 0
-    return crossings, seen, seen_votes, own, own_votes, even, even_votes, lines, balanced
+    return crossings, seen, seen_votes, own, own_votes, even, even_votes
 
 
 @compiled
