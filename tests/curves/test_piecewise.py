@@ -11,9 +11,8 @@ import signedheat as sh
 from refusals import refused
 from shapes.jump_program import minimize_exactly
 from signedheat.curves import piecewise
-from signedheat.curves.cut_lines import unforked
+from signedheat.curves.cut_lines import smoothed, unforked
 from signedheat.curves.jumps import JumpProblem, minimize
-from signedheat.curves.piecewise_slopes import smoothed
 from signedheat.diagnostics import Jumps
 from signedheat.discretization import discretize
 from signedheat.fields.piecewise_field import chains

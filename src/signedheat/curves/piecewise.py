@@ -2,8 +2,8 @@
 
 In Eq. 16 φ is linear in every face with gradient exactly Y, so it is known up to one constant per face. Where Y is
 integrable, the constants make φ continuous across edges; elsewhere φ jumps, and the weighted L1 norm concentrates the
-jumps on a cut that is short and runs where Y is not integrable. The cut is then made clean (`cut_lines`), and φ smooth
-near it (`piecewise_slopes.smoothed`).
+jumps on a cut that is short and runs where Y is not integrable. The cut is then made clean, and φ smooth near it
+(`cut_lines`).
 """
 
 from __future__ import annotations
@@ -38,9 +38,8 @@ from ..memory import refuse_beyond_memory
 from ..method import diffuse, normalize
 from ..progress import Progress, Stopwatch
 from ..solver import as_list
-from .cut_lines import fewest_lines, high_jumps, typical_size
+from .cut_lines import fewest_lines, high_jumps, integration_error, is_continuous, on_lines, typical_size
 from .jumps import JumpProblem, JumpSolution, concentrated, minimize
-from .piecewise_slopes import integration_error, is_continuous, on_lines
 
 SMOOTHING = 10.0
 """Width of the smoothing in mean edge lengths. Less leaves steps where a fork was, more spreads over the surface what
