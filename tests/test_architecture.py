@@ -22,7 +22,7 @@ FLOORS = [
         "frozen",
         "memory",
     }
-    | {"packages", "parallel", "progress", "reprs", "slots"},
+    | {"packages", "parallel", "progress", "reprs"},
     {"geometry"},
     {"linear"},
     {"operators"},

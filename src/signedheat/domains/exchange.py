@@ -19,7 +19,6 @@ from ..geometry.components import members_of
 from ..geometry.tet_faces import face_table
 from ..operators.tetrahedral import signed_volumes
 from ..packages import lazy_module
-from ..slots import Slot
 from .validation import array_of, coordinates, element_ids
 
 if TYPE_CHECKING:
@@ -31,17 +30,13 @@ else:
     open3d = lazy_module("open3d", "objects of Open3D")
     pyvista = lazy_module("pyvista", "objects of PyVista")
 trimesh = lazy_module("trimesh", "objects of trimesh")
+shapes = lazy_module("signedheat.io.shapes", "files")
+drawing = lazy_module("signedheat.view.drawing", "pictures")
+windows = lazy_module("signedheat.view.windows", "windows")
 
 Kind = TypeVar("Kind", bound="Exchangeable[Any]")
 Trimesh = TypeVar("Trimesh")
 """The type of trimesh that corresponds to a kind of shape."""
-
-save_shape: Slot[[object, str | PathLike[str]], None] = Slot("save_shape")
-"""Write a shape in the format given by the extension of the file."""
-html_of: Slot[[object], str] = Slot("html_of")
-"""HTML with a small picture of a shape or a field."""
-plotter_of: Slot[[object], Any] = Slot("plotter_of")
-"""A `pyvista.Plotter` in which a shape or a field is drawn."""
 
 NAME = "signed_distance"
 """Of the values of a field, in objects of PyVista and in files."""
@@ -71,7 +66,7 @@ class Displayed:
         MissingPackageError
             If PyVista is not installed (``pip install pyvista``).
         """
-        plotter: pyvista.Plotter = plotter_of(self)
+        plotter: pyvista.Plotter = windows.plotter_of(self)
         return plotter
 
     def plot(self) -> object:
@@ -90,7 +85,8 @@ class Displayed:
         return self.plotter().show()
 
     def _repr_html_(self) -> str:
-        return html_of(self)
+        html: str = drawing.html_of(self)
+        return html
 
 
 def _no_ids() -> NDArray[np.int64]:
@@ -190,7 +186,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format given by its extension: see `signedheat.save`."""
-        save_shape(self, path)
+        shapes.save(self, path)
 
     @classmethod
     def from_trimesh(cls: type[Kind], thing: object) -> Kind:

@@ -18,7 +18,7 @@ from ..geometry.components import element_components
 from ..geometry.tet_faces import FaceTable, face_table
 from ..operators.tetrahedral import Tetrahedra, signed_volumes
 from ..packages import lazy_module
-from .exchange import Displayed, save_shape, tets_of_meshio, tets_of_pyvista
+from .exchange import Displayed, shapes, tets_of_meshio, tets_of_pyvista
 from .triangle_mesh import TriangleMesh
 from .validation import coordinates, element_ids, frozen, used_bounds
 
@@ -137,7 +137,7 @@ class TetMesh(Displayed, Frozen):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a ``.mesh``, ``.msh``, ``.vtu``, ``.vtk``, or ``.node`` and ``.ele`` file."""
-        save_shape(self, path)
+        shapes.save(self, path)
 
     @classmethod
     def from_meshio(cls, mesh: meshio.Mesh) -> TetMesh:

@@ -24,11 +24,14 @@ from ..geometry.edge_flips import flipped_along_creases
 from ..geometry.marching import closed_surface, level_lines
 from ..operators.grid.block_contours import Refine, block_contour, contour_parts
 from ..operators.grid.blocks import SIDE, Blocks
+from ..packages import lazy_module
 from ..parallel import in_chunks
 from .booleans import Combinable, Rule
-from .files import save_field, save_parts
 from .known_solid import Closest, KnownSolid
 from .levels import on_level
+
+files = lazy_module("signedheat.io.fields", "files")
+ply = lazy_module("signedheat.io.ply", "files")
 
 if TYPE_CHECKING:
     import pyvista
@@ -323,10 +326,13 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         level = finite_number(level, "level")
         if self.blocks is None:
             surface = cast("TriangleMesh", self.contour(level))
-            return save_parts(iter([(surface.vertices, surface.faces)]), path)
-        self._refuse_beyond_band(level)
-        placed = self._placed(self._refined(level))
-        return save_parts(contour_parts(self.blocks, self.values, self.grid.spacing, level, placed), path)
+            parts = iter([(surface.vertices, surface.faces)])
+        else:
+            self._refuse_beyond_band(level)
+            placed = self._placed(self._refined(level))
+            parts = contour_parts(self.blocks, self.values, self.grid.spacing, level, placed)
+        counts: tuple[int, int] = ply.write_parts(parts, path)
+        return counts
 
     def dense(self) -> GridField[Dimension]:
         """The field at all nodes of its grid, those beyond a band interpolated from the coarse ones."""
@@ -457,7 +463,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a file, in the format given by its extension; `signedheat.load_field` reads it."""
-        save_field(self, path)
+        files.write_field(self, path)
 
     def _wall_range(self) -> tuple[float, float]:
         """Least and greatest φ on the walls of the box."""

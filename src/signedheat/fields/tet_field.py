@@ -21,8 +21,10 @@ from ..frozen import Frozen
 from ..geometry.marching_tets import closed_level_set
 from ..geometry.nearest import TriangleTree
 from ..geometry.tet_clipping import Planes, barycentric, containing_tets
+from ..packages import lazy_module
 from .booleans import Combinable
-from .files import save_field
+
+files = lazy_module("signedheat.io.fields", "files")
 
 if TYPE_CHECKING:
     import pyvista
@@ -197,7 +199,7 @@ class TetField(Displayed, Combinable, Frozen):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write mesh and values to a ``.vtu``, ``.vtk`` or ``.msh`` file; `signedheat.load_field` reads it."""
-        save_field(self, path)
+        files.write_field(self, path)
 
     @cached_property
     def _vertex_gradients(self) -> NDArray[np.float64]:

@@ -25,8 +25,10 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import array_of, finite_number, finite_rows
 from ..errors import OutsideError
 from ..frozen import Frozen
+from ..packages import lazy_module
 from .booleans import Combinable, Rule
-from .files import save_field
+
+files = lazy_module("signedheat.io.fields", "files")
 
 if TYPE_CHECKING:
     import pyvista
@@ -218,7 +220,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         FileFormatError
             If the format is unknown or the file cannot be written.
         """
-        save_field(self._embedded, path)
+        files.write_field(self._embedded, path)
 
     @overload
     def restrict(self: VertexField[IntrinsicTriangulation]) -> VertexField[TriangleMesh]: ...

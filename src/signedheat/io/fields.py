@@ -18,7 +18,6 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
-from ..fields.files import save_field as save_any_field
 from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
@@ -54,8 +53,8 @@ _DIMENSIONS = {".vti": (1, 2, 3), HDF: (2, 3), ".vdb": (3,)}
 """Numbers of axes that a format supports; the others support any number."""
 
 
-@save_any_field.provide
-def _(field: object, path: PathLike) -> None:
+def write_field(field: GridField | TetField | VertexField, path: PathLike) -> None:
+    """Write a field of any kind, in the format given by the extension."""
     if isinstance(field, GridField):
         save_field(field, path)
     elif isinstance(field, TetField):
@@ -73,8 +72,6 @@ def _(field: object, path: PathLike) -> None:
             return _write_vertex_npz(simple, path)
         with replacing(path) as temporary:
             temporary.write_bytes(write(elements(simple.domain, {NAME: simple.values}), path))
-    else:
-        raise FileFormatError(f"a {type(field).__name__} is no field", remedy="pass what a solver returned", path=path)
 
 
 def save_field(field: GridField, path: PathLike) -> None:

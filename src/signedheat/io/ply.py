@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ..domains.exchange import Elements
 from ..errors import FileFormatError
-from ..fields.files import save_parts
 from .files import PathLike, contents, damaged, ensure_writable, numbers, replacing
 
 _TYPES = {
@@ -114,7 +113,6 @@ def _header_of(
     return ("\n".join([*lines, "end_header"]) + "\n").encode()
 
 
-@save_parts.provide
 def write_parts(parts: Iterator[tuple[NDArray[np.float64], NDArray[np.int64]]], path: PathLike) -> tuple[int, int]:
     """Write triangles that are more than fit into memory to a binary PLY file as they come, in double precision.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..domains.digital_surface import DigitalSurface
-from ..domains.exchange import Elements, save_shape
+from ..domains.exchange import Elements
 from ..domains.foreign import ForeignShape, as_shape, elements, shape_of
 from ..domains.kinds import Shape
 from ..domains.tet_mesh import TetMesh
@@ -141,8 +141,3 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
         shape = shape.squares
     with replacing(path) as temporary:
         temporary.write_bytes(write(elements(shape), path))
-
-
-@save_shape.provide
-def _(shape: object, path: PathLike) -> None:
-    save(shape, path)  # type: ignore[arg-type]  # methods of shapes call it, and nothing else

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import FileFormatError, GeometryError, SignedHeatError
-from ..solids.files import save_solid
-from ..solids.sampling import Layout, Samples, save_samples
+from ..errors import FileFormatError, GeometryError
+from ..solids.sampling import Layout, Samples
 from ..solids.solid import Solid
 from ..solids.winding import Windings
 from .arrays import read_npz, write_npz
@@ -23,9 +22,8 @@ _NEEDED = ("triangles", "origins", "confidence", "bounding", "closing")
 _SOURCE = ("source_vertices", "source_faces")
 
 
-@save_solid.provide
-def _(solid: object, path: PathLike) -> None:
-    assert isinstance(solid, Solid)
+def save_solid(solid: Solid, path: PathLike) -> None:
+    """Write a solid."""
     ensure_writable(path, SOLID_FORMATS, "a solid")
     source: dict[str, Any] = {}
     if solid.source is not None:
@@ -102,11 +100,9 @@ def load(path: PathLike) -> Solid:
     )
 
 
-@save_samples.provide
-def _(samples: object, path: PathLike, layout: Layout) -> None:
+def save_samples(samples: Samples, path: PathLike, layout: Layout) -> None:
+    """Write samples."""
     format_for(path, dict.fromkeys(SAMPLE_FORMATS), "samples")
-    if not isinstance(samples, Samples):
-        raise SignedHeatError(f"a {type(samples).__name__} is no set of samples", remedy="pass what `sample` returned")
     if layout == "deepsdf":  # (k, 4) in single precision: x, y, z and distance of the points outside and inside
         rows = np.column_stack([samples.points, samples.distances]).astype(np.float32)
         return write_npz(path, pos=rows[samples.distances >= 0], neg=rows[samples.distances < 0])

@@ -18,9 +18,11 @@ from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..frozen import Frozen
-from ..slots import Slot
+from ..packages import lazy_module
 from .complete import complete
 from .solid import Solid
+
+pictures = lazy_module("signedheat.view.deviations", "pictures")
 
 PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 """Of deviations, that summaries have."""
@@ -29,8 +31,6 @@ EXTREME = 99.0
 BINS = 40
 """Of histograms."""
 
-save_deviation: Slot[[object, str | PathLike[str]], None] = Slot("save_deviation")
-"""Write deviations as a coloured shape, a picture or a table."""
 Progress = Callable[[float, str], None]
 
 
@@ -117,7 +117,7 @@ class Deviation(Frozen):
         FileFormatError
             If the format is another, or the file cannot be written.
         """
-        save_deviation(self, path)
+        pictures.save_deviation(self, path)
 
     def __repr__(self) -> str:
         low, middle, high = self.percentiles((1, 50, 99))

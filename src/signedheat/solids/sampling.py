@@ -14,7 +14,9 @@ from ..domains.validation import finite_number, whole_number
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..fields.grid_field import GridField
 from ..memory import refuse_beyond_memory
-from ..slots import Slot
+from ..packages import lazy_module
+
+files = lazy_module("signedheat.io.solids", "files")
 
 WIDTHS = (0.05, 0.0158)
 """Widths of the noise by default, over the radius of the shape: variances of .0025 and .00025 (Park et al. 2019)."""
@@ -24,9 +26,6 @@ BYTES_PER_SAMPLE = 165
 
 Layout = Literal["arrays", "deepsdf"]
 """How samples are kept in a file: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
-
-save_samples: Slot[[object, str | PathLike[str], Layout], None] = Slot("save_samples")
-"""Write samples to a file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +100,7 @@ class Samples:
         FileFormatError
             If the name does not end with ``.npz``, or the file cannot be written.
         """
-        save_samples(self, path, layout)
+        files.save_samples(self, path, layout)
 
     def __repr__(self) -> str:
         low, high = self.distances.min(), self.distances.max()

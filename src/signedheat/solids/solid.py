@@ -22,17 +22,19 @@ from ..geometry.box_tree import order_in_space
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree, NearestFaces
 from ..geometry.nearest import weights_in
+from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..progress import Progress
 from ..reprs import ShortRepr
 from .contouring import sharp_surface
 from .fields import band_field, dense_field
-from .files import save_solid
 from .keeping import given_surface
 from .offsets import Offset
 from .simplification import simplified
 from .stores import Scheduler
 from .winding import Windings
+
+files = lazy_module("signedheat.io.solids", "files")
 
 MANY = 1 << 18
 """Points that are put in order together."""
@@ -298,7 +300,7 @@ class Solid(Frozen, ShortRepr):
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write to a ``.npz`` file, without notes; `signedheat.io.load` reads it, and nothing is completed again."""
-        save_solid(self, path)
+        files.save_solid(self, path)
 
     def _in_order(self, points: NDArray[np.float64], function) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
         order = order_in_space(points)

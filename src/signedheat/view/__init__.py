@@ -1,6 +1,5 @@
 """Fields and shapes as pictures, by Matplotlib, and in windows and notebooks, by PyVista."""
 
-from . import windows as _windows  # noqa: F401  provides windows
 from .deviations import DEVIATION_FORMATS
 from .drawing import save_row
 from .figures import PICTURE_FORMATS, ensure_picture_writable, new_figure

@@ -9,16 +9,15 @@ from ..domains.foreign import elements
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.ply import write_ply
-from ..solids.deviation import Deviation, save_deviation
+from ..solids.deviation import Deviation
 from .drawing import draw
 from .figures import INSIDE_TO_OUTSIDE, PICTURE_FORMATS, picture
 
 DEVIATION_FORMATS = frozenset({".csv", ".ply"}) | PICTURE_FORMATS
 
 
-@save_deviation.provide
-def _(found: object, path: PathLike) -> None:
-    assert isinstance(found, Deviation)
+def save_deviation(found: Deviation, path: PathLike) -> None:
+    """Write deviations as a coloured shape, a picture or a table."""
     ensure_writable(path, DEVIATION_FORMATS, "deviations")
     if extension(path) in PICTURE_FORMATS:
         return _draw(found, path)

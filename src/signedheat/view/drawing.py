@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ..domains.digital_surface import DigitalSurface
-from ..domains.exchange import html_of
 from ..domains.foreign import converted
 from ..domains.grid import Grid
 from ..domains.point_cloud import PointCloud
@@ -66,8 +65,7 @@ def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
             axes.set_title(title, fontsize=11)
 
 
-@html_of.provide
-def as_html(thing: object) -> str:
+def html_of(thing: object) -> str:
     """A line of text and, where there is something to see and matplotlib is installed, a picture of it."""
     text = f"<code>{html.escape(repr(thing))}</code>"
     try:

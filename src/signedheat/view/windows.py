@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..domains.exchange import NAME, plotter_of
+from ..domains.exchange import NAME
 from ..domains.grid import Grid
 from ..domains.polyline import Polyline
 from ..domains.tet_mesh import TetMesh
@@ -28,8 +28,7 @@ BODY = "#d8d2c0"
 LINE = "#1a1a1a"
 
 
-@plotter_of.provide
-def plotter_with(thing: object) -> Any:
+def plotter_of(thing: object) -> Any:
     """A `pyvista.Plotter` in which a shape or a field is drawn."""
     plotter = pyvista.Plotter()
     add(thing, plotter)
