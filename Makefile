@@ -20,7 +20,7 @@ demo: $(VENV)/.installed
 	$(BIN)/signedheat demo --output demo
 
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 fuzz: $(VENV)/.installed-test  # CASES="1000 --seed 3" runs these
 	cd tests && PYTHONPATH=.. ../$(BIN)/python -m fuzz --cases $(or $(CASES),10000)

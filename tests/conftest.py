@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
@@ -19,3 +22,12 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "suite"))
 
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as shells leave it to what they start in the background
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile all kernels before workers begin, each of which would compile them, if none has been compiled yet."""
+    from signedheat.compiled import cache_folder
+
+    is_worker = hasattr(session.config, "workerinput")
+    if not is_worker and session.config.getoption("numprocesses", None) and not cache_folder().exists():
+        subprocess.run([sys.executable, "-m", "signedheat", "warmup", "--quiet"], check=False)
