@@ -309,6 +309,18 @@ def test_what_is_inside_does_not_depend_on_how_the_shape_is_given(name):
         assert np.mean(sh.complete((w, g)).inside(along(points)) != sh.complete((v, f)).inside(points)) < 6e-3
 
 
+@pytest.mark.parametrize("parts", [1, 2, 3, 4])
+def test_rounding_chooses_nothing(parts):
+    """Where what is left of a ball is symmetric, triangles of lids are equal: no choice changes the volume."""
+    ball = samples.sphere(3)
+    kept = ball.faces[(ball.vertices[ball.faces].mean(axis=1) > 0)[:, :parts].all(axis=1) ^ (parts == 4)]
+    volumes = []
+    for seed in range(3):
+        noise = 1e-16 * seed * np.random.default_rng(seed).normal(size=ball.vertices.shape)
+        volumes.append(volume(sh.complete((ball.vertices + noise, kept))))
+    np.testing.assert_allclose(volumes, volumes[0], rtol=1e-9)
+
+
 def test_points_with_normals_and_noisy_soups_are_completed_by_heat():
     points = np.random.default_rng(0).uniform(-1.5, 1.5, (3000, 3))
     truth = np.linalg.norm(points, axis=1) - 1

@@ -32,6 +32,9 @@ SMOOTH = 24
 SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
 
+MOVED = 1e-9
+"""Over the size of a lid, how far points are moved to choose among equal triangles: rounding moves them by 1e-15."""
+
 
 @dataclass(frozen=True, eq=False)
 class Lid:
@@ -224,7 +227,7 @@ def _in_polygon(
     for _ in range(SPLITS):
         n = len(plane)
         points = np.concatenate([plane, inner])
-        faces = scipy.spatial.Delaunay(points).simplices.astype(np.int64)
+        faces = _delaunay(points)
         a, b, c = points[faces].transpose(1, 0, 2)
         area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
         faces[area < 0] = faces[area < 0][:, ::-1]
@@ -247,6 +250,15 @@ def _in_polygon(
         rim = np.insert(rim, after + 1, 0.5 * (rim[after] + rim[(after + 1) % n]), axis=0)
         plane = np.insert(plane, after + 1, 0.5 * (plane[after] + plane[(after + 1) % n]), axis=0)
     return None
+
+
+def _delaunay(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(m, 3) Delaunay triangles, of which, where four points lie on a circle, no rounding chooses: points are moved."""
+    numbers = np.arange(len(points))[:, None]
+    moves = (numbers * 0.5 * (5**0.5 - 1) * np.array([1.0, 2**0.5])) % 1.0 - 0.5
+    size = float(np.ptp(points, axis=0).max())
+    faces: NDArray[np.int64] = scipy.spatial.Delaunay(points + MOVED * size * moves).simplices.astype(np.int64)
+    return faces
 
 
 def _directed(faces: NDArray[np.int64], n: int) -> NDArray[np.int64]:
@@ -312,7 +324,7 @@ def _in_disc(
         rings.append(radius * np.stack([np.cos(ring), np.sin(ring)], axis=1))
         step *= 1 + GROWTH
     points = np.concatenate(rings)
-    faces = scipy.spatial.Delaunay(points).simplices.astype(np.int64)
+    faces = _delaunay(points)
     a, b, c = points[faces].transpose(1, 0, 2)
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     faces[area < 0] = faces[area < 0][:, ::-1]
