@@ -6,6 +6,7 @@ Run as a program, it writes them to the file that it is given.
 from __future__ import annotations
 
 import sys
+from functools import cache
 
 import numpy as np
 
@@ -13,6 +14,7 @@ import signedheat as sh
 from signedheat import samples
 
 
+@cache
 def runs() -> dict[str, np.ndarray]:
     """Values by name."""
     ball = samples.sphere(1)

@@ -10,6 +10,10 @@ import sys
 import pytest
 from hypothesis import HealthCheck, settings
 
+if "PYTEST_XDIST_WORKER" in os.environ:  # as many workers as processors: more threads would wait for one another
+    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+
 settings.register_profile(
     "suite",
     max_examples=20,

@@ -70,8 +70,8 @@ def grown(first: int, last: int) -> int:
 
 @READS_PROC
 def test_many_solvers_grids_and_fields_leave_nothing():
-    """250 solvers with two fields each, 125 grids and other domains, after 150 that fill what is kept on purpose."""
-    assert grown(150, 400) < 8_000_000  # 32 kB a solver; one that is kept takes 400
+    """125 solvers with two fields each, 60 grids and other domains, after 150 that fill what is kept on purpose."""
+    assert grown(150, 275) < 5_000_000  # 40 kB a solver; one that is kept takes 400
 
 
 @pytest.mark.slow

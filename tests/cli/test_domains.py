@@ -276,7 +276,7 @@ def test_version(capsys):
 
 def test_tets_from_the_command_line(tmp_path, capsys):
     """Around the shape, sharpened unless told otherwise; contoured, looked at and described again."""
-    sphere(4).save(tmp_path / "ball.stl")
+    sphere(3).save(tmp_path / "ball.stl")
     flags = ("--tets", "--resolution", "8", "--padding", "0.3")
     fields = []
     for name, more in (("sharp.vtu", ()), ("plain.vtu", ("--plain",))):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 import signedheat as sh
@@ -24,6 +25,14 @@ COMMAND = [sys.executable, "-m", "signedheat"]
 def ball(tmp_path_factory):
     path = tmp_path_factory.mktemp("ends") / "bäll.stl"
     sh.save(samples.sphere(2), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def field(tmp_path_factory):
+    """What `info` describes without compiled code."""
+    path = tmp_path_factory.mktemp("ends") / "φ.npz"
+    sh.GridField(sh.Grid((0, 0), 1.0, (3, 3)), np.arange(9.0).reshape(3, 3)).save(path)
     return path
 
 
@@ -57,26 +66,26 @@ def test_output_that_cannot_hold_the_text(ball, tmp_path):
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
 @pytest.mark.parametrize("json", [[], ["--json"]])
-def test_full_output(ball, json):
+def test_full_output(field, json):
     with open("/dev/full", "w") as full:
-        done = run("info", ball, *json, stdout=full)
+        done = run("info", field, *json, stdout=full)
     assert done.returncode == 1
     assert_one_line(done.stderr)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="closes file descriptors")
-def test_closed_output_and_errors(ball):
-    done = run("info", ball, stdout=None, preexec_fn=lambda: os.close(1))
+def test_closed_output_and_errors(field):
+    done = run("info", field, stdout=None, preexec_fn=lambda: os.close(1))
     assert done.returncode == 1
     assert_one_line(done.stderr)
-    assert run("info", ball, "--quiet", stdout=None, preexec_fn=lambda: os.close(1)).returncode == 0
+    assert run("info", field, "--quiet", stdout=None, preexec_fn=lambda: os.close(1)).returncode == 0
     assert run("info", "nowhere.stl", stderr=None, preexec_fn=lambda: os.close(2)).returncode == 1
 
 
-def test_a_reader_that_has_read_enough(ball):
+def test_a_reader_that_has_read_enough(field):
     reading, writing = os.pipe()
     os.close(reading)
-    done = run("info", ball, stdout=writing)
+    done = run("info", field, stdout=writing)
     os.close(writing)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -95,7 +95,7 @@ def test_lines_through_vertices_of_awful_triangles(seed):
 
 def test_slivers_are_not_cut_short():
     """A search in the triangles given is: every segment is seen through every edge across the disc."""
-    mesh = zigzag(1500)
+    mesh = zigzag(1200)
     triangles, heights = discretize(mesh).triangles, wave(mesh)
     limit = exact.window_limit(triangles)
     given = exact.PausedSearch.start(triangles, [zero_line(triangles, heights)], 1e-4).until(limit, None)

@@ -143,7 +143,7 @@ def packed_vtk(n_bytes):
     return f"{b64encode(head).decode()}{b64encode(data).decode()}"
 
 
-def bomb(folder, ending, size=1 << 28):
+def bomb(folder, ending, size=1 << 27):
     """A small file that becomes `size` bytes when it is unpacked, though it announces 8 numbers or points."""
     path = folder / f"bomb.{ending}"
     array = f'<DataArray type="Float64" NumberOfComponents="%d" format="binary" Name="x">{packed_vtk(size)}</DataArray>'

@@ -67,7 +67,7 @@ def test_poisson_inverts_the_laplacian_and_is_adjoint_to_the_divergence():
 
 def test_directions_agree_with_the_closed_form_kernel_sum():
     # MATH: X(x) = Σ A N exp(−r/√t) / (4π t r); the stencil's kernel is anisotropic by a few degrees near the source
-    shape, grid = sphere(3000), box(28)
+    shape, grid = sphere(1500), box(24)
     discretization = discretize(grid)
     source = discretization.lower([shape], 1.0)
     directions = discretization.to_cells(discretization.diffuse(source)).reshape(-1, 3)
