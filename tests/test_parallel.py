@@ -30,6 +30,34 @@ def test_what_the_report_raises_ends_the_wait():
     assert time.perf_counter() - begin < 10
 
 
+def test_completion_is_reported_on_and_stops(monkeypatch):
+    """However long one of its steps takes; and what it would do afterwards is not done."""
+    steps = []
+
+    def endless(*_):
+        try:
+            while True:
+                time.sleep(0.01)
+        finally:
+            steps.append("left")
+
+    monkeypatch.setattr("signedheat.solids.complete.completed", endless)
+    calls = []
+
+    def progress(fraction, step):
+        calls.append((fraction, step))
+        if calls.count((0.5, "complete")) > 5:
+            raise Stop
+
+    with pytest.raises(Stop):
+        sh.complete(sphere(400), progress=progress)
+    for _ in range(1000):
+        if steps:
+            break
+        time.sleep(0.01)
+    assert steps
+
+
 def test_what_the_job_raises_comes_through():
     for error in (ValueError, TimeoutError):
         with pytest.raises(error):

@@ -71,7 +71,7 @@ def in_chunks(
 def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
     """Run a job on a thread of its own, calling `report` every `INTERVAL` until it ends; returns the job's result.
 
-    An exception that `report` raises is raised at once; the job then runs to its end, and its result is discarded.
+    An exception that `report` raises is raised at once; the job stops at the next of its steps in Python.
 
     Examples
     --------
@@ -80,22 +80,17 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
     """
     if report is None:
         return job()
-    future: Future[Any] = Future()
-
-    def run() -> None:
-        try:
-            future.set_result(job())
-        except BaseException as error:
-            future.set_exception(error)
-
-    Thread(target=run, daemon=True).start()
-    while True:
-        try:
-            return future.result(INTERVAL)
-        except FutureTimeout:
-            if future.done():  # the timeout is the job's own
-                raise
-            report()
+    thread, future = _started(job)
+    try:
+        while True:
+            try:
+                return future.result(INTERVAL)
+            except FutureTimeout:
+                if future.done():  # the timeout is the job's own
+                    raise
+                report()
+    finally:
+        _stop(thread, future)
 
 
 def run_limited(job: Callable[[], Any], seconds: float) -> Any:
@@ -114,6 +109,19 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
     >>> run_limited(lambda: 6 * 7, 10.0)
     42
     """
+    thread, future = _started(job)
+    try:
+        return future.result(seconds)
+    except FutureTimeout:
+        if future.done():  # the timeout is the job's own
+            raise
+        raise TimeoutError(f"it takes more than {seconds:.0f} seconds") from None
+    finally:
+        _stop(thread, future)
+
+
+def _started(job: Callable[[], Any]) -> tuple[Thread, Future[Any]]:
+    """A thread that runs a job, and what will have its result."""
     future: Future[Any] = Future()
 
     def run() -> None:
@@ -124,15 +132,13 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
 
     thread = Thread(target=run, daemon=True)
     thread.start()
-    try:
-        return future.result(seconds)
-    except FutureTimeout:
-        if future.done():  # the timeout is the job's own
-            raise
-        raise TimeoutError(f"it takes more than {seconds:.0f} seconds") from None
-    finally:
-        if not future.done() and thread.ident is not None:
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit))
+    return thread, future
+
+
+def _stop(thread: Thread, future: Future[Any]) -> None:
+    """End a job that is not done."""
+    if not future.done() and thread.ident is not None:
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit))
 
 
 def connected(address: str) -> Any:

@@ -7,6 +7,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from typing import TypeVar
+
+from .parallel import run_cancellable
+
+Result = TypeVar("Result")
 
 logger = logging.getLogger("signedheat")
 
@@ -42,11 +48,14 @@ class Stopwatch:
         self._steps -= steps
 
     @contextmanager
-    def __call__(self, step: str) -> Iterator[None]:
-        if self._progress is not None:
-            self._progress(len(self.seconds) / self._steps, step)
+    def __call__(self, step: str) -> Iterator[Callable[[Callable[[], Result]], Result]]:
+        """Time a step, in which the function given runs jobs: progress is called until they end, and may stop them."""
+        progress, share, report = self._progress, len(self.seconds) / self._steps, None
+        if progress is not None:
+            progress(share, step)
+            report = partial(progress, share, step)
         begin = time.perf_counter()
-        yield
+        yield lambda job: run_cancellable(job, report)
         self.seconds[step] = time.perf_counter() - begin
         logger.info("%s: %.3f s", step, self.seconds[step])
         if self._progress is not None and len(self.seconds) == self._steps:

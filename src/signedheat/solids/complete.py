@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -82,7 +83,7 @@ def complete(
     constraint, diffusion : Constraint, float
         Of the signed heat method, where that completes.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; what it raises cancels.
+        Called as ``progress(fraction, step)``, ten times a second; what it raises cancels.
 
     Returns
     -------
@@ -110,15 +111,18 @@ def complete(
     refuse_what_does_not_fit(joined)
     method = Heat(constraint, diffusion)
     stopwatch = Stopwatch(progress, STEPS)
-    with stopwatch("orient"):
-        found = orientation(joined) if not (as_oriented or isinstance(joined, PointCloud)) else None
-        turned, notes = (joined, ()) if as_oriented else (found.shape, (found.note,)) if found else oriented(joined)
-    with stopwatch("complete"):
+    with stopwatch("orient") as run:
+        found = run(lambda: orientation(joined)) if not (as_oriented or isinstance(joined, PointCloud)) else None
+        turned = found.shape if found else joined
+        notes: tuple[Note, ...] = (found.note,) if found else ()
+        if isinstance(joined, PointCloud) and not as_oriented:
+            turned, notes = run(partial(oriented, joined))
+    with stopwatch("complete") as run:
         if isinstance(turned, PointCloud):
-            solid = _from_points(turned, method)
+            solid = run(partial(_from_points, turned, method))
         else:
             inner = found.inner[_owners(turned)] if found else None
-            solid = completed(turned.triangulation, completion, keep_overlaps, method, inner)
+            solid = run(partial(completed, turned.triangulation, completion, keep_overlaps, method, inner))
     names = None
     if isinstance(turned, TriangleMesh | PolygonMesh):
         names = _owners(turned) if found is None else found.faces[_owners(turned)]
