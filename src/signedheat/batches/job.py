@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -13,7 +14,8 @@ from ..domains.grid import Grid, room_around
 from ..domains.kinds import ShapeLike
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import FileFormatError, SignedHeatError
+from ..domains.validation import positive_number
+from ..errors import FileFormatError, InexactWarning, SignedHeatError
 from ..fields.grid_field import GridField
 from ..io.fields import BAND_FORMATS
 from ..io.figures import describe, shape_figures
@@ -21,8 +23,10 @@ from ..io.files import distinct_names
 from ..io.shapes import read, save
 from ..lowering.area_elements import bounds_around
 from ..orientation.orient import orient
+from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
 from ..solids.sampling import WIDTHS, Layout, sample
+from ..solids.watertight import closed_surface, figures_of
 from ..solver import SignedHeatSolver, as_list
 from .inputs import Input
 
@@ -176,3 +180,60 @@ class Job:
         options: dict[str, Any] = {"as_oriented": self.as_oriented, "keep_overlaps": self.keep_overlaps}
         options |= {"constraint": self.constraint, "diffusion": self.diffusion}
         return cast("GridField", distance_to_shapes(shape, grid, band=self.band, **options))
+
+
+@dataclass(frozen=True)
+class Watertight:
+    """A closed mesh of each shape, for `run`.
+
+    The faces that were given are kept where they bound the solid and join with its completion all around; otherwise the
+    surface is contoured, with its edges and corners.
+
+    Attributes
+    ----------
+    surfaces : str
+        Extension of the files.
+    thickness : float, optional
+        Of sheets, which bound nothing by themselves: the surface is at half of this distance from everything.
+    contoured : bool
+        Contour everything: even triangles in place of few.
+    tolerance : float, optional
+        Simplify the surface, by no more than this distance.
+    resolution, spacing
+        Of the contour, as for `Solid.surface`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from signedheat import samples
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     samples.broken_duck().save(f"{folder}/duck.stl")
+    ...     figures = Watertight()(Path(f"{folder}/duck.stl"), Path(f"{folder}/closed"))
+    >>> figures["bodies"], figures["way"], figures["self_intersections"]
+    (1, 'faces kept', 0)
+    """
+
+    surfaces: str = ".stl"
+    thickness: float | None = None
+    contoured: bool = False
+    tolerance: float | None = None
+    resolution: int = 256
+    spacing: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.thickness is not None:
+            positive_number(self.thickness, "thickness")
+        if self.tolerance is not None:
+            positive_number(self.tolerance, "tolerance")
+
+    def __call__(self, path: Path, stem: Path) -> dict[str, object]:
+        """Make it of one shape, in a file that begins with `stem`; figures, and all notes under "notes"."""
+        shape = read(path)
+        solid = complete(shape.smooth_surface if isinstance(shape, DigitalSurface) else shape)
+        options = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "surfaces"}
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", InexactWarning)
+            surface, way = closed_surface(solid, **options)
+        save(surface, f"{stem}{self.surfaces}")
+        notes = [str(note) for note in solid.diagnostics.notes] + [str(each.message) for each in caught]
+        return {"way": way, **figures_of(surface, solid, 0.5 * (self.thickness or 0.0)), "notes": notes}

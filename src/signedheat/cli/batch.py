@@ -32,7 +32,6 @@ from .options import (
     workers,
 )
 from .parts import pool, shapes
-from .parts import watertight as closed_meshes
 from .terminal import ProgressBar, say, write_out
 
 MANY = (
@@ -134,7 +133,7 @@ def watertight(arguments: Namespace) -> Summary:
         resolution=arguments.resolution or 256,
         spacing=arguments.spacing,
     )
-    done = made_of_each(arguments, job, closed_meshes.in_words)
+    done = made_of_each(arguments, job, in_words)
     summary = {
         "inputs": arguments.inputs,
         "manifest": str(done.manifest),
@@ -146,15 +145,27 @@ def watertight(arguments: Namespace) -> Summary:
     return summary, f"{done.manifest}: {closed} of {len(done.outcomes)} shapes closed"
 
 
+def in_words(figures: dict[str, object]) -> str:
+    """One line of what `figures_of` found."""
+    bodies, openings, meeting = (figures[key] for key in ("bodies", "openings", "self_intersections"))
+    share = 100 * float(str(figures["completed_area"])) / max(float(str(figures["area"])), 1e-300)
+    return (
+        f"{bodies} {'body' if bodies == 1 else 'bodies'}, volume {figures['volume']:.4g}, {figures['faces']} faces, "
+        f"{openings} {'opening' if openings == 1 else 'openings'} completed ({share:.2g} % of the area), "
+        f"{figures['to_faces']:.2g} from the faces and {figures['from_faces']:.2g} back at most, "
+        f"{meeting or 'no'} self-intersections; {figures['way']}"
+    )
+
+
 def made_of_each(
     arguments: Namespace,
     job: Callable[[Path, Path], Mapping[str, object]],
-    in_words: Callable[[dict[str, object]], str] | None = None,
+    line: Callable[[dict[str, object]], str] | None = None,
     **options: Any,
 ) -> sh.batches.Batch:
     """Do a job for every shape: a line on standard error for each that is not done, and perhaps one for each that is.
 
-    `in_words` makes the line about a shape that is done, from its figures; `options` are further ones of
+    `line` makes the line about a shape that is done, from its figures; `options` are further ones of
     `signedheat.batches.run`.
     """
     with ProgressBar(is_quiet(arguments)) as progress:
@@ -163,9 +174,9 @@ def made_of_each(
             if not outcome.is_done:
                 progress.clear()
                 say(f"signedheat: {outcome.input}: {outcome.state}: {outcome.message}")
-            elif in_words is not None and not is_quiet(arguments):
+            elif line is not None and not is_quiet(arguments):
                 progress.clear()
-                write_out(f"{outcome.outputs[0]}: {in_words(dict(outcome.figures))}")
+                write_out(f"{outcome.outputs[0]}: {line(dict(outcome.figures))}")
 
         return sh.batches.run(
             listed(arguments.inputs),
@@ -200,28 +211,17 @@ def job_of(arguments: Namespace) -> sh.batches.Job:
     """The job that the options ask for."""
     sampling = None
     if arguments.sample is not None:
-        sampling = sh.batches.Sampling(
-            n=arguments.sample,
-            near=arguments.near,
-            widths=tuple(arguments.widths),
-            seed=arguments.seed,
-            normalize=arguments.normalize,
-            layout=arguments.layout,
-        )
+        named = {name: getattr(arguments, name) for name in ("near", "seed", "normalize", "layout")}
+        sampling = sh.batches.Sampling(n=arguments.sample, widths=tuple(arguments.widths), **named)
+    same = ("info", "padding", "band", "diffusion", "as_oriented", "keep_overlaps", "plain")
     spacing = None if arguments.spacing is None else tuple(arguments.spacing)
     return sh.batches.Job(
         volume=f".{arguments.volume}" if arguments.volume else None,
         offsets=tuple(arguments.offset),
         surfaces=f".{arguments.surface}",
         samples=sampling,
-        info=arguments.info,
         resolution=arguments.resolution or shapes.RESOLUTION,
         spacing=spacing[0] if spacing is not None and len(spacing) == 1 else spacing,
-        padding=arguments.padding,
-        band=arguments.band,
         constraint=shapes.constraint_of(arguments.constraint),
-        diffusion=arguments.diffusion,
-        as_oriented=arguments.as_oriented,
-        keep_overlaps=arguments.keep_overlaps,
-        plain=arguments.plain,
+        **{name: getattr(arguments, name) for name in same},
     )

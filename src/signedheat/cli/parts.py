@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from .. import parallel as parallel
     from .. import samples as samples
     from ..batches import pool as pool
-    from ..batches import watertight as watertight
     from ..curves import close as close
     from ..curves import distance as distance
     from ..domains import inspection as inspection
@@ -29,7 +28,7 @@ else:
     numpy = lazy_module("numpy", "commands")
     PARTS = {
         **{"compiled": "compiled", "diagnostics": "diagnostics", "parallel": "parallel", "samples": "samples"},
-        **{"pool": "batches.pool", "watertight": "batches.watertight", "inspection": "domains.inspection"},
+        **{"pool": "batches.pool", "inspection": "domains.inspection"},
         **{"close": "curves.close", "distance": "curves.distance"},
         **{"discretization": "lowering.surface.discretization"},
         **{"kernel_runs": "cli.kernel_runs", "reports": "cli.reports", "shapes": "cli.shapes"},

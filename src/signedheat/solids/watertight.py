@@ -1,0 +1,100 @@
+"""Closed meshes of solids, and how far they are from the faces that were given."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..domains.triangle_mesh import TriangleMesh
+from ..errors import GeometryError, SourceError
+from ..geometry.components import element_components
+from ..geometry.face_features import FaceFeatures
+from ..geometry.face_tree import FaceTree
+from ..geometry.self_intersections import self_intersections
+from .parts import face_areas
+from .solid import Solid
+
+BOUNDS = 1e-3
+"""Share of the area of a shape that is on the boundary of its solid, below which it is a sheet."""
+PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]])
+"""Where on a triangle distances are measured: corners, middles of sides, and centre."""
+
+
+def closed_surface(
+    solid: Solid,
+    thickness: float | None = None,
+    contoured: bool = False,
+    tolerance: float | None = None,
+    resolution: int = 256,
+    spacing: float | None = None,
+) -> tuple[TriangleMesh, str]:
+    """A closed surface of a solid, and how it was made; the options are those of `signedheat.batches.Watertight`.
+
+    Raises
+    ------
+    SourceError
+        If the shape is a sheet and there is no thickness.
+    """
+
+    def contour(level: float) -> TriangleMesh:
+        return solid.surface(level, tolerance=tolerance, resolution=resolution, spacing=spacing)
+
+    if thickness is not None:
+        return contour(0.5 * thickness), f"thickened to {thickness:g}"
+    behind, ahead = solid.windings.beside(solid.triangles)
+    areas = face_areas(solid.triangles)
+    if areas[behind != ahead].sum() < BOUNDS * areas.sum():
+        raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
+    if contoured:
+        return contour(0.0), "contoured"
+    try:
+        return solid.surface(keep_faces=True, tolerance=tolerance), "faces kept"
+    except GeometryError as error:
+        reason = str(error).partition(":")[0]
+        return contour(0.0), f"contoured, since {reason}"
+
+
+def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[str, object]:
+    """Counts and sizes of a closed surface, and its distances from the faces of a solid and back.
+
+    `to_faces` is the largest distance from the surface, but where it lies on the completion, to its level around the
+    faces that were given; `from_faces` that from faces that bound the solid to the surface, less the level.
+    """
+    corners = surface.vertices[surface.faces]
+    volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    parts = element_components(surface.faces)
+    behind, ahead = solid.windings.beside(solid.triangles)
+    bounds = (behind != ahead) | (level > 0)
+    given, made = solid.triangles[bounds & (solid.origins >= 0)], solid.triangles[bounds & (solid.origins < 0)]
+    closest = solid.closest(_places(corners))
+    off = np.abs(closest.distances - level)[~closest.completed]
+    back = _tree(corners).distances(_places(given)) - level if len(given) else np.zeros(1)
+    return {
+        "bodies": int((np.bincount(parts, volumes) > 0).sum()),
+        "vertices": surface.n_vertices,
+        "faces": surface.n_faces,
+        "volume": float(volumes.sum()),
+        "area": float(face_areas(corners).sum()),
+        "openings": _openings(made),
+        "completed_area": float(face_areas(made).sum()),
+        "to_faces": float(off.max(initial=0.0)),
+        "from_faces": float(np.abs(back).max(initial=0.0)),
+        "self_intersections": len(self_intersections(surface.vertices, surface.faces)),
+    }
+
+
+def _places(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
+    places: NDArray[np.float64] = np.einsum("pk,mkj->mpj", PARTS, triangles).reshape(-1, 3)
+    return places
+
+
+def _tree(triangles: NDArray[np.float64]) -> FaceTree:
+    return FaceTree.of(FaceFeatures.of(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)))
+
+
+def _openings(completion: NDArray[np.float64]) -> int:
+    """Connected parts of what completes."""
+    if not len(completion):
+        return 0
+    _, faces = np.unique(completion.reshape(-1, 3), axis=0, return_inverse=True)
+    return int(element_components(faces.reshape(-1, 3)).max()) + 1
