@@ -61,7 +61,7 @@ def check_volume(arguments: Namespace) -> None:
     "Signed distance to a shape, broken or not, at the nodes of a grid in space; or to polylines, positive to their "
     "left, in the plane.",
     FLAT_SHAPE,
-    output("field: .npz .vti .nrrd .npy .vdb"),
+    output("field: .npz .vti .nrrd .npy .vdb .vtkhdf"),
     option(
         "--tets",
         nargs="?",

@@ -21,7 +21,7 @@ from .files import PathLike, text
 from .meshes import read_obj_elements
 from .points import read_point_lists
 
-SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
+KINDS = SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
 
 
 class Node(NamedTuple):
@@ -49,59 +49,43 @@ def edge_vertices(domain: EmbeddedSurface) -> NDArray[np.int64]:
 
 
 def read_text(path: PathLike, domain: EmbeddedSurface) -> list[Group]:
-    """Curves in either of the two text formats."""
+    """Curves in either of the two text formats.
+
+    That of the published demo has lines that begin a curve, or points; in the other one, nodes are joined by segments
+    ``l i j``, which count them from 1 unless ``#offset`` says otherwise.
+    """
     lines = [line.split() for line in text(path).splitlines()]
-    if any(words and words[0] in (SIGNED, UNSIGNED, POINTS) for words in lines):
-        return read_groups(lines, domain)
-    return read_segments(lines, domain)
-
-
-def read_groups(lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
-    """The format of the published demo."""
+    has_kinds = any(words and words[0] in KINDS for words in lines)
     groups: list[tuple[Group, bool]] = []
-    edges = None
-    for number, words in enumerate(lines, start=1):
-        if not words or words[0].startswith("#"):
-            continue
-        if words[0] in (SIGNED, UNSIGNED, POINTS):
-            groups.append((Group(words[0], []), words[1:2] == ["1"]))
-            continue
-        if not groups:
-            raise damaged(number, words, f"a node comes before any {SIGNED}, {UNSIGNED} or {POINTS}")
-        nodes = groups[-1][0].nodes
-        try:
-            if words[0] == "l":
-                nodes += [Node((int(word) - 1,), (1.0,)) for word in words[1:]]
-            else:
-                edges = edge_vertices(domain) if edges is None and words[0] == "e" else edges
-                nodes.append(parsed(words, edges, domain))
-        except (ValueError, IndexError) as error:
-            raise damaged(number, words, str(error)) from error
-    return [Group(g.kind, g.nodes[::-1] if reverse else g.nodes) for g, reverse in groups]
-
-
-def read_segments(lines: list[list[str]], domain: EmbeddedSurface) -> list[Group]:
-    """Nodes, and oriented segments between them."""
     nodes: list[Node] = []
     segments: list[tuple[int, int]] = []
     offset, edges = 1, None
     for number, words in enumerate(lines, start=1):
-        if words[:1] == ["#offset"] and len(words) > 1:
-            if not re.fullmatch(r"[-+]?\d{1,18}", words[1]):
-                raise damaged(number, words, "the offset is no whole number")
-            offset = int(words[1])
-        if not words or words[0].startswith("#") or words[0] == "n":
-            continue
         try:
-            if words[0] == "l":
-                ids = [int(word) - offset for word in words[1:]]
-                segments += pairwise(ids)
+            if words[:1] == ["#offset"] and len(words) > 1 and not has_kinds:
+                if not re.fullmatch(r"[-+]?\d{1,18}", words[1]):
+                    raise ValueError("the offset is no whole number")
+                offset = int(words[1])
+            elif not words or words[0].startswith("#") or (words[0] == "n" and not has_kinds):
+                continue
+            elif words[0] in KINDS:
+                nodes = []
+                groups.append((Group(words[0], nodes), words[1:2] == ["1"]))
+            elif has_kinds and not groups:
+                raise ValueError(f"a node comes before any {', '.join(KINDS)}")
+            elif words[0] == "l" and has_kinds:
+                nodes += [Node((int(word) - 1,), (1.0,)) for word in words[1:]]
+            elif words[0] == "l":
+                segments += pairwise(int(word) - offset for word in words[1:])
             else:
                 edges = edge_vertices(domain) if edges is None and words[0] == "e" else edges
                 nodes.append(parsed(words, edges, domain))
         except (ValueError, IndexError) as error:
-            raise damaged(number, words, str(error)) from error
-    return polylines_of_segments(SIGNED, nodes, segments)
+            cause = f"line {number}, '{' '.join(words)[:60]}', makes no sense ({error})"
+            raise FileFormatError(cause, element=f"line {number}") from error
+    if not has_kinds:
+        return polylines_of_segments(SIGNED, nodes, segments)
+    return [Group(group.kind, group.nodes[::-1] if reverse else group.nodes) for group, reverse in groups]
 
 
 def parsed(words: list[str], edges: NDArray[np.int64] | None, domain: EmbeddedSurface) -> Node:
@@ -218,13 +202,6 @@ def projected_nodes(domain: EmbeddedSurface, points: NDArray[np.float64]) -> lis
     """Closest points on a surface, as nodes."""
     faces, weights, _ = closest_points(domain.triangulation, points)
     return nodes_of(faces, weights, domain)
-
-
-def damaged(number: int, words: list[str], reason: str) -> FileFormatError:
-    """The error for a line that cannot be parsed."""
-    return FileFormatError(
-        f"line {number}, '{' '.join(words)[:60]}', makes no sense ({reason})", element=f"line {number}"
-    )
 
 
 def nodes_of(faces: NDArray[np.int64], weights: NDArray[np.float64], domain: EmbeddedSurface) -> list[Node]:
