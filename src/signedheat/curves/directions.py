@@ -90,11 +90,14 @@ class Decision:
         The best directions that were found, and what is inside then.
     rivals : list of Inside
         Others.
+    smooth : bool
+        Whether sides were taken to be smooth, because most of the length bounds nothing in the least energy.
     """
 
     pieces: Pieces
     best: Inside
     rivals: list[Inside]
+    smooth: bool = False
 
     def turned(self, n: int) -> NDArray[np.bool_]:
         """(n,) which of all curves given are turned."""
@@ -116,7 +119,7 @@ class Decision:
     @property
     def ends_agree_in_vain(self) -> bool:
         """Whether most of the length bounds nothing although there are pieces that follow each other."""
-        if not self.bounds_nothing:
+        if not (self.smooth or self.bounds_nothing):
             return False
         movable, signs = self.pieces.movable, self.best.signs
         agreed = self.pieces.strokes.agreed * np.multiply.outer(signs, signs)
@@ -214,7 +217,7 @@ def decide(pieces: Pieces) -> Decision:
             break
         best = better
     if mostly_loose(strokes, best):
-        return Decision(pieces, strokes.inside(smooth), [])
+        return Decision(pieces, strokes.inside(smooth), [], smooth=True)
     for rows in loose(strokes, best, movable):
         rewards = np.full(k, REWARD)
         rewards[rows] = GENEROUS
