@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 from ...memory import untouched_zeros
-from ...operators.grid.node_sources import STRETCH, NodeSources, with_room
+from ...operators.grid.node_sources import STRETCH, NodeSources
 
 
 def merge_in_cells(
@@ -57,6 +57,19 @@ def merge_in_cells(
     weight = sums[:, -1]
     samples = (sums[:, :dimension] / weight[:, None], sums[:, dimension:-1].copy(), weight.copy(), labels)
     return samples, NodeSources(sources.places, nodes, sources.shape, sources.steps)
+
+
+@compiled
+def _with_room(sums: NDArray[np.float32], used: int, more: int) -> NDArray[np.float32]:
+    """`sums`, or a longer copy of it, with room for `more` rows beyond the `used` ones."""
+    if used + more <= sums.shape[0]:
+        return sums
+    grown = np.zeros((2 * sums.shape[0] + more, STRETCH, 4), dtype=np.float32)
+    for row in range(used):
+        for m in range(STRETCH):
+            for q in range(4):
+                grown[row, m, q] = sums[row, m, q]
+    return grown
 
 
 @compiled
@@ -153,7 +166,7 @@ def _merge(corners, vectors, weights, components, order, shape, size, slots, nod
             share = shares[top]
             weight = weights[face] * share
             if used + (1 << dimension) > nodes.shape[0]:
-                nodes = with_room(nodes, used, 1 << dimension)
+                nodes = _with_room(nodes, used, 1 << dimension)
             lines[0], parts[0] = 0, share / scale
             for d in range(dimension - 1):
                 below = min(max(np.int64(centre[d]), 0), shape[d] - 2)

@@ -13,7 +13,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...compiled import compiled
 from ...parallel import n_threads
 from .wavefront import SMALL, padded_shape
 
@@ -30,10 +29,9 @@ def divergence(directions: NDArray[np.floating], spacing: NDArray[np.float64]) -
     array([-2.,  0.,  2.])
     """
     shape = directions.shape[:-1]
-    padded = padded_shape(shape)
-    components = np.ascontiguousarray(np.moveaxis(directions, -1, 0)).reshape(-1, *padded)
-    out = np.empty(padded)
-    by_slabs(padded, _divergence, components, 0.5 / spacing, out)
+    components = np.moveaxis(directions, -1, 0).reshape(-1, *padded_shape(shape))
+    out = np.empty(padded_shape(shape))
+    by_slabs(out.shape, _divergence, components, 0.5 / spacing, out)
     return out.reshape(shape)
 
 
@@ -69,7 +67,7 @@ def solve_poisson(
     ]
     padded = padded_shape(transformed.shape)
     eigenvalues = [np.zeros(1)] * (4 - len(eigenvalues)) + eigenvalues
-    by_slabs(padded, _divide, *eigenvalues, transformed.reshape(padded))
+    by_slabs(padded, _divide, eigenvalues, transformed.reshape(padded))
     return np.asarray(scipy.fft.idctn(transformed, type=2, overwrite_x=True, workers=workers))
 
 
@@ -93,7 +91,7 @@ def interpolation_stencil(
 
 
 def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: Any) -> None:
-    """Run a kernel over slabs of the first long axis."""
+    """Call ``kernel(*arguments, axis, start, stop)`` for slabs of the first long axis, each on a thread."""
     axis = 0 if shape[0] > 1 else 1
     n = shape[axis]
     if np.prod(shape) < SMALL:
@@ -105,31 +103,21 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
             job.result()
 
 
-@compiled
+def slab(axis: int, start: int, stop: int) -> tuple[slice, ...]:
+    """The index of a slab in arrays of four axes."""
+    return tuple(slice(start, stop) if axis == k else slice(None) for k in range(4))
+
+
 def _divide(
-    values0: NDArray[np.float64],
-    values1: NDArray[np.float64],
-    values2: NDArray[np.float64],
-    values3: NDArray[np.float64],
-    transformed: NDArray[np.float64],
-    axis: int,
-    start: int,
-    stop: int,
+    eigenvalues: list[NDArray[np.float64]], transformed: NDArray[np.float64], axis: int, start: int, stop: int
 ) -> None:
     """Divide by the eigenvalues of C, sums of one-dimensional ones; the quotient is zero where they are zero."""
-    n0, n1, n2, n = transformed.shape
-    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
-        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
-            for k in range(n2):
-                line = transformed[i, j, k]
-                outer = values0[i] + values1[j] + values2[k]
-                for m in range(n):
-                    line[m] /= outer + values3[m]
-                if outer == 0.0 and values3[0] == 0.0:
-                    line[0] = 0.0
+    here = slab(axis, start, stop)
+    total = sum(np.ix_(*(values[part] for values, part in zip(eigenvalues, here, strict=True))))
+    total[total == 0.0] = np.inf
+    transformed[here] /= total
 
 
-@compiled
 def _divergence(
     components: NDArray[np.floating],
     scales: NDArray[np.float64],
@@ -138,42 +126,12 @@ def _divergence(
     start: int,
     stop: int,
 ) -> None:
-    dimension = components.shape[0]
-    n0, n1, n2, n = out.shape
-    for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
-        for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
-            for k in range(n2):
-                line = out[i, j, k]
-                flow = components[dimension - 1, i, j, k]
-                scale = scales[dimension - 1]
-                line[0] = -scale * (flow[0] + flow[1])
-                for m in range(1, n - 1):
-                    line[m] = scale * (flow[m - 1] - flow[m + 1])
-                line[n - 1] = scale * (flow[n - 2] + flow[n - 1])
-                for d in range(dimension - 1):
-                    part = components[d]
-                    scale = scales[d]
-                    across = 3 - (dimension - 1 - d)
-                    here = part[i, j, k]
-                    a, b, c = i, j, k
-                    if across == 0:
-                        a = a - 1
-                    elif across == 1:
-                        b = b - 1
-                    else:
-                        c = c - 1
-                    if a >= 0 and b >= 0 and c >= 0:
-                        before = part[a, b, c]
-                        for m in range(n):
-                            line[m] += scale * (before[m] + here[m])
-                    a, b, c = i, j, k
-                    if across == 0:
-                        a = a + 1
-                    elif across == 1:
-                        b = b + 1
-                    else:
-                        c = c + 1
-                    if a < n0 and b < n1 and c < n2:
-                        after = part[a, b, c]
-                        for m in range(n):
-                            line[m] -= scale * (here[m] + after[m])
+    low, high = max(start - 1, 0), min(stop + 1, out.shape[axis])
+    around = components[(slice(None), *slab(axis, low, high))]
+    sums = np.zeros(around.shape[1:])
+    for component, scale, along in zip(around, scales, range(4 - len(scales), 4), strict=True):
+        flow, lines = np.moveaxis(component, along, 0), np.moveaxis(sums, along, 0)
+        lines[0] -= scale * (flow[0] + flow[1])
+        lines[1:-1] += np.multiply(flow[:-2] - flow[2:], scale, dtype=np.float64)
+        lines[-1] += scale * (flow[-2] + flow[-1])
+    out[slab(axis, start, stop)] = sums[slab(axis, start - low, stop - low)]
