@@ -60,22 +60,8 @@ def block_contour(
     OutsideError
         If the values do not take the level.
     """
-    parts, triangles, count = [], [], 0
-    for _, points, cells in window_surfaces(blocks, values, spacing, level):
-        parts.append(points)
-        triangles.append(cells + count)
-        count += len(points)
-    if not parts:
-        raise no_level(level)
-    vertices, faces = merged(np.concatenate(parts), np.concatenate(triangles))
-    return (vertices if refine is None else refine(vertices)), faces
-
-
-def no_level(level: float) -> OutsideError:
-    """That the values do not take a level."""
-    return OutsideError(
-        f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"
-    )
+    vertices, faces = zip(*contour_parts(blocks, values, spacing, level, refine), strict=True)
+    return np.concatenate(vertices), np.concatenate(faces)
 
 
 def window_surfaces(
@@ -125,18 +111,6 @@ def _window_surface(height: NDArray[np.float32]) -> tuple[NDArray[np.float64], N
     return vertices.astype(np.float64), faces
 
 
-def merged(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices on the same edge of the grid as one. Those inside cells belong to one window anyway."""
-    on_edge, keys = edges_of(vertices)
-    own = np.where(on_edge, 0, np.arange(1, len(vertices) + 1))  # each of the others is itself alone
-    order = np.lexsort((keys, own))
-    new = np.ones(len(keys), dtype=bool)
-    new[1:] = (keys[order[1:]] != keys[order[:-1]]) | (own[order[1:]] != own[order[:-1]])
-    number = np.empty(len(keys), dtype=np.int64)
-    number[order] = np.cumsum(new) - 1
-    return vertices[order[new]], number[faces]
-
-
 def edges_of(vertices: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """(n,) whether vertices, in cells, lie on edges of the grid, and numbers that those on the same edge share."""
     base = np.floor(vertices)
@@ -175,32 +149,19 @@ _Seam = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 def contour_parts(
-    blocks: Blocks, values: NDArray[np.floating[Any]], spacing: NDArray[np.float64], level: float, refine: Refine
+    blocks: Blocks,
+    values: NDArray[np.floating[Any]],
+    spacing: NDArray[np.float64],
+    level: float,
+    refine: Refine | None = None,
 ) -> Iterator[Part]:
-    """The vertices and faces of `block_contour`, in another order, window by window.
+    """The vertices and faces of `block_contour`, window by window: new vertices, and faces that use these and older.
 
-    Faces use vertices of their own part and of those before. Only the vertices on walls between windows are kept, as
-    long as neighboring windows are to come.
-
-    Parameters
-    ----------
-    blocks, values, spacing, level, refine
-        See `block_contour`.
-
-    Yields
-    ------
-    vertices, faces : (n, 3) float, (m, 3) int
-        New vertices and new faces.
-
-    Raises
-    ------
-    OutsideError
-        If the values do not take the level.
+    Only the vertices on walls between windows are kept, as long as neighboring windows are to come.
     """
     seams: dict[tuple[int, ...], _Seam] = {}
     count = 0
     for window, points, triangles in window_surfaces(blocks, values, spacing, level):
-        points, triangles = merged(points, triangles)
         on_edge, keys = edges_of(points)
         shared = np.flatnonzero(on_edge & _on_walls(points, window))
         numbers = np.full(len(points), -1, dtype=np.int64)
@@ -213,9 +174,11 @@ def contour_parts(
         seams[tuple(window.tolist())] = keys[order], numbers[order]
         for passed in [place for place in seams if place[0] < window[0] - 1]:
             del seams[passed]
-        yield refine(points[new]), numbers[triangles]
+        yield points[new] if refine is None else refine(points[new]), numbers[triangles]
     if not count:
-        raise no_level(level)
+        raise OutsideError(
+            f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"
+        )
 
 
 def _on_walls(points: NDArray[np.float64], window: NDArray[np.int64]) -> NDArray[np.bool_]:
