@@ -11,6 +11,8 @@ from ..compiled import compiled
 
 LEAF = 4
 """Boxes per leaf."""
+USUAL = 64
+"""Boxes near a triangle for which there is room at first: faces of a mesh have some forty in the leaves around them."""
 FEW = 64
 """Points that are not worth ordering: it takes as long as the searches of some of them."""
 
@@ -77,13 +79,13 @@ class BoxTree:
         (array([0, 3, 3]), array([0, 1, 2]))
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(3, slack)
-        starts, none = np.zeros(len(corners) + 1, dtype=np.int64), np.empty(0, dtype=np.int64)
-        _meeting(self.bounds, self.items, corners, slacks, starts, none)
-        np.cumsum(starts, out=starts)
-        found = np.empty(starts[-1], dtype=np.int64)
-        if len(found):
+        starts, room = np.zeros(len(corners) + 1, dtype=np.int64), USUAL * len(corners)
+        while True:
+            found = np.empty(room, dtype=np.int64)
             _meeting(self.bounds, self.items, corners, slacks, starts, found)
-        return starts, found
+            if starts[-1] <= room:
+                return starts, found[: starts[-1]]
+            room = int(starts[-1])
 
 
 @compiled
@@ -95,7 +97,7 @@ def _meeting(
     starts: NDArray[np.int64],
     out: NDArray[np.int64],
 ) -> None:
-    """Count what is near each triangle, behind its start; or, where there is room, write it."""
+    """Write what is near each triangle, as far as there is room, and where it begins."""
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
     lower, upper, normal = np.empty(3), np.empty(3), np.empty(3)
     for t in range(len(corners)):
@@ -107,7 +109,7 @@ def _meeting(
             normal[d] = (corners[t, 3 + p] - corners[t, p]) * (corners[t, 6 + q] - corners[t, q])
             normal[d] -= (corners[t, 3 + q] - corners[t, q]) * (corners[t, 6 + p] - corners[t, p])
             level += normal[d] * a
-        stack[0], depth, count = 1, 1, 0
+        stack[0], depth, count = 1, 1, starts[t]
         while depth > 0:
             depth -= 1
             node = stack[depth]
@@ -125,11 +127,10 @@ def _meeting(
                 continue
             for place in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
                 if items[place] >= 0:
-                    if len(out):
-                        out[starts[t] + count] = items[place]
+                    if count < len(out):
+                        out[count] = items[place]
                     count += 1
-        if not len(out):
-            starts[t + 1] = count
+        starts[t + 1] = count
 
 
 def order_in_space(points: NDArray[np.float64]) -> NDArray[np.int64]:
