@@ -12,40 +12,6 @@ from ..intrinsic_mesh import IntrinsicMesh
 from .gluing_kernels import Gluing, flip_until_delaunay
 
 
-def flip_to_delaunay(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> IntrinsicMesh:
-    """Flip edges until the two angles opposite to every edge sum to at most π.
-
-    The surface stays the same, with its vertices, angle sums and area; only the edges change. Boundary edges,
-    nonmanifold edges and `fixed_edges` are not flipped and keep their ids. Where neighbouring faces have opposite
-    orientations, faces are turned over as needed.
-
-    Parameters
-    ----------
-    triangles : IntrinsicMesh
-        Neighbouring faces must agree on the length of their edge; flat and nearly flat triangles are allowed.
-    fixed_edges : (e,) bool, optional
-        Edges that must not be flipped, for instance those of a source.
-
-    Returns
-    -------
-    IntrinsicMesh
-        With the same numbers of vertices, edges and faces. Two edges may join the same two vertices, or an edge may
-        join a vertex with itself.
-
-    Examples
-    --------
-    A rhombus cut along its long diagonal; the Delaunay edge is the short one.
-
-    >>> sides = np.array([[1.9, 1.0, 1.0], [1.9, 1.0, 1.0]])
-    >>> rhombus = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3]]), sides, 4)
-    >>> flip_to_delaunay(rhombus).edges.vertices.tolist()
-    [[3, 2], [1, 2], [2, 0], [0, 3], [3, 1]]
-    """
-    gluing = glue(triangles, fixed_edges)
-    flip_all(gluing)
-    return lay_out(gluing)
-
-
 def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None) -> Gluing:
     """Start an intrinsic triangulation, with an empty history."""
     edges, first = triangles.edges, triangles.first_halfedges
@@ -80,7 +46,22 @@ def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None)
 
 
 def flip_all(gluing: Gluing) -> Gluing:
-    """Flip to Delaunay, in place; returns the gluing with arrays long enough for its history."""
+    """Flip edges, in place, until the two angles opposite to every edge sum to at most π.
+
+    The surface stays the same, with its vertices, angle sums and area. Boundary, nonmanifold and fixed edges are not
+    flipped and keep their ids; faces are turned over where neighbours have opposite orientations. Two edges may then
+    join the same two vertices, or an edge a vertex with itself. Returns the gluing with arrays long enough for its
+    history.
+
+    Examples
+    --------
+    A rhombus cut along its long diagonal; the Delaunay edge is the short one.
+
+    >>> sides = np.array([[1.9, 1.0, 1.0], [1.9, 1.0, 1.0]])
+    >>> rhombus = IntrinsicMesh.from_lengths(np.array([[0, 1, 2], [1, 0, 3]]), sides, 4)
+    >>> lay_out(flip_all(glue(rhombus))).edges.vertices.tolist()
+    [[3, 2], [1, 2], [2, 0], [0, 3], [3, 1]]
+    """
     n_edges = int(gluing.counts[1])
     gluing.counts[4] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
