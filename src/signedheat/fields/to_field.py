@@ -62,7 +62,7 @@ def _(
             "distance there is NaN",
             UnreachedWarning,
         )
-    noted = replace(diagnostics, unreached=unreached).noting(sampled(source.whole))
+    noted = replace(diagnostics, unreached=unreached).noting(sampled(source))
     return GridField(grid, everywhere.reshape(grid.shape), noted)
 
 

@@ -8,7 +8,7 @@ that neither huge faces nor millions of tiny ones cost more than the cells that 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatch
 from math import gamma, pi
 from typing import Any
@@ -96,6 +96,11 @@ class AreaSamples:
     outside: float
     cancelled: float
     nodes: NodeSources
+
+    def chosen(self, rows: NDArray[np.int64]) -> AreaSamples:
+        """Some of the samples; what is said of all of them stays."""
+        each = ("positions", "vectors", "weights", "components", "source_ids")
+        return replace(self, **{name: getattr(self, name)[rows] for name in each})
 
 
 @singledispatch

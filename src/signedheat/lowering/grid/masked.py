@@ -104,12 +104,14 @@ class MaskedGridDiscretization(DiffusesEach):
     def _straight(self, source: MaskedSource) -> NDArray[np.bool_]:
         """(n,) nodes that the source reaches along a straight line."""
         nodes, spacing = self.nodes, self.grid.spacing
-        nearest = scipy.spatial.cKDTree(source.positions * spacing).query(nodes.indices * spacing, workers=-1)[1]
-        away = nodes.indices - source.positions[nearest]
-        normals = unit(source.normals * spacing)[nearest]
+        nearest = scipy.spatial.cKDTree(source.samples.positions * spacing).query(nodes.indices * spacing, workers=-1)[
+            1
+        ]
+        away = nodes.indices - source.samples.positions[nearest]
+        normals = unit(source.samples.vectors * spacing)[nearest]
         along = away - np.einsum("ij,ij->i", away, normals)[:, None] * normals
         past_end = source.beside_solid[nearest] & (np.linalg.norm(along, axis=1) > FACING)
-        return nodes.see(source.positions[nearest]) & ~past_end
+        return nodes.see(source.samples.positions[nearest]) & ~past_end
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """X at the free nodes, which are the cells here: as it is."""
@@ -147,24 +149,18 @@ class MaskedIntegration(DirectIntegration):
 
 
 @dataclass(frozen=True, eq=False)
-class MaskedSource:
-    """Sources lowered to the free nodes of a grid.
+class MaskedSource(GridSource):
+    """Sources lowered to the free nodes of a grid: of their samples those with a free node around them.
 
     Attributes
     ----------
-    whole : GridSource
-        The same on the grid without solid nodes.
-    interpolation : (s, n) sparse
-        Interpolates at the samples, from the free ones among the nodes around each.
-    kept : (s,) int
-        Samples of `whole` with a free node around them.
+    rows : (s, n) sparse
+        Interpolate at the samples, from the free ones among the nodes around each.
     beside_solid : (s,) bool
         Samples with a solid node within a cell or two: a source that ends there ends at a wall.
     """
 
-    whole: GridSource
-    interpolation: sparse.csr_matrix
-    kept: NDArray[np.int64]
+    rows: sparse.csr_matrix
     beside_solid: NDArray[np.bool_]
 
     @classmethod
@@ -193,35 +189,14 @@ class MaskedSource:
         shape = (len(kept), len(nodes.ids))
         rows = sparse.csr_matrix((weights[row, corner], (row, numbers[row, corner])), shape=shape)
         near_solid = scipy.ndimage.binary_dilation(nodes.grid.mask).ravel()
-        return cls(whole, rows, kept, near_solid[ids[kept]].any(axis=1))
+        beside_solid = near_solid[ids[kept]].any(axis=1)
+        return cls(whole.samples.chosen(kept), whole.grid, whole.diffusion, rows, beside_solid)
 
     @property
-    def time(self) -> float:
-        return self.whole.time
-
-    @property
-    def weights(self) -> NDArray[np.float64]:
-        return self.whole.weights[self.kept]
-
-    @property
-    def components(self) -> NDArray[np.int64]:
-        return self.whole.components[self.kept]
-
-    @property
-    def source_ids(self) -> NDArray[np.int64]:
-        return self.whole.source_ids[self.kept]
-
-    @property
-    def normals(self) -> NDArray[np.float64]:
-        """(s, d) area times unit normal of each sample."""
-        return self.whole.samples.vectors[self.kept]
+    def interpolation(self) -> sparse.csr_matrix:
+        return self.rows
 
     @cached_property
-    def vectors(self) -> NDArray[np.float64]:
+    def vectors(self) -> Any:
         """(n, d + 1) X₀, and in the last column the scalar source: areas without their normals."""
-        return self.interpolation.T @ np.concatenate([self.normals, self.weights[:, None]], axis=1)
-
-    @property
-    def positions(self) -> NDArray[np.float64]:
-        """(s, d) positions of the samples, in cells."""
-        return self.whole.samples.positions[self.kept]
+        return self.interpolation.T @ np.concatenate([self.samples.vectors, self.weights[:, None]], axis=1)
