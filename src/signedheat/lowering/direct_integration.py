@@ -78,7 +78,7 @@ class DirectIntegration(Frozen):
         rows, values = source.interpolation, levels.values
         if levels.groups is None:
             fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
-            _refuse_contradictions(rows, values, fitted[:, 0])
+            refuse_contradictions(rows, values, fitted[:, 0], 1e-4 * (np.abs(values).max() + np.ptp(fitted)))
             return self._reached(fitted[:, 0], rows)
         group = levels.groups
         bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a group of one sample constrains nothing
@@ -207,10 +207,13 @@ def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.
     return sparse.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
-def _refuse_contradictions(rows: sparse.csr_matrix, levels: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+def refuse_contradictions(
+    rows: sparse.csr_matrix, levels: NDArray[np.float64], values: NDArray[np.float64], allowed: float
+) -> None:
+    """Refuse levels that some sample misses by more than is allowed, unless all are the same."""
     gap = np.abs(levels - rows @ values)
     worst = int(gap.argmax())
-    if np.ptp(levels) > 0 and gap[worst] > 1e-4 * (np.abs(levels).max() + np.ptp(values)):
+    if np.ptp(levels) > 0 and gap[worst] > allowed:
         raise ConstraintError(
             f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: "
             "sources that meet or cross need the same level",

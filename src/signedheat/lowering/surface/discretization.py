@@ -21,7 +21,7 @@ from ...domains.point_cloud import PointCloud
 from ...domains.polygon_mesh import PolygonMesh
 from ...domains.segments import segments_of_each
 from ...domains.triangle_mesh import TriangleMesh
-from ...errors import ConstraintError, GeometryError
+from ...errors import GeometryError
 from ...geometry.curve_segments import CurveSegments
 from ...geometry.intrinsic.conforming_refinement import refine_to_conform
 from ...geometry.intrinsic_mesh import IntrinsicMesh, laid_out, mollify
@@ -29,7 +29,7 @@ from ...geometry.surfels import count_surfels, separated_edges
 from ...linear import Factor, chosen_backend, elimination_order, factorize
 from ...memory import refuse_beyond_memory
 from ...operators.cotan import cotan_matrix, divergence
-from ..direct_integration import DirectIntegration
+from ..direct_integration import DirectIntegration, refuse_contradictions
 from ..spring_integration import SpringIntegration
 from .nonmanifold_frames import nonmanifold_frames
 from .source import surface_source
@@ -274,24 +274,9 @@ class SurfaceIntegration(SpringIntegration):
             return self.fit_exactly(divergence, source, levels)
         fitted = super().fit(divergence, source, levels)
         if levels.groups is None:
-            refuse_far_levels(source, levels.values, fitted)
+            between = np.diff(np.unique(levels.values)).min(initial=np.inf)
+            refuse_contradictions(source.interpolation, levels.values, fitted, 0.25 * float(between))
         return fitted
-
-
-def refuse_far_levels(source: SourceTerm, levels: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    """Refuse levels that contradict each other: some sample is then missed by half their difference."""
-    different = np.unique(levels)
-    if len(different) < 2:
-        return
-    rows = source.interpolation
-    gap = np.abs(levels - rows @ values)
-    worst = int(gap.argmax())
-    if gap[worst] > 0.25 * np.diff(different).min():
-        raise ConstraintError(
-            f"the levels contradict each other near vertex {rows.indices[rows.indptr[worst]]}: "
-            "sources that meet or cross need the same level",
-            element=f"vertex {rows.indices[rows.indptr[worst]]}",
-        )
 
 
 LIGHTER = 0.87
