@@ -285,8 +285,4 @@ def ends_among(parts: Sequence[CurveSegments], who: NDArray[np.int64]) -> NDArra
 def connected(parts: Sequence[CurveSegments]) -> NDArray[np.int64]:
     """(s,) connected component of every node, over all sources, in order of first appearance."""
     first, who = unique_points(concatenated([p.nodes for p in parts]))
-    labels = connected_components(len(first), *ends_among(parts, who).T)
-    seen, order = np.unique(labels, return_index=True)
-    rank = np.empty(len(seen), dtype=np.int64)
-    rank[np.argsort(order)] = np.arange(len(seen))
-    return rank[labels][who]
+    return connected_components(len(first), *ends_among(parts, who).T)[who]

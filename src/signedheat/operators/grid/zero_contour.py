@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from ...geometry.components import grouped, members_of
 from ...geometry.nearest import foot_on_triangle, triangle_rows
 from ...packages import lazy_module
 from .closest_points import circle_distance, crossed_edges, crossings_at, nearest_tiles, seed_edge_ends
@@ -118,7 +119,9 @@ def zero_contour(
     around, where = np.nonzero(corners >= 0)
     at = corners[around, where]
     cells = np.concatenate([np.pad(crossings, ((0, 0), (1, 0))), zeros])
-    starts, around = _triangles_at(_places(cells), at, around)
+    places = _places(cells)
+    of_crossings, members = members_of(*grouped(places[at], len(cells)), places)
+    starts = np.searchsorted(of_crossings, np.arange(len(cells) + 1))
     linear = cells * steps
     curved, smooth = np.zeros((len(linear), 18)), np.zeros(len(linear), dtype=np.bool_)
     curved[: len(edges)] = crossings_at(field, edges, steps)
@@ -137,7 +140,7 @@ def zero_contour(
         rows,
         corners,
         starts,
-        around,
+        around[members],
         least,
         float(np.linalg.norm(steps[unused:])),
     )
@@ -199,24 +202,6 @@ def _places(cells: NDArray[np.float64]) -> NDArray[np.int64]:
         _, first, which = np.unique(rounded[~apart], axis=0, return_index=True, return_inverse=True)
         result[~apart] = np.flatnonzero(~apart)[first][which.ravel()]
     return result
-
-
-def _triangles_at(
-    places: NDArray[np.int64], at: NDArray[np.int64], triangles: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Where the triangles at the place of each crossing begin, and the triangles, given those at each crossing.
-
-    Examples
-    --------
-    >>> [found.tolist() for found in _triangles_at(np.array([0, 1, 0]), np.array([0, 1, 2]), np.array([5, 6, 7]))]
-    [[0, 2, 3, 5], [5, 7, 6, 5, 7]]
-    """
-    keys = places[at]
-    listed = triangles[np.argsort(keys, kind="stable")]
-    counts = np.bincount(keys, minlength=len(places))
-    starts = np.concatenate([[0], np.cumsum(counts[places])])
-    begins = (np.cumsum(counts) - counts)[places]
-    return starts, listed[np.repeat(begins - starts[:-1], counts[places]) + np.arange(starts[-1])]
 
 
 def _between_others(vertices: NDArray[np.float64], faces: NDArray[np.int64], chosen: NDArray[np.bool_]) -> None:
