@@ -69,7 +69,7 @@ class NodeSources:
     def restricted(self, factors: NDArray[np.int64], shape: tuple[int, ...], steps: NDArray[np.float64]) -> NodeSources:
         """The sources on a coarser grid, by the transpose of linear interpolation."""
         lines = np.argwhere(self.places >= 0)
-        rows, at = np.nonzero(self.sums.any(axis=2)[self.places[self.places >= 0]])
+        rows, at = np.nonzero(np.any(self.sums[self.places[self.places >= 0]], axis=2))
         nodes = lines[rows]
         nodes[:, 3] = STRETCH * nodes[:, 3] + at
         coarse = np.where(np.array(shape) > 1, nodes / factors, 0.0)

@@ -113,7 +113,9 @@ def _divide(
 ) -> None:
     """Divide by the eigenvalues of C, sums of one-dimensional ones; the quotient is zero where they are zero."""
     here = slab(axis, start, stop)
-    total = sum(np.ix_(*(values[part] for values, part in zip(eigenvalues, here, strict=True))))
+    total = np.zeros(())
+    for values in np.ix_(*(values[part] for values, part in zip(eigenvalues, here, strict=True))):
+        total = total + values
     total[total == 0.0] = np.inf
     transformed[here] /= total
 
@@ -127,7 +129,7 @@ def _divergence(
     stop: int,
 ) -> None:
     low, high = max(start - 1, 0), min(stop + 1, out.shape[axis])
-    around = components[(slice(None), *slab(axis, low, high))]
+    around = np.moveaxis(np.moveaxis(components, axis + 1, 0)[low:high], 0, axis + 1)
     sums = np.zeros(around.shape[1:])
     for component, scale, along in zip(around, scales, range(4 - len(scales), 4), strict=True):
         flow, lines = np.moveaxis(component, along, 0), np.moveaxis(sums, along, 0)
