@@ -1,4 +1,4 @@
-"""How a surface bends towards its rim: whether it would go on over the opening."""
+"""How a surface bends towards its rim: whether it would continue over the opening."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SAMPLES = 4
 MOST = 4096
 """Samples around a rim at most, or nearly."""
 NEAR = 0.05
-"""Part of that strip that is nearest to a place of the rim, and tells its normal."""
+"""Part of that strip nearest to a place of the rim, which gives the normal there."""
 STIFF = 0.1
-"""Depth, over that strip's, of a wall whose bending is believed by half."""
+"""Depth of a wall, over that strip's, whose bending counts by half."""
 AGREEMENT = 0.5
-"""Ratio of how far a surface bends and how far it would have to, from which on it is believed to go on: 1 on a ball."""
+"""Ratio of how far a surface bends and how far it would have to, from which on the lid is clamped: 1 on a ball."""
 FLAT = 0.05
 """Turn of a surface, in radians, that is as good as none: a lid is then out by less than a hundredth of its width."""
 FREE = 0.01
@@ -101,7 +101,7 @@ def samples_near(
 def continuation(
     lid: Lid, samples: Samples, patches: NDArray[np.int64], width: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Where the surface would go on over a rim, how curved it is, and how far that is to be believed.
+    """Normals and curvatures with which the surface would continue over its rim, and how much that counts.
 
     Across an opening of width W a surface that meets the flat lid at angle β must turn by 2 sin β, the chord of a
     circle; if its curvature towards the rim is k, it would turn by k W. On a ball both are the same, on a box k is 0.
@@ -144,7 +144,7 @@ def continuation(
     squares = (x * x).sum(axis=1)
     behind = _units(sums(areas / (squares + (NEAR * reach) ** 2) ** 1.5, normals))
     way = np.cross(behind, along)
-    told = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
+    enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
     way = _units(way)
     frame = np.stack([way, np.cross(behind, way)], axis=1)
     weights = areas * (1.0 - squares / reach**2)  # what comes into reach weighs nothing yet
@@ -154,11 +154,11 @@ def continuation(
     at = at - mean[rows]
     spread = sums(weights, at[:, :, None], at[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
     slopes = np.linalg.solve(spread, sums(weights, at[:, :, None], (normals - middle[rows])[:, None, :]))
-    at_rim = _units(middle - np.einsum("ni,nij->nj", mean, slopes)) * told[:, None]
+    at_rim = _units(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
     outwards = _units(np.cross(at_rim, along))
     bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * rim_normals(lid)).sum(axis=1)
-    curvatures = np.where(told, (slopes * frame).sum(axis=(1, 2)), 0.0)
-    held = np.where(told, _agreement(bends, must), 0.0)
+    curvatures = np.where(enough, (slopes * frame).sum(axis=(1, 2)), 0.0)
+    held = np.where(enough, _agreement(bends, must), 0.0)
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
 
 
@@ -180,7 +180,7 @@ def _units(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _agreement(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """1 where two numbers are alike within a factor of 1 / `AGREEMENT`, 0 where they differ by its square or are 0."""
+    """1 where two numbers agree within a factor of 1 / `AGREEMENT`, 0 where they differ by its square or are 0."""
     swap = np.abs(one) > np.abs(other)
     low, high = np.where(swap, other, one), np.where(swap, one, other)
     ratio = low * np.sign(high) / np.maximum(np.abs(high), FLAT)

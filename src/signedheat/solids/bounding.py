@@ -56,6 +56,6 @@ def pieces_of(
         largest = np.lexsort((-face_areas(pieces[whole]), parts))
         _, first = np.unique(parts[largest], return_index=True)
         regions[whole] = whole[largest[first]][parts]
-    asked, where = np.unique(regions, return_inverse=True)
-    behind, ahead = windings.beside(pieces[asked])
+    some, where = np.unique(regions, return_inverse=True)
+    behind, ahead = windings.beside(pieces[some])
     return Pieces(pieces, origins, behind[where], ahead[where])

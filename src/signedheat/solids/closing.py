@@ -12,10 +12,6 @@ from ..geometry.components import connected_components
 from . import bending, creases, lids
 from .rims import loops, meeting_edges, open_edges
 
-SIDES = 100
-"""Most sides of a rim that is closed by a few flat triangles."""
-NARROW = 0.03
-"""Width of a rim, over the diagonal of its part, up to which that is so."""
 SLIT = 1e-3
 """Width of an opening, over the length of its rim, up to which its lid is flat: its strip has no end of samples."""
 
@@ -39,12 +35,11 @@ def lids_of(
     for part in np.unique(owners):
         here = order[starts[part] : starts[part + 1]]
         own = triangles[here]
-        diagonal = float(np.linalg.norm(np.ptp(own.reshape(-1, 3), axis=0)))
         patches = bending.smooth_patches(own, ids[here])
         ends = _Ends.of(ids[here], patches, len(vertices))
         rims = loops(edges[np.searchsorted(owners, part) : np.searchsorted(owners, part, side="right")])
         for loop in _openings(rims, vertices):
-            lid = _lid(vertices[loop], own, patches, ends.at(loop), diagonal)
+            lid = _lid(vertices[loop], own, patches, ends.at(loop))
             made.append(lid.vertices[lid.faces])
     return made
 
@@ -68,7 +63,7 @@ def _openings(rims: list[NDArray[np.int64]], vertices: NDArray[np.float64]) -> l
     following = scipy.spatial.cKDTree(vertices[[chain[0] for chain in chains]]).query(
         vertices[[chain[-1] for chain in chains]]
     )[1]
-    if len(np.unique(following)) < len(chains):  # it is not clear how they go on
+    if len(np.unique(following)) < len(chains):  # which start belongs to which end is not clear
         return whole + [rim for rim, _ in partly]
     cycles = connected_components(len(chains), np.arange(len(chains)), following)
     for first in np.unique(cycles, return_index=True)[1]:
@@ -119,12 +114,9 @@ def _lid(
     own: NDArray[np.float64],
     patches: NDArray[np.int64],
     ends: NDArray[np.int64],
-    diagonal: float,
 ) -> lids.Lid:
     if len(corners) == 3:
         return lids.Lid(corners, np.array([[0, 1, 2]]), 3)
-    if len(corners) <= SIDES and np.linalg.norm(np.ptp(corners, axis=0)) < NARROW * diagonal:
-        return lids.Lid(corners, lids.least_triangles(corners), len(corners))
     flat = lids.film(corners)
     rim = flat.vertices[: flat.n_rim]
     width = bending.width_of(flat)

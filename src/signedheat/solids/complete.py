@@ -43,12 +43,12 @@ BYTES_PER_FACE = 1300
 """Measured peak for each face of meshes of 330,000, closed or open; points take less."""
 BYTES_IF_LOOSE, BYTES_OF_HEAT = 3400, 150_000_000
 """The same for loose triangles; and of the grid that they and points are completed on."""
-DOUBT = 0.05
+TRUST = 0.05
 """Distance from what was given, over its diagonal, at which confidence in the completion has fallen to a half."""
 CELLS = 2.0
 """Cells between neighbouring points of a cloud."""
 SEAM = 0.75
-"""Cells from faces within which the zero set of φ stands for what they are."""
+"""Cells from faces within which the zero set of φ is taken for those faces."""
 
 
 def complete(
@@ -282,7 +282,7 @@ def _heat_of(pieces: Surface, method: Heat, cell: float = 0.0) -> Surface | None
 
 
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:
-    """The solid that oriented points are samples of; where they bound nothing, small triangles stand for them."""
+    """The solid that oriented points are samples of; where they bound nothing, each is a small triangle."""
     if cloud.normals is None:
         raise SourceError("the point cloud has no normals, which say what is inside", remedy="give it normals")
     made = heat_surface(cloud, method, mean_gap(np.asarray(cloud.points)) / CELLS)
@@ -371,7 +371,7 @@ def _confidence(
         return confidence
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     away = scipy.spatial.cKDTree(points).query(triangles[~given].mean(axis=1), workers=-1)[0]
-    trust = DOUBT * diagonal / np.maximum(DOUBT * diagonal + away, np.finfo(float).tiny)
+    trust = TRUST * diagonal / np.maximum(TRUST * diagonal + away, np.finfo(float).tiny)
     confidence[~given] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
     return confidence
 

@@ -54,7 +54,7 @@ class Evaluated(KnownSolid, Protocol):
 
     @property
     def windings(self) -> Windings:
-        """What tells its inside."""
+        """Decides what is inside."""
 
     @property
     def diagnostics(self) -> Diagnostics:

@@ -68,9 +68,9 @@ def heat_surface(
         method.constraint or ZeroSet(),
     )
     share = winding / (2 * level)
-    doubtful = ((phi < 0) & (share < SURE)) | ((phi >= 0) & (share > 1 - SURE))
-    if doubtful.any():
-        at = np.argwhere(doubtful)
+    wrong = ((phi < 0) & (share < SURE)) | ((phi >= 0) & (share > 1 - SURE))
+    if wrong.any():
+        at = np.argwhere(wrong)
         away = scipy.spatial.cKDTree(samples.positions).query(at, workers=-1)[0]
         far = tuple(at[away > NEAR].T)
         phi[far] *= -1.0

@@ -36,12 +36,12 @@ def without_copies(
     normals = np.cross(b - a, c - a)
     facing = np.abs((normals[:, None] * tree.features.face_normals[found.faces].reshape(-1, 3, 3)).sum(axis=2))
     doubled = np.linalg.norm(normals, axis=1)
-    alike = (facing > 0.7 * doubled[:, None]).any(axis=1)
+    parallel = (facing > 0.7 * doubled[:, None]).any(axis=1)
     n = int(labels.max()) + 1
     sizes = np.sqrt(np.bincount(labels, 0.5 * doubled, n))
     farthest = np.zeros(n)
     np.maximum.at(farthest, labels, away.max(axis=1))
-    share = np.bincount(labels, alike, n) / np.maximum(np.bincount(labels, minlength=n), 1)
+    share = np.bincount(labels, parallel, n) / np.maximum(np.bincount(labels, minlength=n), 1)
     copy = (farthest < COPY * sizes) & (share > 0.5)
     kept: NDArray[np.bool_] = ~copy[labels]
     return kept

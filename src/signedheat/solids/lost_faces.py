@@ -2,7 +2,7 @@
 
 The surface across a hole that lost no vertices is known but for its diagonals. Of all triangulations of the hole's
 loop, the one whose edges bend least, ``Σ length · angle`` with the rim's edges included (twice the total absolute mean
-curvature), goes on as the faces around it do; dynamic programming over the loop finds it (Barequet and Sharir 1995,
+curvature), continues the faces around it; dynamic programming over the loop finds it (Barequet and Sharir 1995,
 Liepa 2003), each part of a loop keeping the triangle at its end.
 """
 
@@ -22,7 +22,7 @@ from ..geometry.virtual_refinement import area_vectors
 MOST_SIDES = 16
 """Sides of a hole from which on vertices, too, may be lost."""
 BENT = np.deg2rad(70.0)
-"""Root mean square of the angles at the rim from which on a lid does not go on as the surface around it: at the end of
+"""Root mean square of the angles at the rim from which on a lid does not continue the surface around it: at the end of
 a tube it is 90°."""
 FOLDED = np.deg2rad(135.0)
 """The same for one triangle, and for holes of few sides beside others: behind the corner of a cube it is 125°, on the
@@ -208,7 +208,7 @@ def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
 
 
 def _triangles(apexes: NDArray[np.int64], holes: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(k, 3) places around the loops of some holes of the corners of their best lids' triangles, and whose they are."""
+    """(k, 3) places around loops of the corners of the triangles of some holes' best lids, and the hole of each."""
     triangles, owners = [np.empty((0, 3), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     parts = [(0, len(apexes) - 1, holes)]
     while parts:

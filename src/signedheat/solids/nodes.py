@@ -60,7 +60,7 @@ def distances_in(
     tree : FaceTree
         What to measure to.
     windings : Windings
-        What tells the inside.
+        Decides what is inside.
     grid : Grid
         Whose nodes.
     first : (3,) int
@@ -104,7 +104,7 @@ def solved(
 
 
 def _inside(windings: Windings, grid: Grid, first: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where nodes are inside, of which one is asked for all that no surface can divide.
+    """Where nodes are inside, computed for one of all those between which there is no surface.
 
     Of two neighbours that are both farther than half a step no surface is between, nor a gap if they are farther than
     these are wide.

@@ -74,7 +74,7 @@ class Samples:
 
     @property
     def figures(self) -> dict[str, float | list[float]]:
-        """What there is to tell about the samples, ready for JSON."""
+        """A summary of the samples, ready for JSON."""
         return {
             "samples": len(self.points),
             "near": int(self.near.sum()),

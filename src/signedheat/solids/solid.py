@@ -61,7 +61,7 @@ class Solid(Frozen, ShortRepr):
     bounding : (m,) bool
         Whether it is inside behind each and outside in front.
     windings : Windings
-        What tells the inside.
+        Decides what is inside.
     source : TriangleMesh, optional
         Triangles of the shape that was given, which barycentric coordinates refer to.
     diagnostics : Diagnostics
@@ -316,7 +316,7 @@ class Solid(Frozen, ShortRepr):
         """(n,) whether points are inside, whose nearest faces are known.
 
         No triangle is between a point and the nearest place. So where sides change across triangles only it is inside
-        where it is on that side of this place, which the normal there tells. Elsewhere winding numbers are counted.
+        where it is on that side of this place, by the normal there. Elsewhere winding numbers are counted.
         """
         beyond = self.windings.sided_beyond
         if np.isinf(beyond):

@@ -1,4 +1,4 @@
-"""Bands on disk: computed tile by tile by threads, processes or a Dask cluster, so that stopped runs can go on.
+"""Bands on disk: computed tile by tile by threads, processes or a Dask cluster, so that stopped runs can be resumed.
 
 A folder holds what tiles are computed from, values and confidence of all blocks in files that are mapped, and for each
 tile whether it is done. Workers write rows of their own: a tile needs nothing of its neighbours.

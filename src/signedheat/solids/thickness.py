@@ -15,16 +15,16 @@ N_LINES = 30_000
 N_DIRECTIONS = 8
 """Directions of these lines."""
 SHARE = 0.01
-"""Share of the lines' ways through walls, or through gaps, that may be shorter than what is told."""
+"""Share of the lines' ways through walls, or through gaps, that may be shorter than the width reported."""
 OPPOSITE = -0.9
 """Cosine between the normals of faces below which they are opposite each other, and no wedge."""
 STEEP = 0.7
-"""Cosine between line and normals from which a line tells a width: others pass from one place to quite another."""
+"""Cosine between line and normals from which on a line measures a width; others reach quite another place."""
 
 
 @dataclass(frozen=True)
 class Thickness:
-    """Walls and gaps of a shape, measured on lines through it: what is found on less than 1 % of them is not told.
+    """Walls and gaps of a shape, measured on lines through it: what is found on less than 1 % of them is not counted.
 
     Attributes
     ----------
