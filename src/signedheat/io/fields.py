@@ -24,7 +24,6 @@ from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField, on_simple_surface
 from ..lowering.grid.discretization import refuse_beyond_memory
 from ..operators.grid.blocks import SIDE, Blocks
-from ..packages import require
 from .arrays import names_in_npz, read_npz, write_npz
 from .files import PathLike, contents, damaged, ensure_writable, extension, format_for, reading, replacing
 from .images import CONFIDENCE, read_image, write_nrrd
@@ -48,7 +47,6 @@ BYTES_PER_NODE = 20.0
 """Of bands written whole: values, their copy in the order of the file, and what is written."""
 HDF = ".vtkhdf"
 """Of files that are written, and not read."""
-_NEEDED = {".nrrd": ("nrrd", "NRRD files"), HDF: ("h5py", "VTKHDF files")}
 _DIMENSIONS = {".vti": (1, 2, 3), HDF: (2, 3), ".vdb": (3,)}
 """Numbers of axes that a format supports; the others support any number."""
 
@@ -121,8 +119,6 @@ def ensure_field_writable(path: PathLike, in_band: bool = False) -> None:
         If the format needs a package that is not installed.
     """
     ensure_writable(path, BAND_FORMATS if in_band else FIELD_FORMATS, "a field in a band" if in_band else "a field")
-    if extension(path) in _NEEDED:
-        require(*_NEEDED[extension(path)])
 
 
 def load_field(path: PathLike) -> Field:

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
 from ..memory import available_memory
+from ..packages import require
 from ..parallel import run_limited
 
 PathLike = str | os.PathLike[str]
@@ -34,6 +35,8 @@ PACKAGE = f"{__package__.partition('.')[0]}."
 TAKEN = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
 """Bytes that a shape takes while it is read for each byte of its file, measured with some hundred thousand faces; less
 where files may hold more than positions and faces. Of other formats more is known once they are read in part."""
+NEEDED = {".nrrd": ("nrrd", "NRRD files"), ".vtkhdf": ("h5py", "VTKHDF files")}
+"""Packages by which formats are written."""
 READERS = f"{__package__}.", f"{PACKAGE}parallel", f"{PACKAGE}packages"
 """Modules that read, and those by which they call parsers of other packages."""
 
@@ -275,9 +278,13 @@ def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> Non
     ------
     FileFormatError
         If the extension is not supported, or the file cannot be created.
+    MissingPackageError
+        If the format needs a package that is not installed.
     """
     if extension(path) not in known:
         raise unknown_extension(path, known, purpose)
+    if extension(path) in NEEDED:
+        require(*NEEDED[extension(path)])
     with writing(path):
         os.unlink(_new_file(path))
 

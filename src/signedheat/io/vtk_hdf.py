@@ -18,8 +18,7 @@ from ..domains.grid import Grid
 from ..packages import lazy_module
 from .files import PathLike
 
-HDF = ("h5py", "VTKHDF files")
-h5py = lazy_module(*HDF)
+h5py = lazy_module("h5py", "VTKHDF files")
 TETRA = 10
 """VTK's number for tets."""
 
