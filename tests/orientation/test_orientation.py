@@ -346,6 +346,34 @@ def test_a_cell_that_all_walls_face_into_is_a_cavity_if_the_outside_faces_outwar
     assert found.turned_faces == 0
 
 
+@pytest.mark.parametrize("gone", [0, 1, 2])
+def test_a_cell_that_lacks_walls_is_outside_and_opens_no_other(gone):
+    mesh, bounding = walls_of_cells(np.ones((3, 3, 3), dtype=bool))
+    corner = mesh.vertices[mesh.faces].mean(axis=1)
+    outer = bounding & (corner < 1).all(axis=1)  # of the first cell
+    kept = ~(outer & (corner[:, :gone] < 1e-9).any(axis=1))
+    first = (corner < 1).all(axis=1) | ((corner <= 1 + 1e-9).all(axis=1) & ~bounding)
+    which = np.random.default_rng(2).random(mesh.n_faces) < 0.5
+    found = sh.orientation(turned(sh.TriangleMesh(mesh.vertices, mesh.faces[kept]), which[kept]))
+    np.testing.assert_array_equal(found.inner, (~bounding & ~(first & (gone > 0)))[kept])
+    sure = (bounding & ~first)[kept]
+    np.testing.assert_array_equal(found.turned[sure], which[kept][sure])
+
+
+def test_a_fin_in_a_closed_body_is_inner_and_one_outside_is_not():
+    mesh, bounding = walls_of_cells(np.ones((2, 2, 2), dtype=bool))
+    centers = mesh.vertices[mesh.faces].mean(axis=1)
+    kept = bounding | ((np.abs(centers[:, 0] - 1) < 1e-9) & (centers[:, 1:] < 1).all(axis=1))
+    fin = ~bounding[kept]
+    assert fin.sum() == 2
+    given = sh.TriangleMesh(mesh.vertices, mesh.faces[kept])
+    np.testing.assert_array_equal(sh.orientation(given).inner, fin)
+    outside = sh.TriangleMesh(
+        [*mesh.vertices, [-1, 0, 0], [-1, 1, 0]], [*mesh.faces[bounding], [0, 27, 28], [0, 28, 3]]
+    )
+    assert not sh.orientation(outside).inner.any()
+
+
 def test_faces_on_each_other_make_no_complex():
     """Where faces overlap around an edge, nobody knows which of them is next."""
     mesh, bounding = walls_of_cells(np.ones((2, 1, 1), dtype=bool))

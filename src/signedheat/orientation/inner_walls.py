@@ -1,4 +1,4 @@
-"""Which walls of a whole complex of cells bound nothing, since cells lie on both sides of them.
+"""Which walls of a complex of cells bound nothing, since closed cells lie on both sides of them.
 
 Each face has two sides. Around an edge, in order of angle, the sides of neighbouring faces that look at each other
 bound the same region of space; so all sides fall into shells, the whole boundary of a region each. Which way the faces
@@ -30,11 +30,11 @@ def inner_walls(
     areas: NDArray[np.float64],
     volumes: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """(p,) faces with a cell on either side; of whole complexes only, in which each edge has two faces or more.
+    """(p,) faces with a closed cell on either side, or the same on both, where some edges have three or more faces.
 
-    A complex whose faces run along each edge as often one way as the other is the boundary of something as it is, and
-    none of its faces is inner. Where the outside of a complex was given facing outwards, cells are cavities that their
-    walls face into.
+    A cell that lacks a wall is part of the outside. A complex whose faces run along each edge as often one way as the
+    other is the boundary of something as it is, and none of its faces is inner. Where the outside of a complex was
+    given facing outwards, cells are cavities that their walls face into.
 
     Parameters
     ----------
@@ -64,19 +64,20 @@ def inner_walls(
     complexes = connected_components(n, faces, faces[following])
     gaps = np.where(last, 2 * np.pi, 0.0) + angles[following] - angles
     many = pairs.counts[edges] > 2
-    broken = (pairs.counts[edges] == 1) | (many & ~(gaps > SAME_ANGLE))  # also where an angle is no number
+    unclear = many & ~(gaps > SAME_ANGLE)  # also where an angle is no number
     balance = np.bincount(edges, np.where(forward, 1, -1), len(pairs.counts))
     qualified = np.zeros((2, n), dtype=bool)
     qualified[0, complexes[faces[many]]] = qualified[1, complexes[faces[balance[edges] != 0]]] = True
-    qualified[:, complexes[faces[broken]]] = False
+    qualified[:, complexes[faces[unclear]]] = False
     chosen = (qualified[0] & qualified[1])[complexes]
 
     # sides of faces: 2 f is the one that the normal points to, 2 f + 1 the other
     ahead, behind = 2 * faces + ~forward, 2 * faces + forward
     shells = connected_components(2 * n, ahead, behind[following]).reshape(n, 2)
+    front, back = shells.T
+    volumes = np.where(front != back, volumes, 0.0)  # surface that is open has one shell around it
     inside = np.bincount(shells.ravel(), np.stack([-volumes, volumes], axis=1).ravel()) > 0
     cavities = _cavities(shells, inside, np.where(chosen, areas, 0.0))
-    front, back = shells.T
     inner: NDArray[np.bool_] = chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
     return inner
 

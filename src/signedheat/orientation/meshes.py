@@ -66,7 +66,7 @@ class Orientation(Frozen, ShortRepr):
         Faces of sheets and other parts for which no side is outside: they agree with their neighbours, and most of each
         part's area is as it was given.
     inner : (k,) bool
-        Walls between cells of whole complexes (see `inner_walls`), which bound nothing: left as they are.
+        Walls between closed cells (see `inner_walls`), which bound nothing: left as they are.
     n_parts, closed_parts : int
         Parts, and those of which every edge has two faces.
     turned_parts, turned_faces, turned_area : int, int, float
@@ -125,13 +125,13 @@ class Orientation(Frozen, ShortRepr):
 def orientation(shape: Mesh | ForeignShape) -> Orientation:
     """Orient a mesh, and tell what was turned, merged and left.
 
-    Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Walls between cells of a
-    whole complex are left out (`inner_walls`). Across edges of two faces orientation is carried on, and each part so
-    found takes that of the most of its area. Lines laid through the whole shape then tell which way each part faces
-    (`orient_parts`). Small pieces that touch other parts at corners face as they do; of those that touch nothing, each
-    turns only if its neighbours clearly disagree with it. Where they are a tenth of the shape or more, and lines do not
-    leave it as often as they enter it, points on them tell which way they face, all together (`orient_triangles`): that
-    is taken if lines then find fewer contradictions.
+    Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Walls between closed cells
+    are left out (`inner_walls`). Across edges of two faces orientation is carried on, and each part so found takes that
+    of the most of its area. Lines laid through the whole shape then tell which way each part faces (`orient_parts`).
+    Small pieces that touch other parts at corners face as they do; of those that touch nothing, each turns only if its
+    neighbours clearly disagree with it. Where they are a tenth of the shape or more, and lines do not leave it as often
+    as they enter it, points on them tell which way they face, all together (`orient_triangles`): that is taken if lines
+    then find fewer contradictions.
 
     A part that is there twice, once facing each way, is a doubled wall: both its sides stay. If it is closed, or holes
     make up less than a ninth of its area, it is a solid drawn from both sides, and one side goes.
@@ -204,7 +204,7 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
 
 
 def _without_inner_walls(faces: MeshFaces) -> MeshFaces:
-    """Faces of which those are left out that have a cell of a whole complex on either side."""
+    """Faces of which those are left out that have a closed cell on either side."""
     surface = faces.surface
     normals = faces.normals(np.zeros(surface.n_faces, dtype=bool))
     inner = inner_walls(
