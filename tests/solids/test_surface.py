@@ -9,6 +9,7 @@ from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold
 from signedheat import samples
 from signedheat.errors import OutsideError
+from signedheat.geometry.conforming import conforming
 from signedheat.geometry.edges import edge_table
 from signedheat.geometry.self_intersections import self_intersections
 from signedheat.solids import simplification
@@ -218,3 +219,19 @@ def test_surfaces_that_are_not_simplified_are_returned_with_a_warning(monkeypatc
     surface = samples.sphere(2)
     with pytest.warns(sh.errors.InexactWarning, match="as it was"):
         assert simplification.simplified(surface, 0.08) is surface
+
+
+def test_triangles_without_area_do_not_keep_faces_from_joining():
+    """Completion has some at rims, and what they bound is not the same on both of their sides."""
+    shape = turned(box((-1.0, -0.7, -0.2), (1.0, 0.6, 0.3)))
+    triangles = shape.vertices[shape.faces]
+    a, b, c = triangles[0]
+    middle = 0.5 * (a + b)
+    halves = [[a, middle, c], [middle, b, c]]
+    flat = [[a, b, middle], [a, middle, middle], [b, c, 0.3 * b + 0.7 * c]]
+    vertices, faces, gaps = conforming(np.concatenate([triangles[1:], halves, flat]), 1e-9)
+    assert not len(gaps)
+    corners = vertices[faces]
+    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    assert volume == pytest.approx(2 * 1.3 * 0.5)
+    assert not len(self_intersections(vertices, faces))

@@ -61,10 +61,17 @@ def conforming(
 
 
 def _welded(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices, and triangles between them that have three different ones."""
+    """Vertices, and triangles between them that have three different ones.
+
+    Triangles without area are left out: along their longest side two edges of others meet one, which is divided.
+    """
     used, numbers = np.unique(welded(points, tolerance), return_inverse=True)
-    faces = numbers.reshape(-1, 3)
-    return points[used], faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    vertices, faces = points[used], numbers.reshape(-1, 3)
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+    corners = vertices[faces]
+    sides = np.roll(corners, -1, axis=1) - corners
+    heights = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / np.linalg.norm(sides, axis=2).max(axis=1)
+    return vertices, faces[heights > tolerance]
 
 
 def _open_sides(faces: NDArray[np.int64]) -> NDArray[np.int64]:
