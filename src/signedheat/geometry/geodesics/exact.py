@@ -181,21 +181,26 @@ class PausedSearch:
     def distance(self) -> NDArray[np.float64]:
         """(n,) of every vertex; along edges from what was reached, where it was not."""
         distance = self.known.distance
-        if not self.has_ended:
-            return _along_edges(self.triangles, distance)
-        missed = np.isinf(distance)
-        if missed.any():  # on other parts, or past edges so short that windows on them are lost in rounding
-            distance[missed] = _along_edges(self.triangles, distance)[missed]
-        return distance
+        if self.has_ended and np.isfinite(distance).all():
+            return distance
+        known = np.flatnonzero(np.isfinite(distance))
+        # merged windows may miss zero by their tolerance, and Dijkstra needs it
+        along = along_edges(self.triangles, known, np.maximum(distance[known], 0.0))
+        # where it has ended: on other parts, or past edges so short that windows on them are lost in rounding
+        return np.where(np.isinf(distance), along, distance) if self.has_ended else along
 
 
-def _along_edges(triangles: IntrinsicMesh, distance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The least of these distances and of those along edges from other vertices."""
-    distance = np.maximum(distance, 0.0)  # which merged windows may miss by their tolerance; Dijkstra needs it
-    n, known = len(distance), np.flatnonzero(np.isfinite(distance))
+def along_edges(
+    triangles: IntrinsicMesh, vertices: NDArray[np.int64], offsets: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n,) distance of every vertex along edges from vertices (k,) that have distances of their own; inf if none.
+
+    A vertex that is given several times starts with the least of its distances.
+    """
+    n = triangles.n_vertices
     tails, heads = triangles.edges.vertices.T
-    rows, columns = np.concatenate([tails, np.full(len(known), n)]), np.concatenate([heads, known])
-    lengths = np.concatenate([triangles.lengths_of_edges, distance[known]]) + 1e-300  # SciPy drops edges of length 0
+    rows, columns = np.concatenate([tails, np.full(len(vertices), n)]), np.concatenate([heads, vertices])
+    lengths = np.concatenate([triangles.lengths_of_edges, offsets]) + 1e-300  # SciPy drops edges of length 0
     order = np.lexsort([lengths, columns, rows])
     rows, columns, lengths = rows[order], columns[order], lengths[order]
     first = np.ones(len(rows), dtype=bool)  # the shortest of the edges that join two vertices

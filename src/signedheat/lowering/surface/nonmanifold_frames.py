@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 from ...geometry.curve_segments import CurveSegments
+from ...geometry.geodesics.exact import along_edges
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 
 
@@ -83,16 +82,8 @@ def mirrored(part: CurveSegments, changed: NDArray[np.bool_]) -> CurveSegments:
 
 def from_sources(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
     """(n_vertices,) distance of every vertex from the sources along edges."""
-    lengths, n = triangles.lengths_of_edges, triangles.n_vertices
-    tail, head = triangles.edges.vertices.T
     onto = [corner_distances(triangles, part) for part in parts]
-    vertices, offsets = (np.concatenate(a) for a in zip(*onto, strict=True))
-    rows, columns = np.concatenate([tail, np.full(len(vertices), n)]), np.concatenate([head, vertices])
-    shortest = np.lexsort([np.concatenate([lengths, offsets]), columns, rows])
-    first = np.append(True, (np.diff(rows[shortest]) != 0) | (np.diff(columns[shortest]) != 0))
-    kept = shortest[first]  # csr_matrix would sum duplicate entries
-    graph = csr_matrix((np.concatenate([lengths, offsets])[kept], (rows[kept], columns[kept])), shape=(n + 1, n + 1))
-    return dijkstra(graph, directed=False, indices=n)[:n]
+    return along_edges(triangles, *(np.concatenate(a) for a in zip(*onto, strict=True)))
 
 
 def corner_distances(triangles: IntrinsicMesh, part: CurveSegments) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
