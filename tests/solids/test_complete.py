@@ -63,6 +63,11 @@ def test_sides_of_a_box_that_touch_come_back_with_their_edges_and_corner(without
     assert volume(solid) == pytest.approx(1.08, rel=1e-9)
 
 
+def test_a_flat_box_without_three_sides_at_a_corner_is_a_solid():
+    for size in ((1.7, 1.2, 0.25), (1.0, 1.5, 0.1)):
+        assert volume(sh.complete(box(size, without=(1, 3, 5)))) == pytest.approx(np.prod(size), rel=1e-9)
+
+
 @pytest.mark.parametrize("center", [(1.0, 1.0, 0.5), (1.0, 1.0, 1.0)])
 def test_holes_over_an_edge_and_a_corner_of_a_box_close_to_the_box(center):
     vertices, faces = box(n=12)
