@@ -20,7 +20,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SignedHeatError, SourceError
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
-from ..geometry.welding import roundoff, welded
+from ..geometry.welding import roundoff, same_positions, welded
 from ..memory import refuse_beyond_memory
 from ..operators.grid.fitted_points import mean_gap
 from ..orientation.meshes import orientation
@@ -398,4 +398,4 @@ def _some(surface: Surface, chosen: NDArray[np.bool_] | NDArray[np.int64], closi
 
 def _new_ids(triangles: NDArray[np.float64]) -> NDArray[np.int64]:
     """(m, 3) negative numbers, one for each position."""
-    return -1 - np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
+    return -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)

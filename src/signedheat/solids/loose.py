@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..geometry.components import connected_components
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
+from ..geometry.welding import same_positions
 from .parts import FRAGMENTS, face_areas, level
 
 COPY = 0.5
@@ -58,16 +59,32 @@ def clusters_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> li
     np.maximum.at(high, labels, triangles.max(axis=1))
     centres, radii = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low, axis=1)
     octaves = np.floor(np.log2(np.maximum(radii, 1e-300)))
-    one, other = [], []
-    for octave in np.unique(octaves):
-        here, below = np.flatnonzero(octaves == octave), np.flatnonzero(octaves <= octave)
-        pairs = scipy.spatial.cKDTree(centres[here]).sparse_distance_matrix(
-            scipy.spatial.cKDTree(centres[below]), 4 * REACH * 2.0**octave, output_type="coo_matrix"
-        )
-        i, j = here[pairs.row], below[pairs.col]
-        near = pairs.data < REACH * (radii[i] + radii[j])
+    groups = [
+        (octave, np.flatnonzero(octaves == octave), np.flatnonzero(octaves <= octave)) for octave in np.unique(octaves)
+    ]
+    one, other = [np.arange(n)], [np.arange(n)]
+
+    def join(i: NDArray[np.int64], j: NDArray[np.int64], apart: NDArray[np.float64]) -> None:
+        near = apart < REACH * (radii[i] + radii[j])
         one.append(i[near])
         other.append(j[near])
+
+    for octave, here, _ in groups:  # those in one cube, in which all belong together: most, so that few pairs are left
+        side = 2 * REACH * 2.0**octave / np.sqrt(3)
+        for thirds in np.ndindex(3, 3, 3):
+            with np.errstate(over="ignore"):
+                cubes = np.floor(centres[here] / side + np.array(thirds) / 3)
+            first = here[same_positions(cubes)]
+            join(here, first, np.linalg.norm(centres[here] - centres[first], axis=1))
+    known = connected_components(n, np.concatenate(one), np.concatenate(other))
+    rest = known != np.bincount(known).argmax()
+    for octave, here, below in groups:  # all pairs but those within the largest cluster
+        for some, others in ((here[rest[here]], below), (here[~rest[here]], below[rest[below]])):
+            if len(some) and len(others):
+                pairs = scipy.spatial.cKDTree(centres[some]).sparse_distance_matrix(
+                    scipy.spatial.cKDTree(centres[others]), 4 * REACH * 2.0**octave, output_type="coo_matrix"
+                )
+                join(some[pairs.row], others[pairs.col], pairs.data)
     clusters = connected_components(n, np.concatenate(one), np.concatenate(other))[labels]
     return np.split(np.argsort(clusters, kind="stable"), np.cumsum(np.bincount(clusters))[:-1])
 
