@@ -22,7 +22,7 @@ FLOORS = [
         "frozen",
         "memory",
     }
-    | {"packages", "parallel", "progress", "reprs"},
+    | {"jobs", "packages", "parallel", "progress", "reprs"},
     {"geometry"},
     {"linear"},
     {"operators"},

@@ -12,7 +12,7 @@ import signedheat as sh
 from refusals import refused
 from shapes.grid_cases import box, sphere
 from signedheat import parallel
-from signedheat.parallel import run_cancellable
+from signedheat.jobs import run_cancellable
 
 
 class Stop(Exception):

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import TypeVar
 
-from .parallel import run_cancellable
+from .jobs import run_cancellable
 
 Result = TypeVar("Result")
 

@@ -23,7 +23,7 @@ from signedheat import samples
 from signedheat.geometry import nearest
 from signedheat.io import files
 from signedheat.io.files import ensure_writable, replacing
-from signedheat.parallel import run_limited
+from signedheat.jobs import run_limited
 
 BALL = samples.sphere(1)
 posix = pytest.mark.skipif(os.name != "posix", reason="pipes and permissions of POSIX")

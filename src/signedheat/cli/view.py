@@ -14,8 +14,9 @@ from typing import Any
 import signedheat as sh
 
 from ..errors import FileFormatError, MissingPackageError
+from ..jobs import run_limited
 from .options import UP, Summary, command, is_quiet, option, positive, whole_number
-from .parts import inspection, parallel, samples, shapes
+from .parts import inspection, samples, shapes
 from .terminal import ProgressBar, say
 
 PATIENCE = 5.0
@@ -72,7 +73,7 @@ def display_answers() -> bool:
         library = ctypes.CDLL("libX11.so.6")
         library.XOpenDisplay.restype, library.XOpenDisplay.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
         library.XCloseDisplay.argtypes = [ctypes.c_void_p]
-        found = parallel.run_limited(lambda: library.XOpenDisplay(os.fsencode(name)), PATIENCE)
+        found = run_limited(lambda: library.XOpenDisplay(os.fsencode(name)), PATIENCE)
     except (OSError, TimeoutError):  # no such library, or a server that says nothing
         found = None
     if found:

@@ -456,7 +456,8 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     @property
     def surface_confidence(self) -> float | None:
         """Mean confidence at the nodes within a cell of the zero set, one number for the whole field; or None."""
-        near = np.abs(self.values) < float(self.grid.spacing.max())
+        cell = float(self.grid.spacing.max())
+        near = (self.values < cell) & (self.values > -cell)
         if self.confidence is None or not near.any():
             return None
         return float(self.confidence[near].mean(dtype=np.float64))

@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
+from ..jobs import run_limited
 from ..memory import available_memory
 from ..packages import require
-from ..parallel import run_limited
 
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
 from ..fields.redistancing import redistance
-from ..parallel import run_cancellable
+from ..jobs import run_cancellable
 from ..progress import Progress
 from .sharpen import sharpen_field
 

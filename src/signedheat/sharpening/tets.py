@@ -16,9 +16,9 @@ from ..domains.kinds import Shapes
 from ..errors import UnsupportedTypeError
 from ..fields.tet_field import TetField
 from ..geometry.marching_tets import level_triangles
+from ..jobs import run_cancellable
 from ..lowering.tets.discretization import TetDiscretization, lowered_tets
 from ..operators.linear_elements import LinearElements
-from ..parallel import run_cancellable
 from ..progress import Progress
 from ..solids.joining import Shape
 from .methods import straight_distance

@@ -15,9 +15,9 @@ from ..errors import SourceError
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.marching_tets import level_triangles
+from ..jobs import run_cancellable
 from ..lowering.tets.discretization import TetDiscretization
 from ..operators.linear_elements import LinearElements
-from ..parallel import run_cancellable
 from ..progress import Progress
 from ..solids.joining import Shape, joined_triangles
 from .tet_distance import Surface, distance_around
