@@ -139,7 +139,7 @@ def plate(
     Lid or None
         None where no plate that is not higher than `HIGHEST` is at rest.
     """
-    n, film = lid.n_rim, lid
+    n, start = lid.n_rim, lid
     if n == len(lid.vertices):
         return lid
     rim = lid.vertices[:n]
@@ -165,7 +165,7 @@ def plate(
             rises = ((vertices - lid.vertices) * up).sum(axis=1)  # what slides along the surface does not change it
             rise = float(np.abs(rises).max())
             lid = Lid(lid.vertices + min(1.0, furthest / max(rise, 1e-300)) * rises[:, None] * up, lid.faces, n)
-            if np.linalg.norm(lid.vertices - film.vertices, axis=1).max() > HIGHEST * width:
+            if np.linalg.norm(lid.vertices - start.vertices, axis=1).max() > HIGHEST * width:
                 return None
             furthest = SHORTER * min(rise, furthest)
     return lid
