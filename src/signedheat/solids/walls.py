@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .lids import area_vector, cut_to_pieces
 from .parts import face_areas, parts_of
-from .rims import OPPOSITE, loops, open_edges
+from .rims import loops, open_edges
 
 NARROW = 0.3
 """Area of a strip at right angles to the surface at both rims, over that of flat lids on both, up to which it closes
@@ -70,8 +70,8 @@ class _Rim:
         What ends there.
     centre, radius : (3,) float, float
         A ball around it.
-    lid : float
-        Area of a flat lid.
+    opening : (3,) float
+        Area vector of a lid.
     """
 
     ids: NDArray[np.int64]
@@ -80,7 +80,7 @@ class _Rim:
     part: int
     centre: NDArray[np.float64]
     radius: float
-    lid: float
+    opening: NDArray[np.float64]
 
     @classmethod
     def of(cls, ids: NDArray[np.int64], vertices: NDArray[np.float64], behind: NDArray[np.float64], part: int) -> _Rim:
@@ -91,19 +91,19 @@ class _Rim:
         away /= np.maximum(np.linalg.norm(away, axis=1), 1e-300)[:, None]
         centre = corners.mean(axis=0)
         radius = float(np.linalg.norm(corners - centre, axis=1).max())
-        return cls(ids, corners, away, part, centre, radius, float(np.linalg.norm(area_vector(corners))))
+        return cls(ids, corners, away, part, centre, radius, area_vector(corners))
 
 
 def facing(rims: list[_Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """Pairs of rims of parts with these areas, each with the narrowest strip to the other, and narrow enough."""
+    """Pairs of rims that run opposite ways, of parts with these areas: the strip between them is narrow enough."""
     centres, widths = np.array([rim.centre for rim in rims]), []
     for i, near in enumerate(scipy.spatial.cKDTree(centres).query_ball_point(centres, [rim.radius for rim in rims])):
         one = rims[i]
         for j in near:
             other = rims[j]
-            if (other.radius, j) >= (one.radius, i):  # once, from the larger one
+            if (other.radius, j) >= (one.radius, i) or one.opening @ other.opening >= 0:  # once, from the larger one
                 continue
-            lids = one.lid + other.lid
+            lids = float(np.linalg.norm(one.opening) + np.linalg.norm(other.opening))
             if lids > LARGE * areas[np.unique([one.part, other.part])].sum():
                 (area, onward), (again, back) = _way(one, other), _way(other, one)
                 if area + again <= 2 * lids * (NARROW + (1 - NARROW) * (onward + back) / max(area + again, 1e-300)):
@@ -116,7 +116,7 @@ def facing(rims: list[_Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]
 
 
 def _way(rim: _Rim, other: _Rim) -> tuple[float, float]:
-    """Area between a rim and another, infinite unless that runs the opposite way; how much of it goes straight on."""
+    """Area between a rim and another; how much of it goes straight on."""
     along = np.roll(rim.corners, -1, axis=0) - rim.corners
     lengths = np.linalg.norm(along, axis=1)
     places = cut_to_pieces(other.corners)
@@ -125,8 +125,6 @@ def _way(rim: _Rim, other: _Rim) -> tuple[float, float]:
     base /= np.maximum(steps, 1e-300)[:, None]
     middles = rim.corners + 0.5 * along
     nearest = scipy.spatial.cKDTree(places).query(middles)[1]
-    if (along * base[nearest]).sum() > OPPOSITE * lengths.sum():
-        return np.inf, 0.0
     way = places[nearest] - middles
     way -= np.clip((way * base[nearest]).sum(axis=1), -steps[nearest], steps[nearest])[:, None] * base[nearest]
     return float(lengths @ np.linalg.norm(way, axis=1)), float(lengths @ (way * rim.onward).sum(axis=1))
