@@ -140,10 +140,13 @@ def dual_cells(
             ways[cells[order], faces[order]] = way[:, None]
             pieces = _pieces(edges, ways)
             around = pieces[cells[:, None], _face_edges(faces)]
-            one = (around == around[:, :1]).all(axis=1)[order].all(axis=1)
-            if not one.any():
+            double = np.flatnonzero((around == around[:, :1]).all(axis=1)[order].all(axis=1))
+            if not len(double):
                 break
-            way[one] ^= True
+            # one face of a cell at a time: each divides the pieces of both cells, two together may join them again
+            first_of = np.full(len(places), len(order))
+            np.minimum.at(first_of, cells[order[double]], double[:, None])
+            way[double[(first_of[cells[order[double]]] == double[:, None]).all(axis=1)]] ^= True
     owners = np.empty(int(pieces.max(initial=-1)) + 1, dtype=np.int64)
     at, side = np.nonzero(edges >= 0)
     owners[pieces[at, side]] = at
