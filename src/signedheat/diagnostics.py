@@ -1,0 +1,461 @@
+"""Diagnostics of the computation of a field, and one class for each kind of note in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .frozen import Frozen
+from .reprs import ShortRepr
+
+SMALL = 0.005
+"""Fraction of the surface that may be completed, or bound nothing, without being important."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Note(Frozen, ShortRepr):
+    """A note on a computation; ``str(note)`` is its text."""
+
+    @property
+    def important(self) -> bool:
+        """Whether it should be read before the result is trusted: commands print it."""
+        return False
+
+    def as_dict(self) -> dict[str, object]:
+        """The values of the note by name, ready for JSON."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values.items()}
+
+
+AnyNote = TypeVar("AnyNote", bound=Note)
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnostics(ShortRepr):
+    """Timings, diffusion time, and notes on the computation of a field.
+
+    Attributes
+    ----------
+    timings : mapping of str to float
+        Seconds per step.
+    time : float
+        Diffusion time t, in squared units of length.
+    unreached : (k,) int
+        Unknowns that are connected to no source; φ is NaN there.
+    notes : tuple of Note
+        Residuals, repairs, subdivisions, dropped parts of sources; `note` finds one by its type.
+
+    Examples
+    --------
+    >>> diagnostics = Diagnostics().noting(TetsTurned(3), SlopeErrors(0.2, 0.1))
+    >>> print(diagnostics.note(TetsTurned))
+    tets turned: 3
+    >>> diagnostics.note(LargeAngles) is None
+    True
+    """
+
+    timings: Mapping[str, float] = field(default_factory=dict)
+    time: float = float("nan")
+    unreached: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def important(self) -> list[Note]:
+        """Notes to read before the result is trusted."""
+        return [note for note in self.notes if note.important]
+
+    def note(self, kind: type[AnyNote]) -> AnyNote | None:
+        """The note of a given type, or None."""
+        return next((note for note in self.notes if isinstance(note, kind)), None)
+
+    def noting(self, *notes: Note) -> Diagnostics:
+        """The same with further notes, each replacing an older one of the same type."""
+        kinds = {type(note) for note in notes}
+        return replace(self, notes=(*(note for note in self.notes if type(note) not in kinds), *notes))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SampledSource(Note):
+    """The source on a grid, merged in its cells: number of samples, fractions of the area outside and cancelled."""
+
+    samples: int
+    area_outside: float
+    area_cancelled: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.samples} samples of the source; {self.area_outside:.3g} of its area lies outside the grid, "
+            f"{self.area_cancelled:.3g} cancels"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OutsideMesh(Note):
+    """Sources that leave the tet mesh: their indices, and the fraction of the area of each that is dropped."""
+
+    sources_outside: NDArray[np.int64]
+    area_left_out: NDArray[np.float64]
+
+    def __str__(self) -> str:
+        shares = zip(self.sources_outside, self.area_left_out, strict=True)
+        return "; ".join(f"source {k} outside the mesh: {100 * part:.3g} % of its area, left out" for k, part in shares)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ShapeOriented(Note):
+    """How the faces of a shape were oriented; fractions are of its area. The values are those of `Orientation`."""
+
+    turned_faces: int
+    turned_area: float
+    turned_parts: int
+    merged_faces: int
+    nonorientable_parts: int
+    undecided_area: float
+    doubled_walls: int
+    nested_bodies: int
+    cavities: int
+
+    @property
+    def important(self) -> bool:
+        return self.turned_faces > 0 or self.merged_faces > 0
+
+    def __str__(self) -> str:
+        texts = [
+            (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.1%} of the area"),
+            (self.merged_faces, f"duplicate faces merged: {self.merged_faces}"),
+            (self.nonorientable_parts, f"parts that cannot be oriented: {self.nonorientable_parts}"),
+            (self.doubled_walls, f"doubled walls: {self.doubled_walls}"),
+            (self.nested_bodies, f"bodies hidden in others: {self.nested_bodies}"),
+            (self.cavities, f"cavities: {self.cavities}"),
+            (self.undecided_area, f"sheets without an inside: {self.undecided_area:.1%} of the area"),
+        ]
+        return "; ".join(text for value, text in texts if value) or "faces are oriented as they were given"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OrientedPoints(Note):
+    """Number of normals of a point cloud that were fitted, and that were turned."""
+
+    normals_fitted: int
+    normals_turned: int
+
+    @property
+    def important(self) -> bool:
+        return self.normals_fitted > 0 or self.normals_turned > 0
+
+    def __str__(self) -> str:
+        return f"{self.normals_fitted} normals fitted, {self.normals_turned} turned"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LeftOut(Note):
+    """What a union leaves out of a shape.
+
+    Attributes
+    ----------
+    covered_faces : int
+        Faces, or points, that lie inside other bodies, wholly or in part.
+    covered_area : float
+        Their fraction of the area, as far as they do.
+    cut_faces : int
+        Those that lie inside in part, and were cut.
+    merged_faces : int
+        Duplicates.
+    doubled_walls : int
+        Faces that are there twice, once facing each way; they stay, unless they lie inside a body.
+    """
+
+    covered_faces: int = 0
+    covered_area: float = 0.0
+    cut_faces: int = 0
+    merged_faces: int = 0
+    doubled_walls: int = 0
+
+    @property
+    def important(self) -> bool:
+        return self.covered_faces > 0
+
+    def __str__(self) -> str:
+        return (
+            f"left out: {self.covered_faces} faces, {self.covered_area:.1%} of the area, that lie inside other bodies "
+            f"({self.cut_faces} of them in part), and {self.merged_faces} duplicates"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FacesRestored(Note):
+    """Number of faces that were lost between vertices which are there, and are put back; their share of the area."""
+
+    restored_faces: int
+    restored_area: float
+
+    @property
+    def important(self) -> bool:
+        return True
+
+    def __str__(self) -> str:
+        return f"lost faces restored: {self.restored_faces}, {self.restored_area:.1%} of the area"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SharpenedToShape(Note):
+    """Fraction of the zero set's triangles that distance is measured to, where the shape has no faces."""
+
+    completed_zero_set: float
+
+    def __str__(self) -> str:
+        return f"{self.completed_zero_set:.1%} of the zero set completes the shape"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CompletedArea(Note):
+    """How much of the surface of a solid is its completion, not a face that was given.
+
+    Attributes
+    ----------
+    completed_area : float
+        Area of the completion, in squared units of length.
+    completed_share : float
+        The same, over the area of the whole surface.
+    where : (k, 2, d) float
+        Lower and upper corners of boxes around it.
+    """
+
+    completed_area: float
+    completed_share: float
+    where: NDArray[np.float64]
+
+    @property
+    def important(self) -> bool:
+        return self.completed_share > SMALL
+
+    def __str__(self) -> str:
+        text = f"{self.completed_share:.1%} of the surface is completed"
+        if not len(self.where):
+            return text
+        lower, upper = ("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in self.where[0])
+        return f"{text}, most of it between {lower} and {upper}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BoundsNothing(Note):
+    """Fraction of the area that has the same side on both sides: distance to it is positive all around."""
+
+    open_area: float
+
+    @property
+    def important(self) -> bool:
+        return self.open_area > SMALL
+
+    def __str__(self) -> str:
+        return f"{self.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TetsTurned(Note):
+    """Number of tets given with negative volume, which have been turned."""
+
+    tets_turned: int
+
+    def __str__(self) -> str:
+        return f"tets turned: {self.tets_turned}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EdgesLengthened(Note):
+    """Length that mollification has added to every edge, so that no triangle is flat."""
+
+    added_to_edge_lengths: float
+
+    def __str__(self) -> str:
+        return f"added to edge lengths: {self.added_to_edge_lengths:.3g}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LargeAngles(Note):
+    """Fraction of angles above 120°, if it is 1 % or more: an intrinsic triangulation is then more accurate."""
+
+    large_angles: float
+
+    def __str__(self) -> str:
+        return f"{self.large_angles:.0%} of the angles exceed 120°"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class WithoutLength(Note):
+    """Curves that were left out, by number, since all points of each coincide: a click where a stroke was meant."""
+
+    without_length: NDArray[np.int64]
+
+    def __str__(self) -> str:
+        return f"curves without length left out: {', '.join(map(str, self.without_length))}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SmallLoops(Note):
+    """Number of closed curves that are smaller than a few triangles, to which the method is inaccurate."""
+
+    small_loops: int
+
+    def __str__(self) -> str:
+        return f"closed curves smaller than a few triangles: {self.small_loops}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class VerticesAdded(Note):
+    """Number of vertices added so that sources run along edges."""
+
+    vertices_added: int
+
+    def __str__(self) -> str:
+        return f"vertices added for sources: {self.vertices_added}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IntrinsicTriangles(Note):
+    """The intrinsic triangulation on which distance was computed: summary of its angles."""
+
+    intrinsic_triangulation: str
+
+    def __str__(self) -> str:
+        return f"intrinsic triangulation: {self.intrinsic_triangulation}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PointsLeftOut(Note):
+    """Points of a cloud that coincide with earlier ones, and points without a triangle."""
+
+    duplicate_points: int
+    points_without_triangles: NDArray[np.int64]
+
+    def __str__(self) -> str:
+        return f"{self.duplicate_points} duplicate points; {len(self.points_without_triangles)} without triangles"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlopeErrors(Note):
+    """Root mean square of ``|∇φ| − 1`` over the domain, before and after sharpening.
+
+    Attributes
+    ----------
+    slope_error_before, slope_error_after : float
+        The two.
+    worse : bool
+        Whether the slopes of most of the domain became worse, so that the field before is the better distance. Cells
+        without height and the kinks that every distance has do not count: they may raise the root mean square.
+    """
+
+    slope_error_before: float
+    slope_error_after: float
+    worse: bool = False
+
+    def __str__(self) -> str:
+        found = f"slope error before: {self.slope_error_before:.3g}; after: {self.slope_error_after:.3g}"
+        return found + ("; the field before is the better distance" if self.worse else "")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SharpenedToCurves(Note):
+    """What distance of a field sharpened to curves is measured to, and what decided its sign.
+
+    Attributes
+    ----------
+    completed_length : float
+        Fraction of what distance is measured to that is zero set of φ, standing in for missing curve.
+    free_ends : int
+        Ends of oriented curves, but for those at the boundary of the surface, and points where curves run head to head.
+    sides_by_curves : float
+        Fraction of the vertices whose sign the curves decide by themselves; φ decides that of the others.
+    """
+
+    completed_length: float
+    free_ends: int
+    sides_by_curves: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.completed_length:.1%} of the curve completed between {self.free_ends} free ends; "
+            f"curves decide the sign of {self.sides_by_curves:.1%} of the vertices"
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GeodesicWindows(Note):
+    """Number of windows in the exact polyhedral distance.
+
+    Attributes
+    ----------
+    windows : int
+        Their number, a measure of the work.
+    cut_short : bool
+        Whether there were so many that some distances are lengths of paths along edges instead of shortest ones.
+    """
+
+    windows: int
+    cut_short: bool = False
+
+    def __str__(self) -> str:
+        return f"windows: {self.windows}" + ("; some distances are along edges, too long" if self.cut_short else "")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RoundCorners(Note):
+    """Number of vertices whose path to the zero set bends around the boundary of the mesh."""
+
+    round_corners: int
+
+    def __str__(self) -> str:
+        return f"round corners: {self.round_corners}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConvexRounds(Note):
+    """Number of iterations and final residual of the convex method of sharpening."""
+
+    rounds: int
+    residual: float
+
+    def __str__(self) -> str:
+        return f"{self.rounds} rounds, residual {self.residual:.3g}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Jumps(Note):
+    """Objective of a piecewise distance with its lower bound, and the size of its jumps.
+
+    Attributes
+    ----------
+    objective : float
+        The objective of Eq. 16, before what jumps off the cut was smoothed.
+    least : float
+        The least that was found, before jumps were concentrated: `objective` itself where they were not.
+    bound, gap : float
+        A lower bound of the objective, and the relative difference of `least` and it.
+    rounds : int
+        Number of iterations.
+    continuous : bool
+        Whether there is no cut.
+    largest_jump, cut_length : float
+        The largest jump, and the total length of all cuts.
+    integration_error : float
+        Root mean square of ∇φ̄ − Y, φ̄ being φ averaged at the vertices of `PiecewiseField.split`.
+    """
+
+    objective: float
+    least: float
+    bound: float
+    gap: float
+    rounds: int
+    continuous: bool
+    largest_jump: float
+    cut_length: float
+    integration_error: float
+
+    def __str__(self) -> str:
+        cut = "continuous" if self.continuous else f"cuts of length {self.cut_length:.3g}"
+        given = f"{self.objective / self.least - 1:.2%} above it" if self.objective > self.least > 0 else "reached"
+        return f"{cut}; least objective found within {self.gap:.2%}, {given}"
