@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from signedheat.geometry.signed_graph import Links, best_signs, signs_of
-from signedheat.orientation.plane_fit_kernels import least_eigenvector
-from signedheat.orientation.plane_fits import CLEAN_NEIGHBORS, fit_planes, noise_scale
-from signedheat.orientation.thinning import spread_out
+from signedheat.orientation.axes import spread_out
+from signedheat.orientation.plane_fits import CLEAN_NEIGHBORS, fit_planes, least_eigenvector, noise_scale
 
 
 def random_pairs(rng, n, m):
