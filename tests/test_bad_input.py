@@ -201,7 +201,7 @@ def test_sharpen(arguments, keywords, error):
 
 
 def test_methods_are_for_surfaces_and_tets():
-    with pytest.raises(TypeError):
+    with refused(sh.errors.UnsupportedTypeError):
         sh.sharpen(sh.GridField(GRID, ROUND), method=sh.Convex())
 
 

@@ -199,7 +199,7 @@ def test_the_convex_method_stays_bounded_where_the_field_is_constant(scale):
         assert np.abs(field.values).max() < scale
         tiny = sh.VertexField(mesh, np.array([0, 1, -1, 2, -2]) * 1e-95 * scale, source=field.source)
         for made in (field, tiny):
-            assert np.abs(sh.sharpen(made, sh.Convex()).values).max() < 10 * scale
+            assert np.abs(sh.sharpen(made, method=sh.Convex()).values).max() < 10 * scale
 
 
 @pytest.mark.parametrize("origin", [1e16, -1e16, 1e20])
@@ -251,7 +251,7 @@ def test_convex_sharpening_on_tets_holds_sources_of_any_size(area):
     middle = mesh.vertices.mean(axis=0) + np.array([0.01, 0.02, 0.03])
     patch = sh.TriangleMesh(middle + size * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.1]]), [[0, 1, 2]])
     phi = sh.SignedHeatSolver(mesh).distance(patch)
-    sharp = sh.sharpen(phi, sh.Convex(max_rounds=20))
+    sharp = sh.sharpen(phi, method=sh.Convex(max_rounds=20))
     assert np.abs(sharp.values).max() < 3 * np.linalg.norm(np.ptp(mesh.vertices, axis=0))
 
 

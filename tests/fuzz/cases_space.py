@@ -141,7 +141,7 @@ def check_tets(given: Subject) -> str:
     size = size_of(np.stack([domain.vertices.min(axis=0), domain.vertices.max(axis=0)]), asked)
     judge(phi.values[np.unique(domain.tets)], warned, size * len(cells), "tets")
     if chance(random, 0.5):
-        sharp, _ = announced(lambda: sh.sharpen(phi, one_of(random, (None, sh.Convex(max_rounds=30)))))
+        sharp, _ = announced(lambda: sh.sharpen(phi, method=one_of(random, (None, sh.Convex(max_rounds=30)))))
         judge(sharp.values[~np.isnan(phi.values)], False, size * len(cells), "sharpened")
     return "in part" if warned else "tets"
 

@@ -193,7 +193,7 @@ def check_use(given: Subject) -> str:
     kind = int(random.integers(6))
     if kind < 2:
         method = one_of(random, (None, sh.Geodesic(), sh.Convex(max_rounds=30)))
-        sharp, _ = announced(lambda: sh.sharpen(phi, method))
+        sharp, _ = announced(lambda: sh.sharpen(phi, method=method))
         lost = np.isnan(sharp.values) & ~np.isnan(phi.values)
         judge(sharp.values[~np.isnan(phi.values)], False, size, f"sharpened by {method}")
         return "sharpened" if not lost.any() else "sharpened in part"

@@ -34,7 +34,7 @@ def test_a_cube_is_exact_at_its_edges_too(tets):
     assert np.abs(sharp.values - exact).max() < 1e-12
     assert rms(sh.sharpen(field).values - exact) > 1e-3
     assert sharp.diagnostics.note(SharpenedToShape).completed_zero_set == 0
-    assert np.array_equal(sh.sharpen(field, shape=[cube(0.83)]).values, sharp.values)
+    assert np.array_equal(sh.sharpen(field, source=[cube(0.83)]).values, sharp.values)
 
 
 def test_solids_on_tets_are_measured_to_the_shape(tets):
@@ -86,7 +86,7 @@ def test_points_and_methods_beside_shapes_are_refused(tets):
     with refused(SourceError, "shape"):
         sh.sharpen(field, cloud)
     with refused(UnsupportedTypeError):
-        sh.sharpen(field, sh.Convex(), shape=cube(0.8))
+        sh.sharpen(field, cube(0.8), method=sh.Convex())
 
 
 def test_it_can_be_cancelled(tets):

@@ -423,5 +423,5 @@ def test_a_field_that_became_worse_is_told():
     mesh = sphere(2)
     plain = sh.SignedHeatSolver(mesh).distance(mesh.level_set(latitudes(mesh.vertices)))
     with pytest.warns(sh.errors.InexactWarning):
-        sharp = sh.sharpen(plain, Doubled())
+        sharp = sh.sharpen(plain, method=Doubled())
     assert sharp.diagnostics.note(SlopeErrors).worse

@@ -55,7 +55,7 @@ assert_type(tets, sh.TetMesh)
 assert_type(sh.signed_distance(mesh, tets), sh.TetField)
 in_tets = sh.SignedHeatSolver(tets).distance([mesh], sh.Free())
 assert_type(in_tets.offset(0.1), sh.TriangleMesh)
-assert_type(sh.sharpen(in_tets, sh.Convex()), sh.TetField)
+assert_type(sh.sharpen(in_tets, method=sh.Convex()), sh.TetField)
 
 # --- on surfaces
 curve = mesh.path([0, 1])

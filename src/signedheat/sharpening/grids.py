@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..errors import GeometryError
+from ..discretization import SourceTerm
+from ..domains.grid import Grid
+from ..errors import GeometryError, UnsupportedTypeError
 from ..fields.grid_field import GridField
 from ..fields.redistancing import redistance
 from ..jobs import run_cancellable
 from ..progress import Progress
-from .sharpen import sharpen_field
+from .methods import Nearest, distance_to_nearest, nearest
+from .sharpen import Method, sharpen_field, timed
 
 
 @sharpen_field.register
-def _(field: GridField, *, progress: Progress | None = None) -> GridField:
+def _(field: GridField, source: object, method: Method | None, progress: Progress | None) -> GridField:
     """Distance of every node to the zero set, that of `redistance`; signs stay as they are."""
+    if source is not None or method is not None:
+        raise UnsupportedTypeError(
+            "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
+        )
     if not np.isfinite(field.values).all():
         raise GeometryError(
             "a field around solid nodes, or with parts that no source reaches, cannot be sharpened: straight lines to "
@@ -25,12 +33,19 @@ def _(field: GridField, *, progress: Progress | None = None) -> GridField:
             remedy="use it as it is",
             element="field",
         )
-    report = None if progress is None else lambda: progress(0.0, "sharpen")
-    if report is not None:
-        report()
-    begin = time.perf_counter()
-    values = run_cancellable(lambda: redistance(field.values, field.grid.spacing), report)
-    if progress is not None:
-        progress(1.0, "done")
-    timings = {**field.diagnostics.timings, "sharpen": time.perf_counter() - begin}
-    return GridField(field.grid, values, replace(field.diagnostics, timings=timings))
+    run = partial(distance_to_nearest, field.grid, field.values, None, None, 0.0, progress)
+    values, diagnostics = timed(run, field.diagnostics, progress)
+    return GridField(field.grid, values, diagnostics)
+
+
+@nearest.register
+def _(
+    grid: Grid,
+    values: NDArray[np.float64],
+    source: SourceTerm | None,
+    given: None,
+    tolerance: float,
+    report: Callable[[], None] | None,
+) -> Nearest:
+    distances = run_cancellable(lambda: redistance(values, grid.spacing), report)
+    return Nearest(np.abs(distances), np.sign(distances).astype(np.int64))

@@ -1,6 +1,6 @@
-"""Methods of sharpening on surfaces and tets (Sec. 7.3).
+"""Methods of sharpening (Sec. 7.3): distance to the nearest of a source and the zero set of φ, and a convex problem.
 
-The error of the heat method is smooth and decreases slowly under refinement. Both methods here remove most of it.
+The error of the heat method is smooth and decreases slowly under refinement. Both methods remove most of it.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import singledispatch
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,82 @@ from ..discretization import Discretization, SourceTerm
 from ..domains.validation import finite_number, positive_number
 from ..errors import OutsideError, SignedHeatError, SourceError, UnsupportedTypeError
 from ..lowering.direct_integration import DirectIntegration
-from ..lowering.surface.source import SurfaceSource
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """The nearest of a source and of the zero set of φ, for each unknown.
+
+    Attributes
+    ----------
+    distances : (n,) float
+        Without sign; inf where neither is in the same component of the domain.
+    sides : (n,) int
+        1 or −1 where the source decides the sign; 0 where φ does.
+    notes : tuple of Note
+        For the diagnostics.
+    """
+
+    distances: NDArray[np.float64]
+    sides: NDArray[np.int64]
+    notes: tuple[Note, ...] = ()
+
+
+@singledispatch
+def nearest(
+    domain: Any,
+    values: NDArray[np.float64],
+    source: SourceTerm | None,
+    given: Any,
+    tolerance: float,
+    report: Callable[[], None] | None,
+) -> Nearest:
+    """Measure to the nearest of a source and the zero set of φ; every kind of domain registers a function of its own.
+
+    Parameters
+    ----------
+    domain : Grid or Discretization
+        What φ lives on.
+    values : (n,) float
+        φ at the unknowns.
+    source : SourceTerm, optional
+        What φ was computed from: unoriented curves and points are measured to though φ does not vanish there.
+    given : curves, points or shapes, optional
+        What is measured to exactly; the zero set counts where these are missing. By default the zero set alone.
+    tolerance : float
+        Of polyhedral distance, see `Geodesic`.
+    report : callable, optional
+        Called every now and then; an exception that it raises ends the search.
+    """
+    raise UnsupportedTypeError(f"there are no straight lines on a {type(domain).__name__}", element="method")
+
+
+def distance_to_nearest(
+    domain: Any,
+    values: NDArray[np.float64],
+    source: SourceTerm | None,
+    given: Any,
+    tolerance: float,
+    progress: Progress | None,
+) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+    """Signed distance to the nearest of a source and the zero set, for all domains; and notes.
+
+    The source decides the sign where it can, φ elsewhere. Components with neither keep the values of φ.
+    """
+    report = None if progress is None else lambda: progress(0.0, "sharpen")
+    found = nearest(domain, values, source, given, tolerance, report)
+    reached = np.isfinite(found.distances)
+    if not reached.any():
+        raise OutsideError(
+            "the field has one sign everywhere, hence no zero set to measure from",
+            remedy="add an offset to its values, or use method=Convex(), which measures from the source "
+            "that it was computed from",
+        )
+    distances = np.where(reached, found.distances, np.abs(values))
+    signed = np.copysign(distances, np.where(found.sides != 0, found.sides, values))
+    return np.where(np.isnan(values), np.nan, signed), found.notes
 
 
 @dataclass(frozen=True)
@@ -63,34 +137,8 @@ class Geodesic:
         source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-        """Distances with the signs of φ; connected components without a zero set keep their values."""
-        report = None if progress is None else lambda: progress(0.0, "sharpen")
-        distance, notes = straight_distance(discretization, values, source, self.tolerance, report)
-        if not np.isfinite(distance).any():
-            raise OutsideError(
-                "the field has one sign everywhere, hence no zero set to measure from",
-                remedy="add an offset to its values, or use method=Convex(), which measures from the source "
-                "that it was computed from",
-            )
-        distance = np.where(np.isfinite(distance), distance, np.abs(values))
-        unsided = isinstance(source, SurfaceSource) and not source.oriented
-        sides = np.ones_like(values) if unsided else values
-        return np.where(np.isnan(values), np.nan, np.copysign(distance, sides)), notes
-
-
-@singledispatch
-def straight_distance(
-    discretization: object,
-    values: NDArray[np.float64],
-    source: SourceTerm | None,
-    tolerance: float,
-    report: Callable[[], None] | None,
-) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-    """Distance of every unknown from the zero set of `values`, inf where there is none in its component; and notes.
-
-    `report` is called every now and then; an exception that it raises ends the search.
-    """
-    raise UnsupportedTypeError(f"there are no straight lines on a {type(discretization).__name__}", element="method")
+        """Distances with the signs of φ."""
+        return distance_to_nearest(discretization, values, source, None, self.tolerance, progress)
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
-from functools import singledispatch
-from typing import Protocol, TypeVar, overload, runtime_checkable
+from functools import partial, singledispatch
+from typing import Any, Protocol, TypeVar, overload, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
-from .methods import Geodesic
+from .methods import Geodesic, distance_to_nearest
 
 
 @runtime_checkable
@@ -43,25 +44,36 @@ class Method(Protocol):
 WORSE = 0.1
 """Mean deviation of slopes from 1, none counted above 1, that sharpening may add. Triangles on their own have .08."""
 
-AnyField = TypeVar("AnyField", bound=VertexField | TetField)
+TO_CURVES = 1e-5
+"""Tolerance of distance to curves: at a tenth of that of `Geodesic`, it changes by less than 1e-6 of its range with the
+order of faces."""
+
 OnSurface = TypeVar("OnSurface", bound=VertexField)
 
 
 @overload
+def sharpen(field: GridField[Dimension], *, progress: Progress | None = None) -> GridField[Dimension]: ...
+@overload
 def sharpen(
-    field: GridField[Dimension],
+    field: OnSurface,
+    source: CurvesAndPoints | None = None,
     *,
+    method: Method | None = None,
     progress: Progress | None = None,
-) -> GridField[Dimension]: ...
+) -> OnSurface: ...
 @overload
-def sharpen(field: OnSurface, curves: CurvesAndPoints, *, progress: Progress | None = None) -> OnSurface: ...
-@overload
-def sharpen(field: TetField, shape: Shapes, *, progress: Progress | None = None) -> TetField: ...
-@overload
-def sharpen(field: AnyField, method: Method | None = None, progress: Progress | None = None) -> AnyField: ...
+def sharpen(
+    field: TetField, source: Shapes | None = None, *, method: Method | None = None, progress: Progress | None = None
+) -> TetField: ...
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
-def sharpen(field: Field, *arguments: object, **options: object) -> Field:
+def sharpen(
+    field: Field,
+    source: CurvesAndPoints | Shapes | None = None,
+    *,
+    method: Method | None = None,
+    progress: Progress | None = None,
+) -> Field:
     """Replace a field by the distance to its own zero set, or to what it was computed from.
 
     This is Section 7.3 of the paper.
@@ -70,13 +82,13 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     itself is that of `complete`.
 
     On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
-    smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With
-    ``curves``: exact distance to the curves and points themselves, however they cross the faces. In regions that curves
+    smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With a
+    `source`: exact distance to the curves and points themselves, however they cross the faces. In regions that curves
     bound, these decide the side; elsewhere the field does, and its zero set replaces missing curve where it is
     farther from any curve than the triangles are large, or begins at the free end of one.
 
     On tets: distance along straight lines in space, which bend around the boundary of the mesh, to the zero set. With a
-    ``shape``: to the faces of the shape, exactly, and to the zero set where it is farther than one and a half edges
+    `source`: to the faces of the shape, exactly, and to the zero set where it is farther than one and a half edges
     from any. Within two edges of a face the face decides the side, where the surface is closed there.
 
     On surfaces and tets ``method=Convex()`` is the method of the paper, which is less accurate but can correct wrong
@@ -87,12 +99,11 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     ----------
     field : GridField, VertexField or TetField
         From `signed_distance` or `SignedHeatSolver.distance`.
-    shape : TriangleMesh or PolygonMesh, or a sequence of them, optional
-        On tets: what the field was computed from, oriented, and without parts inside others.
-    curves : Curve, SurfacePoints or a sequence of them, optional
-        On surfaces: what the field was computed from.
+    source : curves and points, or meshes, optional
+        What the field was computed from. On surfaces `Curve`, `SurfacePoints` or a sequence of them; on tets
+        `TriangleMesh`, `PolygonMesh` or a sequence of them, oriented, and without parts inside others.
     method : Geodesic or Convex, optional
-        On surfaces and tets only.
+        On surfaces and tets, without a source.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
@@ -109,11 +120,11 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     UnsupportedTypeError
         If this kind of field cannot be sharpened, or not by this method.
     OutsideError
-        If the field has the same sign everywhere, or is NaN everywhere; with a shape, if that has no faces besides.
+        If the field has the same sign everywhere, or is NaN everywhere; with a source, if that has no faces besides.
     GeometryError
         If a value is infinite, or there is not one value for each vertex.
     SourceError
-        If the shape is none that the field can be sharpened to, or a cloud without normals.
+        If the source is none that the field can be sharpened to.
 
     Examples
     --------
@@ -125,11 +136,11 @@ def sharpen(field: Field, *arguments: object, **options: object) -> Field:
     >>> bool(np.abs(sharpened.values - (radius - 0.5)).max() < 0.01)
     True
     """
-    return sharpen_field(field, *arguments, **options)
+    return sharpen_field(field, source, method, progress)
 
 
 @singledispatch
-def sharpen_field(field: object, *arguments: object, **options: object) -> Field:
+def sharpen_field(field: object, source: Any, method: Method | None, progress: Progress | None) -> Field:
     """Sharpen a field; every kind of field registers a function of its own. `sharpen` is the public function."""
     raise UnsupportedTypeError(
         f"a {type(field).__name__} cannot be sharpened",
@@ -142,10 +153,15 @@ def sharpened(
     discretization: Discretization,
     elements: LinearElements,
     values: NDArray[np.float64],
+    source: Any,
     method: Method | None,
     progress: Progress | None,
 ) -> tuple[NDArray[np.float64], Diagnostics]:
     """Sharpened values of a field on a surface or on tets, and diagnostics with the slope errors before and after."""
+    if source is not None and method is not None:
+        raise UnsupportedTypeError(
+            "a method measures to the zero set alone", remedy="leave out the method or the source", element="method"
+        )
     method = Geodesic() if method is None else method
     if isinstance(method, type) or not isinstance(method, Method):
         raise UnsupportedTypeError(
@@ -164,16 +180,27 @@ def sharpened(
             remedy="compute it anew",
             element=f"vertex {np.flatnonzero(np.isinf(values))[0]}",
         )
-    begin = time.perf_counter()
-    if progress is not None:
-        progress(0.0, "sharpen")
-    new, notes = method.sharpened(discretization, elements, values, field.source, progress)
-    if progress is not None:
-        progress(1.0, "done")
-    old = field.diagnostics
+    if source is None:
+        run = partial(method.sharpened, discretization, elements, values, field.source, progress)
+    else:
+        run = partial(distance_to_nearest, discretization, values, field.source, source, TO_CURVES, progress)
+    new, diagnostics = timed(run, field.diagnostics, progress)
     worse = elements.bounded_slope_error(new) > 1.5 * elements.bounded_slope_error(values) + WORSE
     errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new), worse)
     if worse:
         warn_user(f"sharpening made the field worse: {errors}", InexactWarning)
-    timings = {**old.timings, "sharpen": time.perf_counter() - begin}
-    return new, replace(old, timings=timings).noting(errors, *notes)
+    return new, diagnostics.noting(errors)
+
+
+def timed(
+    run: Callable[[], tuple[NDArray[np.float64], tuple[Note, ...]]], before: Diagnostics, progress: Progress | None
+) -> tuple[NDArray[np.float64], Diagnostics]:
+    """The values that a function makes, and the diagnostics with its notes and its seconds."""
+    begin = time.perf_counter()
+    if progress is not None:
+        progress(0.0, "sharpen")
+    values, notes = run()
+    if progress is not None:
+        progress(1.0, "done")
+    timings = {**before.timings, "sharpen": time.perf_counter() - begin}
+    return values, replace(before, timings=timings).noting(*notes)
