@@ -349,7 +349,8 @@ def shell(
     if keep_outside:
         if not isinstance(solid, Solid):
             raise SourceError("what was measured knows no faces", remedy="leave out measure or keep_outside")
-        outside, inside = solid.surface(keep_faces=True), solid.surface(inner, spacing=grid.spacing)
+        outside = solid.surface(keep_faces=True, spacing=grid.spacing)
+        inside = solid.surface(inner, spacing=grid.spacing)
         faces = np.concatenate([outside.faces, inside.faces[:, ::-1] + outside.n_vertices])
         wall = TriangleMesh(np.concatenate([outside.vertices, inside.vertices]), faces)
     else:
@@ -486,7 +487,7 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     )
     solid = complete(both, as_oriented=True)
     try:
-        return solid.surface(keep_faces=True)
+        return solid.surface(keep_faces=True, spacing=cell)
     except GeometryError:
         return solid.surface(spacing=cell)
 

@@ -149,6 +149,7 @@ def broken():
     yield "a side gone", sh.TriangleMesh(plank.vertices, plank.faces[2:]), whole
     yield "a cross", samples.union(plank, post), whole + 0.5 * 0.6 * (1.7 - 0.5)
     yield "touching", samples.union(plank, box((1, -0.3, -0.1), (1.5, 0.3, 0.2))), whole + 0.5 * 0.6 * 0.3
+    yield "sides in one plane", samples.union(plank, box((-0.3, -0.7, -0.2), (1.8, 0.6, 0.3))), 2.8 * 1.3 * 0.5
     yield "turned faces", samples.with_flipped_faces(plank, 0.3, seed=1), whole
     yield "soup", samples.soup(plank), whole
 
@@ -156,13 +157,39 @@ def broken():
 @pytest.mark.parametrize(("shape", "volume"), [pytest.param(*rest, id=name) for name, *rest in broken()])
 def test_given_faces_are_kept(shape, volume):
     surface = complete(shape).surface(keep_faces=True)
-    tails, heads = surface.faces.ravel(), np.roll(surface.faces, -1, axis=1).ravel()
-    there = scipy.sparse.coo_array((np.ones(len(tails)), (tails, heads))).tocsr()
-    assert abs(there - there.T).sum() == 0
+    assert_closed_edges(surface)
     assert not len(self_intersections(surface.vertices, surface.faces))
     corners = surface.vertices[surface.faces]
     found = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
     assert found == pytest.approx(volume, rel=1e-3)
+
+
+def test_contoured_where_faces_do_not_join():
+    """A box of sheets with gaps between them: exact beyond the gaps."""
+    plank = box((-1, -0.7, -0.2), (1, 0.6, 0.3))
+    triangles = plank.vertices[plank.faces]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    sides = [triangles[(normals @ axis) > 0] for axis in (*np.eye(3), *-np.eye(3))]
+    middles = [side.reshape(-1, 3).mean(axis=0) for side in sides]
+    shrunk = [middle + 0.99 * (side - middle) for side, middle in zip(sides, middles, strict=True)]
+    sheets = sh.TriangleMesh(np.concatenate(shrunk).reshape(-1, 3), np.arange(36).reshape(-1, 3))
+    with pytest.warns(sh.errors.InexactWarning, match="contoured there"):
+        surface = complete(turned(sheets)).surface(keep_faces=True, spacing=0.05)
+    assert_closed_edges(surface)
+    assert not len(self_intersections(surface.vertices, surface.faces))
+    corners = surface.vertices[surface.faces]
+    volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+    assert volume == pytest.approx(2 * 1.3 * 0.5, rel=0.01)
+    middle = turned(sh.TriangleMesh(np.array(middles), [[0, 1, 2], [3, 4, 5]])).vertices
+    flat = complete(surface, as_oriented=True)
+    np.testing.assert_allclose(flat.distance(middle), 0, atol=1e-9)
+
+
+def assert_closed_edges(surface):
+    """As many faces run along each edge one way as the other."""
+    tails, heads = surface.faces.ravel(), np.roll(surface.faces, -1, axis=1).ravel()
+    there = scipy.sparse.coo_array((np.ones(len(tails)), (tails, heads))).tocsr()
+    assert abs(there - there.T).sum() == 0
 
 
 def test_whole_shapes_keep_their_faces_as_they_are():

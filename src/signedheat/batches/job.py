@@ -186,8 +186,8 @@ class Job:
 class Watertight:
     """A closed mesh of each shape, for `run`.
 
-    The faces that were given are kept where they bound the solid and join with its completion all around; otherwise the
-    surface is contoured, with its edges and corners.
+    The faces that were given are kept where they bound the solid and join with its completion; elsewhere the surface is
+    contoured, with its edges and corners.
 
     Attributes
     ----------

@@ -113,7 +113,7 @@ def batch(arguments: Namespace) -> Summary:
     "closed meshes of broken shapes",
     "The closed mesh of each shape, and a line that says what it is: bodies, volume, what was completed, how far it is "
     "from the faces that were given, and back. Faces are kept where they bound the solid and join with its completion; "
-    "otherwise the surface is contoured with its edges and corners. Sheets are refused unless they are given a "
+    "elsewhere the surface is contoured with its edges and corners. Sheets are refused unless they are given a "
     "thickness.",
     *MANY,
     option("--thickness", type=positive, metavar="D", help="of the solids around sheets"),

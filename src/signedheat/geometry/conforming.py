@@ -11,6 +11,9 @@ from .welding import welded
 
 MOST_ROUNDS = 64
 """Times that faces are divided: each halves the number of points on an edge."""
+SLITS = 1.0, 10.0, 100.0
+"""Widths, over the tolerance, of slits between edges that are closed one after the other: where two triangles that are
+hardly inclined cut each other, rounding moves the ends of the cut that much."""
 
 
 def conforming(
@@ -48,15 +51,21 @@ def conforming(
     (4, 4)
     """
     vertices, faces = _welded(triangles.reshape(-1, 3), tolerance)
-    for _ in range(MOST_ROUNDS):
-        sides = _open_sides(faces)
-        rows, corners, points = _points_on_edges(vertices, faces, sides, tolerance)
-        if not len(rows):
-            break
-        a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
-        halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
-        faces = np.concatenate([np.delete(faces, rows, axis=0), halves])
+    for slit in SLITS:
+        for _ in range(MOST_ROUNDS):
+            sides = _open_sides(faces)
+            rows, corners, points = _points_on_edges(vertices, faces, sides, tolerance, slit * tolerance)
+            if not len(rows):
+                break
+            a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
+            halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
+            faces = np.concatenate([np.delete(faces, rows, axis=0), halves])
     sides = _open_sides(faces)
+    alone, counts = np.unique(sides // 3, return_counts=True)  # flat ones, which came of dividing, between closed edges
+    idle = alone[(counts == 3) & (_heights(vertices[faces[alone]]) <= SLITS[-1] * tolerance)]
+    if len(idle):
+        faces = np.delete(faces, idle, axis=0)
+        sides = _open_sides(faces)
     return vertices, faces, np.stack([faces[sides // 3, sides % 3], faces[sides // 3, (sides + 1) % 3]], axis=1)
 
 
@@ -68,10 +77,15 @@ def _welded(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.f
     used, numbers = np.unique(welded(points, tolerance), return_inverse=True)
     vertices, faces = points[used], numbers.reshape(-1, 3)
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    corners = vertices[faces]
+    return vertices, faces[_heights(vertices[faces]) > tolerance]
+
+
+def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) of triangles above their longest sides."""
     sides = np.roll(corners, -1, axis=1) - corners
-    heights = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / np.linalg.norm(sides, axis=2).max(axis=1)
-    return vertices, faces[heights > tolerance]
+    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    heights: NDArray[np.float64] = areas / np.linalg.norm(sides, axis=2).max(axis=1)
+    return heights
 
 
 def _open_sides(faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -81,7 +95,7 @@ def _open_sides(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _points_on_edges(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], sides: NDArray[np.int64], tolerance: float
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], sides: NDArray[np.int64], tolerance: float, slit: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """For faces with points on a side: the face, the corner where this begins, and of the points the middlemost."""
     tails, heads = faces[sides // 3, sides % 3], faces[sides // 3, (sides + 1) % 3]
@@ -97,7 +111,7 @@ def _points_on_edges(
     away, along = vertices[point] - start[side], (stop - start)[side] / np.maximum(lengths, 1e-300)[side, None]
     at = (away * along).sum(axis=1)
     off = np.linalg.norm(away - at[:, None] * along, axis=1)
-    on = (off <= tolerance) & (at > tolerance) & (at < lengths[side] - tolerance)
+    on = (off <= slit) & (at > tolerance) & (at < lengths[side] - tolerance)
     on &= (point != tails[side]) & (point != heads[side]) & (point != faces[sides // 3, (sides + 2) % 3][side])
     side, point, at = side[on], point[on], at[on]
     order = np.lexsort((np.abs(at / lengths[side] - 0.5), sides[side] // 3))

@@ -14,7 +14,7 @@ from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number, positive_number, query_points
-from ..errors import SignedHeatError, SourceError
+from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..fields.grid_field import GridField
 from ..fields.known_solid import Closest
 from ..frozen import Frozen
@@ -28,7 +28,7 @@ from ..progress import Progress
 from ..reprs import ShortRepr
 from .contouring import sharp_surface
 from .fields import band_field, dense_field
-from .keeping import given_surface
+from .keeping import given_surface, unjoined
 from .offsets import Offset
 from .simplification import simplified
 from .stores import Scheduler
@@ -240,7 +240,8 @@ class Solid(Frozen, ShortRepr):
             Dual contouring with exact distances, nearest places and normals; else marching cubes, which cuts edges off.
         keep_faces : bool
             At level 0, the faces that were given, cut where bodies overlap, and what completes them: exact, and of few
-            triangles. Edges are divided where those of the completion are finer. Bodies that touch share edges.
+            triangles. Edges are divided where those of the completion are finer. Bodies that touch share edges. Where
+            faces and completion do not join, the surface is contoured, with an `InexactWarning` that says where.
         tolerance : float, optional
             Simplify the surface, by manifold3d: no point of the result is farther from it than this, nor the converse.
             Where manifold3d has no such result the surface stays as it was, with an `InexactWarning`.
@@ -262,8 +263,8 @@ class Solid(Frozen, ShortRepr):
         OutsideError
             If distance has the level nowhere, or only where it is thinner than a cell.
         GeometryError
-            If faces are to be kept and do not join with the completion all around; it says where. Or if a surface whose
-            bodies touch along edges is to be simplified.
+            If faces are to be kept and do not join with a contour either; it says where. Or if a surface whose bodies
+            touch along edges is to be simplified.
         MissingPackageError
             If it is to be simplified, and manifold3d is not installed.
         SignedHeatError
@@ -291,7 +292,13 @@ class Solid(Frozen, ShortRepr):
                 raise SignedHeatError(
                     "faces that were given are on level 0", remedy="leave out keep_faces or the level"
                 )
-            return given_surface(self.triangles, self.windings)
+            cell = float(Grid.around(self.bounds, resolution, None, spacing).spacing.max())
+            surface, places = given_surface(
+                self, lambda: self.surface(resolution=resolution, spacing=spacing, progress=progress), cell
+            )
+            if len(places):
+                warn_user(f"faces are kept but {unjoined(places)}", InexactWarning)
+            return surface
         reach = self.bounds + np.array([[-1.0], [1.0]]) * max(height, 0.0)
         where = Grid.around(reach, resolution, None, spacing)
         if sharp:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, SourceError
 from ..geometry.components import element_components
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.self_intersections import self_intersections
+from .keeping import given_surface, unjoined
 from .parts import face_areas
+from .simplification import simplified
 from .solid import Solid
 
 BOUNDS = 1e-3
@@ -47,8 +50,11 @@ def closed_surface(
         raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
     if contoured:
         return contour(0.0), "contoured"
+    cell = float(Grid.around(solid.bounds, resolution, None, spacing).spacing.max())
     try:
-        return solid.surface(keep_faces=True, tolerance=tolerance), "faces kept"
+        kept, places = given_surface(solid, lambda: solid.surface(resolution=resolution, spacing=spacing), cell)
+        made = kept if tolerance is None else simplified(kept, tolerance)
+        return made, f"faces kept but {unjoined(places)}" if len(places) else "faces kept"
     except GeometryError as error:
         reason = str(error).partition(":")[0]
         return contour(0.0), f"contoured, since {reason}"
