@@ -1,6 +1,7 @@
 """Deviations of scans from nominal parts."""
 
 import json
+from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -71,9 +72,10 @@ def test_command(tmp_path, capsys):
     sh.save(samples.sphere(2, 1.1), tmp_path / "scan.stl")
     sh.save(samples.without_faces(samples.sphere(3), 0.1), tmp_path / "part.stl")
     words = ["deviation", str(tmp_path / "scan.stl"), str(tmp_path / "part.stl"), "--tolerance", "0.2"]
-    assert main([*words, "--json", "-o", str(tmp_path / "deviation.pdf")]) == 0
+    outputs = [str(tmp_path / "deviation.pdf"), str(tmp_path / "deviation.ply")]
+    assert main([*words, "--json", "-o", outputs[0], "-o", outputs[1]]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["within"] == 1.0 and said["percentiles"]["50"] == pytest.approx(0.1, abs=0.02)
-    assert (tmp_path / "deviation.pdf").exists()
+    assert said["output"] == outputs and all(Path(each).exists() for each in outputs)
     assert main(words) == 0
     assert "100.00% within 0.2" in capsys.readouterr().out

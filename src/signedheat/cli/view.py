@@ -107,31 +107,37 @@ def shape_or_field(path: str) -> Any:
     "how far a scan is off a nominal part",
     "Signed distances of a scan's points to a nominal part, positive outside of it: percentiles; the scan in colours, "
     "a picture with the histogram, or a table. Both must be in one place: nothing is aligned.",
-    option("scan", metavar="SCAN", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd"),
-    option("nominal", metavar="NOMINAL", help="the part as it should be, broken or not"),
-    option("-o", "--output", metavar="OUT", help="coloured .ply, picture .png .pdf .svg .jpg, or table .csv"),
+    option("scan", metavar="SCAN", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd .las .laz .e57"),
+    option("nominal", metavar="NOMINAL", help="the part as it should be, broken or not, also .step"),
+    option(
+        "-o",
+        "--output",
+        metavar="OUT",
+        action="append",
+        default=[],
+        help="coloured .ply, picture .png .pdf .svg .jpg, or table .csv; may be given several times",
+    ),
     option("--tolerance", type=positive, metavar="T", help="say which share of the points is within it"),
 )
 def deviation(arguments: Namespace) -> Summary:
     """Read, check that the result can be written, measure, write."""
-    if arguments.output:
-        sh.io.ensure_writable(arguments.output, sh.view.DEVIATION_FORMATS, "deviations")
+    for output in arguments.output:
+        sh.io.ensure_writable(output, sh.view.DEVIATION_FORMATS, "deviations")
     scan, nominal = sh.read(arguments.scan), sh.read(arguments.nominal)
     with shapes.prefix_errors(arguments.nominal), ProgressBar(is_quiet(arguments)) as progress:
         found = sh.deviation(scan, nominal, progress)
     summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **found.figures}
     low, middle, high = found.percentiles((1, 50, 99))
-    text = f"{arguments.scan}: {len(found.distances)} points, 98 % of them {low:.4g} to {high:.4g} off "
+    text = f"{arguments.scan}: {len(found.of_surface)} points, 98 % of them {low:.4g} to {high:.4g} off "
     text += f"{arguments.nominal}, median {middle:.4g}, root mean square {found.rms:.4g}"
     if arguments.tolerance is not None:
         share = found.within(arguments.tolerance)
         summary |= {"tolerance": arguments.tolerance, "within": share}
         text += f", {share:.2%} within {arguments.tolerance:g}"
-    if arguments.output:
-        found.save(arguments.output)
-        summary["output"] = arguments.output
-        text += f"; {arguments.output}"
-    return summary, text
+    for output in arguments.output:
+        found.save(output)
+        text += f"; {output}"
+    return summary | {"output": arguments.output}, text
 
 
 @command(

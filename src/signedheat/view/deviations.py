@@ -6,13 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.foreign import elements
+from ..domains.point_cloud import PointCloud
 from ..fields.vertex_field import VertexField
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.ply import write_ply
 from ..solids.deviation import Deviation
-from .drawing import draw
-from .figures import INSIDE_TO_OUTSIDE, PICTURE_FORMATS, picture
+from .figures import INSIDE_TO_OUTSIDE, PICTURE_FORMATS, even_colors, picture
+from .rasterizer import oblique
+from .surfaces import draw_points, draw_surface
 
+VIEW = (22, -58)
+"""Elevation and azimuth, in degrees, from which points are seen."""
 DEVIATION_FORMATS = frozenset({".csv", ".ply"}) | PICTURE_FORMATS
 
 
@@ -40,15 +44,21 @@ def colors(values: NDArray[np.float64], found: Deviation) -> NDArray[np.uint8]:
 
 
 def _draw(found: Deviation, path: PathLike) -> None:
-    """The scan in colours, and the histogram with the percentiles."""
+    """The scan in colours, and the histogram in the same, with the percentiles; no isolines, since scans are noisy."""
+    scale = even_colors(found.extreme or 1.0)
     with picture(path, 12, 5) as figure:
         scan, histogram = figure.subplots(1, 2)
-        draw(VertexField(found.scan, found.distances), scan)
+        if isinstance(found.scan, PointCloud):
+            draw_points(found.points, scan, oblique(*VIEW), colors=scale.to_rgba(found.distances))
+        else:
+            draw_surface(VertexField(found.scan, found.distances), scan, colors=scale)
+        figure.colorbar(scale, ax=scan, shrink=0.85, pad=0.015, extend="both", format="{x:g}")
         counts, limits = found.histogram()
         middles = 0.5 * (limits[1:] + limits[:-1])
-        histogram.bar(
-            middles, counts, np.diff(limits), color=colors(middles, found) / 255, edgecolor="0.5", linewidth=0.5
-        )
+        look = {"color": scale.to_rgba(middles), "edgecolor": "0.5", "linewidth": 0.5}
+        histogram.bar(middles, counts, np.diff(limits), **look)
         low, middle, high = found.percentiles((1, 50, 99))
-        title = f"1 %, 50 %, 99 %: {low:.4g}, {middle:.4g}, {high:.4g}; root mean square {found.rms:.4g}"
-        histogram.set(xlabel="deviation, positive outside of the nominal part", ylabel="points", title=title)
+        title = f"root mean square {found.rms:.4g}\n1 %: {low:.4g}, 50 %: {middle:.4g}, 99 %: {high:.4g}"
+        beyond = f"the first and last bar: all beyond {limits[-2]:.3g}"
+        histogram.set(xlabel=f"deviation, positive outside of the nominal part\n({beyond})", ylabel="points")
+        histogram.set_title(title, fontsize=10)

@@ -78,7 +78,16 @@ def distance_colors(low: float, high: float) -> ScalarMappable:
     that a thin inside is visible next to a wide outside.
     """
     reach = max(abs(low), abs(high), 1e-300)
-    norm = mpl_colors.FuncNorm((signed_root, signed_square), -reach, reach)
+    return scale_of(mpl_colors.FuncNorm((signed_root, signed_square), -reach, reach))
+
+
+def even_colors(reach: float) -> ScalarMappable:
+    """The same colours, evenly from −reach to reach; what is beyond has the last ones."""
+    return scale_of(mpl_colors.Normalize(-reach, reach))
+
+
+def scale_of(norm: Any) -> ScalarMappable:
+    """Colours from inside to outside, over a norm of values."""
     colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
     scale: ScalarMappable = mpl_cm.ScalarMappable(norm, colors)
     return scale

@@ -25,6 +25,7 @@ from .rasterizer import Camera, oblique, rasterize
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
 
 OUTSIDE, INSIDE = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
 MOST_POINTS = 200_000
@@ -51,11 +52,7 @@ def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float
     direction = oblique(*view, up)
     axes.set_axis_off()
     if isinstance(shape, PointCloud):
-        points = shape.points[:: max(1, shape.n_points // MOST_POINTS)]
-        pixels = Camera.around(points, direction, up).pixels(points)
-        x, y, depth = pixels[np.argsort(pixels[:, 2])].T
-        axes.scatter(x, y, s=4, c=depth, cmap="Blues", vmin=depth[0] - np.ptp(depth), linewidths=0)
-        axes.set_aspect("equal")
+        draw_points(shape.points, axes, direction, up)
         return
     mesh = triangulated(shape)
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
@@ -64,6 +61,26 @@ def draw_shape(shape: Shape | ForeignShape, axes: Axes, view: tuple[float, float
     outwards = mesh.face_area_vectors @ camera.frame[2] > 0
     colors = np.where(outwards[:, None], OUTSIDE, INSIDE) * camera.shades(mesh.face_area_vectors)[:, None]
     axes.imshow(np.where((face >= 0)[..., None], colors[face], 1.0), origin="lower", interpolation="antialiased")
+
+
+def draw_points(
+    points: NDArray[np.float64],
+    axes: Axes,
+    direction: NDArray[np.float64],
+    up: int = 2,
+    colors: NDArray[np.float64] | None = None,
+) -> None:
+    """Draw points into axes, from far to near; without (n, 4) colours, in darker blue the nearer they are."""
+    some = slice(None, None, max(1, len(points) // MOST_POINTS))
+    pixels = Camera.around(points[some], direction, up).pixels(points[some])
+    order = np.argsort(pixels[:, 2])
+    x, y, depth = pixels[order].T
+    if colors is None:
+        axes.scatter(x, y, s=4, c=depth, cmap="Blues", vmin=depth[0] - np.ptp(depth), linewidths=0)
+    else:
+        axes.scatter(x, y, s=4, c=colors[some][order], linewidths=0)
+    axes.set_axis_off()
+    axes.set_aspect("equal")
 
 
 def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | PointCloud:
@@ -129,8 +146,12 @@ def draw_surface(
     n_contours: int = 20,
     view: NDArray[np.float64] | None = None,
     up: int = 2,
+    colors: ScalarMappable | None = None,
 ) -> None:
-    """Draw into axes, with a colour bar. `view` is a direction from the surface to the eye."""
+    """Draw into axes, with isolines and a colour bar; in given colours, without them.
+
+    `view` is a direction from the surface to the eye.
+    """
     own, mesh, values = _own_and_painted(field)
     flat = [item for source in sources for item in (source if isinstance(source, Sequence) else [source])]
     direction = toward_sources(own, flat, up) if view is None else view
@@ -139,20 +160,21 @@ def draw_surface(
     depth, face, phi = rasterize(corners, values[mesh.faces], camera.width, camera.height)
 
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    colors = distance_colors(low, high)
-    shade = colors.to_rgba(np.where(np.isfinite(phi), phi, 0.0))[..., :3]
+    scale = distance_colors(low, high) if colors is None else colors
+    shade = scale.to_rgba(np.where(np.isfinite(phi), phi, 0.0))[..., :3]
     shade[~np.isfinite(phi)] = 0.7
     known = face >= 0
     image = np.where(known[..., None], shade * camera.shades(mesh.face_area_vectors)[face][..., None], 1.0)
     isolines, step = isolines_between(low, high, n_contours)
-    if n_contours > 0 and high > low:
+    if n_contours > 0 and high > low and colors is None:
         darken(image, phi, known, step)
     axes.imshow(image, origin="lower", interpolation="antialiased")
     for item in flat:
         draw_source(axes, item, own, camera, depth)
     axes.set_axis_off()
-    spanned = np.array([low, *isolines, high]) if high > low else isolines  # both signs, however little of one there is
-    add_color_bar(axes.figure, [axes], colors, spanned, step)
+    if colors is None:
+        spanned = np.array([low, *isolines, high]) if high > low else isolines  # both signs, however little of one
+        add_color_bar(axes.figure, [axes], scale, spanned, step)
 
 
 def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, Any, NDArray[np.float64]]:
