@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
@@ -28,7 +29,8 @@ from .resolution import flattened, for_zero_set
 ZERO = 1e-7
 """Value, in mean edge lengths, up to which φ is zero at a vertex of the rim."""
 WHOLE = 0.5
-"""Length, relative to the shortest curve given, below which a loop is none of those that complete them."""
+"""Length of a loop, and how near it comes to the curves given, relative to the shortest of them: shorter ones complete
+nothing, nor do those that are farther away, which are where φ has the wrong sign."""
 
 
 def close_curves(
@@ -136,7 +138,8 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     """The zero set of a field as curves: those that follow or complete the given ones.
 
     Where a curve runs along the rim of the surface, φ has one sign next to it, and is zero up to rounding on it: there
-    the rim counts as the other side. Loops that are shorter than what they would complete are left out.
+    the rim counts as the other side. Loops that are shorter than what they would complete, or far from it, are left
+    out.
     """
     if not isinstance(field.domain, TriangleMesh):
         return field.contour(0.0)
@@ -146,10 +149,18 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     values = fine.values.copy()
     beyond_the_rim(surface.triangles, values)
     found = replace(fine, values=values).contour(0.0)
-    shortest = min(
-        length(field.domain, each) for each in flattened(curves) if isinstance(each, Curve) and each.oriented
-    )
-    whole = [curve for curve in found if not curve.closed or length(field.domain, curve) > WHOLE * shortest]
+    given = [each for each in flattened(curves) if isinstance(each, Curve) and each.oriented]
+    shortest = min(length(field.domain, each) for each in given)
+    near = cKDTree(np.concatenate([places(field.domain, each) for each in given]))
+    whole = [
+        curve
+        for curve in found
+        if not curve.closed
+        or (
+            length(field.domain, curve) > WHOLE * shortest
+            and near.query(places(field.domain, curve))[0].min() < WHOLE * shortest
+        )
+    ]
     return whole or found
 
 
@@ -178,6 +189,12 @@ def beyond_the_rim(triangles: IntrinsicMesh, values: NDArray[np.float64]) -> Non
 
 def length(mesh: TriangleMesh, curve: Curve) -> float:
     """Length of a curve, measured straight between its points."""
-    points = np.einsum("nk,nkd->nd", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]])
+    points = places(mesh, curve)
     following = np.roll(points, -1, axis=0) if curve.closed else points[1:]
     return float(np.linalg.norm(following - points[: len(following)], axis=1).sum())
+
+
+def places(mesh: TriangleMesh, curve: Curve) -> NDArray[np.float64]:
+    """(n, 3) points of a curve in space."""
+    result: NDArray[np.float64] = np.einsum("nk,nkd->nd", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]])
+    return result

@@ -43,6 +43,9 @@ AREA_ERROR = 1e-4
 LARGEST_ANGLE = 30.0
 """Degrees; for larger minimum angles refinement need not terminate."""
 
+UPWARD = (np.pi / 4) ** np.arange(3)
+"""Direction in which no two different points with coordinates that are algebraic numbers are equally high."""
+
 
 @dataclass(frozen=True, eq=False)
 class IntrinsicTriangulation(Displayed, Frozen):
@@ -318,9 +321,8 @@ def intrinsic_delaunay(
         base = mesh.intrinsic
         refuse_other_area(mesh, base)
         listed = list(keep) if isinstance(keep, Sequence) else [keep]
-        refinement = ConformingRefinement.of(
-            base, list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))
-        )
+        parts = list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))
+        refinement = ConformingRefinement.of(base, parts, (mesh.vertices - mesh.bounds[0]) @ UPWARD)
         marked, complete = refinement.marked, True
     with stopwatch("flip"):
         gluing = flip_all(glue(refinement.triangles, marked))

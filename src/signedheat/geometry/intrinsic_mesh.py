@@ -70,10 +70,11 @@ class IntrinsicMesh(Frozen):
         a, b, c = np.sort(lengths, axis=1)[:, ::-1].T
         product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))
         twice_area = 0.5 * np.sqrt(np.maximum(product, 0.0))
-        apex_x = 0.5 * (base + (left - right) * (left + right) / base)
+        divisor = np.where(base > 0, base, 1.0)  # rounding leaves some edges no length
+        apex_x = 0.5 * (base + (left - right) * (left + right) / divisor)
         positions = np.zeros((len(lengths), 3), dtype=np.complex128)
         positions[:, 1] = base
-        positions[:, 2] = apex_x + 1j * (twice_area / base)
+        positions[:, 2] = apex_x + 1j * np.where(base > 0, twice_area / divisor, left)
         return cls(corner_vertices, positions, edge_table(corner_vertices) if edges is None else edges, n_vertices)
 
     @property

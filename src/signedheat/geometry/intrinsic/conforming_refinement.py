@@ -61,9 +61,14 @@ def refine_to_conform(
 
 
 def cut_along(
-    triangles: IntrinsicMesh, parts: Sequence[CurveSegments], unfit: Sequence[bool] | None = None
+    triangles: IntrinsicMesh,
+    parts: Sequence[CurveSegments],
+    unfit: Sequence[bool] | None = None,
+    begin: NDArray[np.int64] | None = None,
 ) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
     """Cut faces along the segments of sources that are unfit, all by default, and of those that these entail.
+
+    Which triangles a face is cut into may hang on the corner at which it begins: `begin` (m,), the first by default.
 
     Returns
     -------
@@ -78,7 +83,8 @@ def cut_along(
     faces, edges = affected_elements(triangles, merged, [True] * len(parts) if unfit is None else unfit)
     if not len(faces) and not len(edges):
         return triangles, merged, np.zeros(triangles.n_faces, dtype=bool), np.arange(triangles.n_faces)
-    return FaceCutter(triangles, merged, faces, edges).assemble()
+    begin = np.zeros(triangles.n_faces, dtype=np.int64) if begin is None else begin
+    return FaceCutter(triangles, merged, faces, edges, begin).assemble()
 
 
 def affected_elements(
@@ -113,9 +119,14 @@ class FaceCutter:
     """An intrinsic mesh while some of its faces are being cut."""
 
     def __init__(
-        self, triangles: IntrinsicMesh, merged: MergedSources, faces: NDArray[np.int64], edges: NDArray[np.int64]
+        self,
+        triangles: IntrinsicMesh,
+        merged: MergedSources,
+        faces: NDArray[np.int64],
+        edges: NDArray[np.int64],
+        begin: NDArray[np.int64],
     ) -> None:
-        self.triangles, self.merged = triangles, merged
+        self.triangles, self.merged, self.begin = triangles, merged, begin
         self.n_vertices, self.n_edges = triangles.n_vertices, triangles.n_edges
         self.faces: list[NewFace] = []
         self.pieces: list[NewSegment] = []
@@ -187,13 +198,13 @@ class FaceCutter:
     def cut_face(self, face: int, inside: list[int]) -> None:
         """Cut one face along the segments inside it."""
         triangles, merged = self.triangles, self.merged
-        corners = triangles.corner_vertices[face].tolist()
-        points, vertices = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], list(corners)
+        around = ((self.begin[face] + np.arange(3)) % 3).tolist()
+        points, vertices = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], triangles.corner_vertices[face, around].tolist()
         sides: list[list[int]] = []
         edge_of: dict[tuple[int, int], tuple[int, bool]] = {}
         frames: dict[int, tuple[int, int, bool]] = {}
-        for k in range(3):
-            edge, forward = int(triangles.edges.face_edges[face, k]), bool(triangles.edges.forward[face, k])
+        for k, side in enumerate(around):
+            edge, forward = int(triangles.edges.face_edges[face, side]), bool(triangles.edges.forward[face, side])
             members = self.on_edge.get(edge, [])[:: 1 if forward else -1]
             subs = self.sub_edges.get(edge, [edge])[:: 1 if forward else -1]
             (x, y), (u, v) = points[k], points[(k + 1) % 3]
@@ -208,10 +219,10 @@ class FaceCutter:
             for j, sub in enumerate(subs):
                 edge_of[chain[j], chain[j + 1]] = sub, forward
                 along = (chain[j], chain[j + 1]) if forward else (chain[j + 1], chain[j])
-                frames[sub] = (*along, bool(triangles.reflected[face, k]))
+                frames[sub] = (*along, bool(triangles.reflected[face, side]))
         cut = Triangulation.of(points, sides)
         for i in self.in_face[face]:
-            cut.insert((float(merged.nodes.barycentric[i, 1]), float(merged.nodes.barycentric[i, 2])))
+            cut.insert((float(merged.nodes.barycentric[i, around[1]]), float(merged.nodes.barycentric[i, around[2]])))
             vertices.append(self.vertex_of[i])
 
         local = {v: k for k, v in reversed(list(enumerate(vertices)))}
@@ -225,7 +236,7 @@ class FaceCutter:
             )
         vertices += [self.new_vertex() for _ in range(len(cut.points) - len(vertices))]
         flat = np.array(cut.points)
-        q = triangles.corner_positions[face]
+        q = triangles.corner_positions[face, around]
         positions = q[0] + flat[:, 0] * (q[1] - q[0]) + flat[:, 1] * (q[2] - q[0])
 
         for corner in cut.triangles:

@@ -25,7 +25,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: NDArray[np.bool_] | None = None)
     start[edge[first]], front[first] = first, True
     sums = np.bincount(edge, weights=triangles.edge_lengths.ravel(), minlength=n_edges)
     lengths = sums / np.maximum(edges.face_counts, 1)
-    unit = _power_of_two(lengths.mean())
+    unit = float(lengths.mean()) or 1.0  # what is compared with powers of two does not depend on scale
     fixed = np.zeros(n_edges, dtype=bool) if fixed_edges is None else np.array(fixed_edges, dtype=bool)
     return Gluing(
         tail=triangles.corner_vertices.ravel().copy(),
@@ -86,7 +86,3 @@ def lay_out(gluing: Gluing) -> IntrinsicMesh:
 
 def doubled(array: NDArray) -> NDArray:
     return np.concatenate([array, np.zeros_like(array)])
-
-
-def _power_of_two(value: float) -> float:
-    return float(2.0 ** np.round(np.log2(value))) if value > 0 else 1.0

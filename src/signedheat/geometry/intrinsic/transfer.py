@@ -12,6 +12,7 @@ from ...errors import SourceError
 from ...frozen import Frozen
 from ..components import grouped, members_of
 from ..curve_segments import CurveSegments
+from ..edges import EdgeTable
 from ..geodesics.exact import cleared
 from ..geodesics.sources import zero_line
 from ..intrinsic_mesh import FLATTEST, IntrinsicMesh
@@ -52,17 +53,27 @@ class ConformingRefinement(Frozen):
     corners: NDArray[np.float64]
 
     @classmethod
-    def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> ConformingRefinement:
-        """Cut faces along all segments inside them, and put vertices at all points of the sources."""
-        if not parts:
-            corners = np.broadcast_to(np.eye(3), (triangles.n_faces, 3, 3))
-            return cls(triangles, np.zeros(triangles.n_edges, dtype=bool), np.arange(triangles.n_faces), corners)
-        finer, merged, is_new, parents = cut_along(triangles, parts)
-        corners, new = np.where(is_new[:, None, None], 0.0, np.eye(3)), np.flatnonzero(is_new)
-        corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
+    def of(
+        cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], heights: NDArray[np.float64]
+    ) -> ConformingRefinement:
+        """Cut faces along all segments inside them, and put vertices at all points of the sources.
+
+        Faces are put in the order of the heights (n,) of the vertices, so that no later choice hangs on the order that
+        they were given in.
+        """
+        finer, parents, corners = triangles, np.arange(triangles.n_faces), np.eye(3)[None]
         marked = np.zeros(finer.n_edges, dtype=bool)
-        marked[merged.edges[merged.edges >= 0]] = True
-        return cls(finer, marked, parents, corners)
+        if parts:
+            begin = heights[triangles.corner_vertices].argmin(axis=1)
+            finer, merged, is_new, parents = cut_along(triangles, parts, begin=begin)
+            corners, new = np.where(is_new[:, None, None], 0.0, np.eye(3)), np.flatnonzero(is_new)
+            corners[new] = barycentric_of(triangles, parents[new], finer.corner_positions[new])
+            marked = np.zeros(finer.n_edges, dtype=bool)
+            marked[merged.edges[merged.edges >= 0]] = True
+        at_corners = np.einsum("mkl,ml->mk", corners, heights[triangles.corner_vertices[parents]])
+        finer, edges, faces, turns = in_order(finer, at_corners)
+        corners = np.take_along_axis(np.broadcast_to(corners, (len(faces), 3, 3))[faces], turns[:, :, None], axis=1)
+        return cls(finer, marked[edges], parents[faces], corners)
 
     def push_forward(
         self, faces: NDArray[np.int64], barycentric: NDArray[np.float64], vectors: NDArray[np.float64]
@@ -79,6 +90,36 @@ class ConformingRefinement(Frozen):
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Points of the faces after the cuts, in the faces before."""
         return self.parents[faces], np.einsum("pk,pkl->pl", barycentric, self.corners[faces])
+
+
+def in_order(
+    triangles: IntrinsicMesh, heights: NDArray[np.float64]
+) -> tuple[IntrinsicMesh, NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Triangles with faces, their corners and edges in the order of the heights (m, 3) of the corners.
+
+    Returns
+    -------
+    triangles : IntrinsicMesh
+        With the same vertices; each face begins at its lowest corner.
+    edges, faces : (e,) int, (m,) int
+        The number that each had.
+    turns : (m, 3) int
+        The corner that each was.
+    """
+    faces = np.argsort(heights.sum(axis=1), kind="stable")
+    turns = (heights[faces].argmin(axis=1)[:, None] + np.arange(3)) % 3
+    old = triangles.edges
+    rows = faces[:, None]
+    sides, forward = old.face_edges[rows, turns], old.forward[rows, turns]
+    first = np.unique(sides, return_index=True)[1]
+    first.sort()
+    edges, ahead = sides.ravel()[first], forward.ravel()[first]
+    number = np.empty(triangles.n_edges, dtype=np.int64)
+    number[edges] = np.arange(len(edges))
+    vertices = np.where(ahead[:, None], old.vertices[edges], old.vertices[edges][:, ::-1])
+    table = EdgeTable(vertices, number[sides], forward == ahead[number[sides]])
+    corners, positions = triangles.corner_vertices[rows, turns], triangles.corner_positions[rows, turns]
+    return IntrinsicMesh(corners, positions, table, triangles.n_vertices), edges, faces, turns
 
 
 def barycentric_of(
