@@ -25,8 +25,7 @@ from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number, positive_number
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
-from ..fields.intrinsic_piecewise_field import IntrinsicPiecewiseField
-from ..fields.piecewise_field import PiecewiseField
+from ..fields.piecewise_field import IntrinsicPiecewiseField, PiecewiseField
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.face_pairs import FacePairs, face_pairs
 from ..geometry.intrinsic_mesh import IntrinsicMesh

@@ -7,18 +7,19 @@ from functools import singledispatch
 from typing import Any, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ..diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
 from ..domains.point_cloud import PointCloud
 from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
-from ..geometry.neighbor_paths import spread
+from ..geometry.components import connected_components
 from ..lowering.grid.discretization import GridDiscretization
 from ..lowering.grid.masked import MaskedGridDiscretization, MaskedSource
 from ..lowering.grid.source import GridSource
 from ..lowering.surface.discretization import SurfaceDiscretization
-from ..lowering.surface.small_loops import small_loops
-from ..lowering.surface.source import SurfaceSource
+from ..lowering.surface.source import SurfaceSource, joined
 from ..lowering.tets.discretization import TetDiscretization
 from ..lowering.tets.source import TetSource
 from .grid_field import GridField
@@ -29,6 +30,10 @@ Field = GridField | VertexField | TetField
 """What a solver returns."""
 
 AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
+SMALL_LOOP = 3.5
+"""Length of a loop, in sides of the triangles that it crosses, below which a quarter or more of its heat cancels."""
+NEAREST = 8
+"""Nearest points that a point is joined to, if it is among theirs: on a surface about six lie round a point."""
 
 
 @singledispatch
@@ -131,3 +136,63 @@ def warned(field: AnyField) -> AnyField:
             InexactWarning,
         )
     return field
+
+
+def small_loops(source: SurfaceSource) -> int:
+    """How many closed oriented curves are shorter than `SMALL_LOOP` sides of the triangles that they cross.
+
+    Distance to them is several times less accurate than triangles of this size allow.
+    """
+    parts = [part for part in source.parts if part.oriented and len(part.ends)]
+    if not parts:
+        return 0
+    triangles = source.triangles
+    nodes, ends = joined(parts)
+    label = connected_components(len(nodes), ends[:, 0], ends[:, 1])[ends[:, 0]]
+    lengths = np.concatenate([part.lengths for part in parts])
+    faces = np.concatenate([part.faces for part in parts])
+    inside = np.concatenate([part.edges < 0 for part in parts])
+    sides = np.where(inside, np.sqrt(4 / 3**0.5 * triangles.face_areas[faces]), 0.0)  # edges see what runs along them
+    length, weighted = np.bincount(label, lengths), np.bincount(label, lengths * sides)
+    is_open = np.zeros(len(length), dtype=bool)
+    odd = np.bincount(ends.ravel(), minlength=len(nodes)) % 2 == 1
+    is_open[label[odd[ends].any(axis=1)]] = True
+    return int(((length > 0) & ~is_open & (length**2 < SMALL_LOOP * weighted)).sum())
+
+
+def spread(points: NDArray[np.float64], values: NDArray[np.float64], used: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(n,) signed distances that go on from point to neighbouring point where they are NaN.
+
+    The shortest way to a point with a value adds to its absolute value; the sign stays. Points that are not used, and
+    those that no way leads to, stay NaN.
+    """
+    lacking = np.isnan(values) & used
+    ids = np.flatnonzero(used)
+    if not lacking.any() or len(ids) <= NEAREST:
+        return values
+    far, near = scipy.spatial.cKDTree(points[ids]).query(points[ids], k=NEAREST + 1)
+    rows = np.repeat(np.arange(len(ids)), NEAREST)
+    graph = sparse.csr_matrix(
+        (np.maximum(far[:, 1:].ravel(), 1e-300), (rows, near[:, 1:].ravel())), shape=(len(ids),) * 2
+    )
+    graph = sparse.csr_matrix(graph.minimum(graph.T))  # joined from both sides
+    known = np.flatnonzero(~lacking[ids])
+    start = np.abs(values[ids[known]])
+    tail, head = known, np.full(len(known), len(ids))
+    coo = graph.tocoo()
+    whole = sparse.csr_matrix(
+        (
+            np.concatenate([coo.data, start + 1e-300, start + 1e-300]),
+            (np.concatenate([coo.row, tail, head]), np.concatenate([coo.col, head, tail])),
+        ),
+        shape=(len(ids) + 1,) * 2,
+    )
+    away, before = sparse.csgraph.dijkstra(whole, indices=len(ids), return_predecessors=True)
+    result: NDArray[np.float64] = values.copy()
+    sign = np.where(values[ids] < 0, -1.0, 1.0)
+    for k in np.argsort(away, kind="stable").tolist():
+        if k == len(ids) or not lacking[ids[k]] or not np.isfinite(away[k]):
+            continue
+        sign[k] = sign[before[k]]
+        result[ids[k]] = sign[k] * away[k]
+    return result

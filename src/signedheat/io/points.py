@@ -1,19 +1,27 @@
-"""Lists of points: text with one on each line (XYZ, CSV), and PCD, the format of the Point Cloud Library."""
+"""Lists of points: text with one on each line (XYZ, CSV), PCD of the Point Cloud Library, scans (LAS, LAZ, E57)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..domains.exchange import Elements
+from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
-from .files import PathLike, contents, refuse_kind, text
+from ..packages import lazy_module, require
+from .files import PathLike, contents, ensure_fits, parsed_by_others, reading, refuse_kind, text
 
 SEPARATORS = str.maketrans(",;", "  ")
 NUMBERS = {"F": "f", "I": "i", "U": "u"}
 """Types of fields, and their letters for NumPy."""
+laspy = lazy_module("laspy", ".las and .laz files")
+pye57 = lazy_module("pye57", ".e57 files")
+
+BYTES = 60
+"""Measured: what each point takes at most while a file is read."""
 
 
 def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[NDArray[np.float64]]:
@@ -134,3 +142,51 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.fl
         raise FileFormatError(f"there are no {n} lines of {sum(counts)} numbers") from None
     begins = np.concatenate([[0], np.cumsum(counts)])
     return {name: numbers[:, begins[k]] for k, name in enumerate(names)}
+
+
+def read_las(path: PathLike) -> PointCloud:
+    """Points of a LAS or LAZ file, with its scale and offset; it has no normals.
+
+    Raises
+    ------
+    MissingPackageError
+        If laspy is not installed, or for LAZ no package that it decompresses with.
+    """
+    opened = laspy.open
+    if Path(path).suffix.lower() == ".laz" and not laspy.LazBackend.detect_available():
+        require("lazrs", ".laz files")
+    with reading(path):
+        size = Path(path).stat().st_size
+
+        def parse() -> NDArray[np.float64]:
+            with opened(str(path)) as file:
+                ensure_fits(file.header.point_count * BYTES, path)
+                return np.array(file.read().xyz, dtype=np.float64)
+
+        return _cloud(parsed_by_others(parse, size), path)
+
+
+def read_e57(path: PathLike) -> PointCloud:
+    """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out."""
+    opened = pye57.E57
+    with reading(path):
+        size = Path(path).stat().st_size
+
+        def parse() -> NDArray[np.float64]:
+            file = opened(str(path))
+            try:
+                ensure_fits(sum(file.get_header(k).point_count for k in range(file.scan_count)) * BYTES, path)
+                scans = [file.read_scan(k, ignore_missing_fields=True) for k in range(file.scan_count)]
+            finally:
+                file.close()
+            axes = ("cartesianX", "cartesianY", "cartesianZ")
+            return np.concatenate([np.zeros((0, 3)), *(np.stack([s[a] for a in axes], axis=1) for s in scans)])
+
+        return _cloud(parsed_by_others(parse, size), path)
+
+
+def _cloud(points: NDArray[np.float64], path: PathLike) -> PointCloud:
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        raise FileFormatError("it has no points", path=path)
+    return PointCloud(points)

@@ -13,8 +13,7 @@ from ..memory import refuse_beyond_memory
 from .files import PathLike, format_for, reading, replacing
 from .meshes import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
 from .ply import read_ply, write_ply
-from .points import read_pcd, read_xyz, write_xyz
-from .scans import read_e57, read_las
+from .points import read_e57, read_las, read_pcd, read_xyz, write_xyz
 from .scenes import read_3mf, read_glb, step_mesh
 from .tets import TET_FORMATS, read_tets, write_tets
 from .voxels import read_volume

@@ -10,7 +10,7 @@ from refusals import refused
 from shapes.grid_cases import assert_closed_manifold, enclosed_volume
 from signedheat.linear.restarts import matrix_forces, solve_with_restarts
 from signedheat.lowering.grid import masked as masked_grid
-from signedheat.lowering.grid.free_nodes import FreeNodes
+from signedheat.lowering.grid.masked import FreeNodes
 
 LEFT_OF_WALL = sh.Polyline([[0.3, 2.0], [0.3, 0.0]])
 
