@@ -24,10 +24,28 @@ def pcd(data, normals=True, points=POINTS, size="4"):
     table = np.column_stack([points, np.arange(len(points)), *([NORMALS[: len(points)]] if normals else [])])
     if data == "ascii":
         return (header + "\n".join(" ".join(map(str, row)) for row in table.tolist()) + "\n").encode()
-    return header.encode() + table.astype(f"<f{size}").tobytes()
+    table = table.astype(f"<f{size}")
+    return header.encode() + (packed(table.T.tobytes()) if data == "binary_compressed" else table.tobytes())
 
 
-@pytest.mark.parametrize("data", ["ascii", "binary"])
+def packed(data):
+    """LZF, that packs runs of one byte only: what comes again is a part that begins one byte before."""
+    result, at = b"", 0
+    while at < len(data):
+        run = 1
+        while run < 200 and data[at : at + run + 1] == data[at : at + 1] * (run + 1):
+            run += 1
+        result += b"\0" + data[at : at + 1]
+        length = run - 1 - 2
+        if 1 <= length < 7:
+            result += bytes([length << 5, 0])
+        elif length >= 7:
+            result += bytes([7 << 5, length - 7, 0])
+        at += run if length >= 1 else 1
+    return np.array([len(result), len(data)], dtype="<u4").tobytes() + result
+
+
+@pytest.mark.parametrize("data", ["ascii", "binary", "binary_compressed"])
 @pytest.mark.parametrize("normals", [True, False])
 @pytest.mark.parametrize("size", ["4", "8"])
 def test_points_are_read(tmp_path, data, normals, size):
@@ -36,6 +54,36 @@ def test_points_are_read(tmp_path, data, normals, size):
     cloud = sh.read(path)
     np.testing.assert_array_equal(cloud.points, POINTS)
     assert (cloud.normals is not None) == normals
+
+
+@pytest.mark.parametrize("n", [3, 300, 2048])
+def test_what_is_packed_is_unpacked_where_parts_come_again(tmp_path, n):
+    """Of points in a pattern, written by hand: a part of nine bytes, or more, from as far back as can be said."""
+    first = np.arange(3 * n, dtype="<f4").reshape(3, n)
+    table = np.concatenate([first, first], axis=1)  # each axis twice
+    body = b""
+    for row in first:
+        values = row.tobytes()
+        for at in range(0, len(values), 32):
+            body += bytes([len(values[at : at + 32]) - 1]) + values[at : at + 32]
+        for left in range(4 * n, 0, -264):
+            length, back = min(left, 264) - 2, 4 * n - 1
+            long = bytes([length - 7]) if length >= 7 else b""
+            body += bytes([min(length, 7) << 5 | back >> 8]) + long + bytes([back & 255])
+    header = f"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH {2 * n}\nHEIGHT 1\nDATA binary_compressed\n"
+    sizes = np.array([len(body), table.nbytes], dtype="<u4").tobytes()
+    (tmp_path / "cloud.pcd").write_bytes(header.encode() + sizes + body)
+    np.testing.assert_array_equal(sh.read(tmp_path / "cloud.pcd").points, table.T)
+
+
+@pytest.mark.parametrize("at", range(8, 60, 7))
+def test_damaged_packed_data_are_refused(tmp_path, at):
+    content = pcd("binary_compressed")
+    begin = content.index(b"compressed\n") + len(b"compressed\n")
+    for change in (content[: begin + at], content[: begin + 8] + b"\xff" * at + content[begin + 8 + at :]):
+        (tmp_path / "cloud.pcd").write_bytes(change)
+        with refused(sh.errors.FileFormatError, file="cloud.pcd"):
+            sh.read(tmp_path / "cloud.pcd")
 
 
 def test_points_without_a_position_are_left_out(tmp_path):

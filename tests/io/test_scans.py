@@ -40,3 +40,11 @@ def test_e57_puts_each_scan_into_its_place(tmp_path):
     path.write_bytes(b"ASTM-E57 and nothing else")
     with refused(sh.errors.FileFormatError):
         sh.read(path)
+
+
+@pytest.mark.parametrize(("kind", "package"), [("las", "laspy"), ("e57", "pye57")])
+def test_a_scan_that_is_not_there(tmp_path, kind, package):
+    pytest.importorskip(package)
+    with refused(sh.errors.FileFormatError, file=f"scan.{kind}") as caught:
+        sh.read(tmp_path / f"scan.{kind}")
+    assert not isinstance(caught.value.__cause__, OSError)

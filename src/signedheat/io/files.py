@@ -19,7 +19,7 @@ from contextlib import contextmanager, redirect_stderr, suppress
 from io import StringIO
 from pathlib import Path
 from traceback import walk_tb
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,14 +180,30 @@ def contents(path: PathLike) -> bytes:
     MemoryLimitError
         If it is larger than the memory that is free.
     """
+    with _opened(path) as (file, size):
+        ensure_fits(TAKEN.get(extension(path), 1) * size, path)
+        data = file.read()
+    if not data:
+        raise FileFormatError("the file is empty", remedy="write or download it again", path=path)
+    return data
+
+
+def size_of(path: PathLike) -> int:
+    """Bytes of a file that another package reads; what is missing, or no regular file, is refused as by `contents`."""
+    with _opened(path) as (_, size):
+        return size
+
+
+@contextmanager
+def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
+    """A regular file, and its size."""
     try:
         # without waiting, as for the writer of a pipe, until it is known what it is
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise _no_file(path, status.st_mode)
-            ensure_fits(TAKEN.get(extension(path), 1) * status.st_size, path)
-            data = file.read()
+            yield file, status.st_size
     except FileNotFoundError:
         raise FileFormatError("there is no such file", remedy="check the name", path=path) from None
     except IsADirectoryError:
@@ -200,9 +216,6 @@ def contents(path: PathLike) -> bytes:
         if isinstance(error, SignedHeatError):
             raise
         raise FileFormatError(f"this is no name of a file ({error})", remedy="check the name", path=path) from error
-    if not data:
-        raise FileFormatError("the file is empty", remedy="write or download it again", path=path)
-    return data
 
 
 def contents_beside(path: PathLike, name: str) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from ..domains.exchange import Elements
 from ..domains.point_cloud import PointCloud
 from ..errors import FileFormatError
 from ..packages import lazy_module, require
-from .files import PathLike, contents, ensure_fits, parsed_by_others, reading, refuse_kind, text
+from .files import PathLike, contents, ensure_fits, parsed_by_others, reading, refuse_kind, size_of, text
 
 SEPARATORS = str.maketrans(",;", "  ")
 NUMBERS = {"F": "f", "I": "i", "U": "u"}
@@ -92,7 +93,7 @@ def write_xyz(shape: Elements, path: PathLike) -> bytes:
 
 
 def read_pcd(path: PathLike) -> Elements:
-    """Points of a file with DATA ascii or binary; those without a position (NaN), as scanners write them, left out."""
+    """Points whose DATA are ascii, binary or binary_compressed; those without a position (NaN) are left out."""
     content = contents(path)
     header: dict[str, list[str]] = {}
     at = 0
@@ -133,8 +134,15 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.fl
             raise FileFormatError(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow")
         rows = np.frombuffer(body, row, n)
         return {name: rows[f"{k}"][:, 0].astype(np.float64) for k, name in enumerate(names)}
+    if kind == "binary_compressed":  # one field after another
+        body, at = _unpacked(body, n * row.itemsize), 0
+        table = {}
+        for name, code, count in zip(names, types, counts, strict=True):
+            table[name] = np.frombuffer(body, f"<{code}", n * count, at).reshape(n, count)[:, 0].astype(np.float64)
+            at += n * count * np.dtype(code).itemsize
+        return table
     if kind != "ascii":
-        raise FileFormatError(f"data are {kind}", remedy="write them as ascii or binary")
+        raise FileFormatError(f"data are {kind}", remedy="write them as ascii, binary or binary_compressed")
     try:
         numbers = np.array([line.split() for line in body.decode("ascii").splitlines() if line.strip()], dtype=float)
         numbers = numbers.reshape(n, sum(counts))
@@ -152,11 +160,10 @@ def read_las(path: PathLike) -> PointCloud:
     MissingPackageError
         If laspy is not installed, or for LAZ no package that it decompresses with.
     """
-    opened = laspy.open
+    size, opened = size_of(path), laspy.open
     if Path(path).suffix.lower() == ".laz" and not laspy.LazBackend.detect_available():
         require("lazrs", ".laz files")
     with reading(path):
-        size = Path(path).stat().st_size
 
         def parse() -> NDArray[np.float64]:
             with opened(str(path)) as file:
@@ -168,9 +175,8 @@ def read_las(path: PathLike) -> PointCloud:
 
 def read_e57(path: PathLike) -> PointCloud:
     """Points of all scans of an E57 file, in its own place for each; those that are marked invalid are left out."""
-    opened = pye57.E57
+    size, opened = size_of(path), pye57.E57
     with reading(path):
-        size = Path(path).stat().st_size
 
         def parse() -> NDArray[np.float64]:
             file = opened(str(path))
@@ -190,3 +196,38 @@ def _cloud(points: NDArray[np.float64], path: PathLike) -> PointCloud:
     if not len(points):
         raise FileFormatError("it has no points", path=path)
     return PointCloud(points)
+
+
+def _unpacked(body: bytes, size: int) -> bytes:
+    """What LZF has packed, behind two numbers of four bytes: how long it is packed, and unpacked.
+
+    A byte below 32 is followed by one more byte than it says. Others have the length of a part that comes again, less
+    two, in three bits (seven: the next byte is added), and in the other five and a byte how far back it is, less one.
+    """
+    ends = struct.unpack_from("<II", body) if len(body) >= 8 else (0, -1)
+    if ends[1] != size or len(body) < 8 + ends[0]:
+        raise FileFormatError(f"{size} bytes were to be unpacked from {ends[0]}: it is damaged or truncated")
+    packed, result, at = body[8 : 8 + ends[0]], bytearray(), 0
+    try:
+        while at < len(packed) and len(result) <= size:
+            control = packed[at]
+            at += 1
+            if control < 32:
+                result += packed[at : at + control + 1]
+                at += control + 1
+                continue
+            length = 2 + (control >> 5)
+            if length == 9:
+                length += packed[at]
+                at += 1
+            back = ((control & 31) << 8) + packed[at] + 1
+            at += 1
+            if back > len(result):
+                raise IndexError
+            part = bytes(result[len(result) - back : len(result) - back + length])
+            result += (part * (length // len(part) + 1))[:length]  # it may come again within itself
+    except IndexError:
+        raise FileFormatError("what is packed is damaged") from None
+    if len(result) != size:
+        raise FileFormatError(f"{len(result)} bytes were unpacked, not {size}: it is damaged")
+    return bytes(result)
