@@ -365,7 +365,7 @@ class SharpenedToCurves(Note):
     Attributes
     ----------
     completed_length : float
-        Fraction of what distance is measured to that is zero set of φ, standing in for missing curve.
+        Fraction of what distance is measured to that is zero set of φ, where curve is missing.
     free_ends : int
         Ends of oriented curves, but for those at the boundary of the surface, and points where curves run head to head.
     sides_by_curves : float

@@ -15,7 +15,7 @@ CURVES = (".txt", ".json")
 
 
 def check_files(arguments: Namespace) -> None:
-    """Tell curves from files, and reject those of several shapes."""
+    """Find a file of curves after that of a shape; reject curves with several shapes."""
     last = Path(arguments.files[-1]).suffix.lower()
     if len(arguments.files) == 2 and last in CURVES and arguments.curves is None:
         arguments.curves = arguments.files.pop()

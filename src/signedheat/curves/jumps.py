@@ -142,7 +142,7 @@ def minimize(
     progress : callable, optional
         Called with the fraction of `max_rounds` done.
     enough : callable, optional
-        Asked about constants whose gap is below `LOOSE` whether they will do: then no better ones are sought.
+        Called with constants whose gap is below `LOOSE`; if it returns True, no better ones are sought.
 
     Returns
     -------

@@ -133,7 +133,7 @@ def is_pair(thing: object) -> bool:
 
 
 def as_shape(thing: Shape | ForeignShape) -> Shape:
-    """The shape that an object of another package, or a pair of arrays, stands for; a shape as it is.
+    """The shape that an object of another package, or a pair of arrays, describes; a shape as it is.
 
     Every function that takes a shape does this by itself.
 

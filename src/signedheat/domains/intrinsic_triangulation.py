@@ -293,8 +293,8 @@ def intrinsic_delaunay(
     Raises
     ------
     GeometryError
-        If the domain is not a triangle mesh, has no area or faces so thin that lengths of edges do not tell it to four
-        digits, or `angle`, `max_vertices` or `coarsest` is out of range.
+        If the domain is not a triangle mesh, has no area or faces so thin that lengths of edges do not determine it to
+        four digits, or `angle`, `max_vertices` or `coarsest` is out of range.
     SourceError
         If a curve to be kept does not lie on the mesh.
 
@@ -342,7 +342,7 @@ def intrinsic_delaunay(
 
 
 def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
-    """Refuse what lengths of edges cannot tell: triangles thinner than about the square root of rounding."""
+    """Refuse what lengths of edges do not determine: triangles thinner than about the square root of rounding."""
     before, after = float(mesh.face_areas.sum()), float(triangles.face_areas.sum())
     longest, most = float(triangles.lengths_of_edges.max(initial=0.0)), float(mesh.edge_lengths.sum())
     lost = "" if abs(after - before) <= AREA_ERROR * before else f"area would be {after:.6g}, and it is {before:.6g}"

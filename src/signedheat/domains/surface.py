@@ -227,7 +227,7 @@ class Surface(Frozen):
         return corners // 3, np.eye(3)[corners % 3]
 
     def _triangulation_vertices(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Vertices of `triangulation` that stand for vertices of the domain."""
+        """Vertices of `triangulation` that are vertices of the domain."""
         return vertices
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

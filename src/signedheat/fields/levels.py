@@ -17,7 +17,7 @@ ROUNDS = 10
 
 
 class NodeValues(Protocol):
-    """Values of nodes by their indices: an array, or what stands for one."""
+    """Values of nodes by their indices: an array, or anything indexed like one."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...

@@ -18,7 +18,7 @@ TIE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class CurveSides:
-    """What oriented curves tell about the sides of the vertices of a surface.
+    """The sides of the vertices of a surface, as far as oriented curves decide them.
 
     Attributes
     ----------

@@ -71,8 +71,8 @@ class _Graph:
 def signs_of(links: Links, n_nodes: int) -> NDArray[np.float64]:
     """(n,) signs s that make Σ w s_tail s_head large: no sign gains by turning alone, and hardly any group of them.
 
-    Groups that tell most about each other merge first, and what they tell about third ones adds up (greedy additive
-    contraction, Keuper et al. 2015, for signs instead of cuts), until nothing is left to tell. Then groups are taken
+    Groups with the strongest links merge first, and their links to third ones add up (greedy additive contraction,
+    Keuper et al. 2015, for signs instead of cuts), until no link is left. Then groups are taken
     apart in reverse, and each part turns if that agrees better with the rest.
 
     Examples
@@ -154,7 +154,7 @@ def _turned_in_groups(
 
 
 def _contractions(graph: _Graph) -> list[tuple[_Graph, NDArray[np.int64], NDArray[np.float64]]]:
-    """Each graph, the group of each of its nodes and the sign in it, until nothing is left to tell."""
+    """Each graph, the group of each of its nodes and the sign in it, until no link is left."""
     levels = []
     while len(graph.neighbors):
         groups, within = _contraction(graph)

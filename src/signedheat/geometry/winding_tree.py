@@ -22,7 +22,7 @@ from .box_tree import LEAF, BoxTree
 DEPTH = 1e-5
 """Size of a face by which what is behind it lies behind it."""
 OPENING = 1.25
-"""Distance over radius from which on moments stand for what is below a node."""
+"""Distance over radius from which on moments replace what is below a node."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,7 +139,7 @@ def write_curves(
 
 
 def surface_in_space(domain: EmbeddedSurface | ForeignShape) -> EmbeddedSurface:
-    """The surface that an object of another package stands for; a surface as it is."""
+    """The surface that an object of another package describes; a surface as it is."""
     shape = converted(domain)
     if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface):
         raise UnsupportedTypeError(f"curves lie on surfaces, not on a {type(shape).__name__}", element="domain")

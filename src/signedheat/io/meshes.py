@@ -203,7 +203,7 @@ def read_off(path: PathLike) -> Elements:
 
 
 def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
-    """Lines joined until each holds as many words as its beginning asks for; more words on its last line stay."""
+    """Lines joined until each holds as many words as its beginning says; more words on its last line stay."""
     for row in lines:
         wanted = length(row)
         while len(row) < wanted and (more := next(lines, None)) is not None:

@@ -158,7 +158,7 @@ def read_3mf(path: PathLike) -> TriangleMesh:
 
 
 def unit_of(path: PathLike) -> str | None:
-    """The unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not tell.
+    """The unit of length of a file: what a 3MF file says, metres in glTF; None where formats do not say.
 
     Raises
     ------
@@ -189,7 +189,7 @@ class _Package:
 
     @property
     def root(self) -> str:
-        """The name of the part with the build, which the relations of the package tell."""
+        """The name of the part with the build, as the relations of the package say."""
         if "_rels/.rels" in self._zip.namelist():
             for relation in ElementTree.fromstring(self._bytes("_rels/.rels")):
                 if relation.get("Type", "").endswith("/3dmodel"):
@@ -265,6 +265,7 @@ def _matrix(element: ElementTree.Element) -> NDArray[np.float64]:
 
 
 def _object(element: ElementTree.Element, part: str) -> _Object:
+    """The object that an element of a part describes."""
     vertices = [[float(v.get(axis, "nan")) for axis in "xyz"] for v in _all(element, "vertex")]
     faces = [[int(t.get(corner, "-1")) for corner in ("v1", "v2", "v3")] for t in _all(element, "triangle")]
     parts = [(_key(each, part), _matrix(each)) for each in _all(element, "component")]

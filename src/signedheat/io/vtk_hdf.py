@@ -75,7 +75,7 @@ def _root(file: Any, kind: str, version: tuple[int, int]) -> Any:
 
 
 def _cells(group: Any, corners: NDArray[np.int64], counts: NDArray[np.int64]) -> None:
-    """Vertex ids of cells, one after another, and where each begins."""
+    """Write the vertex ids of cells, one after another, and where each begins, into a group of the file."""
     if group.name != "/VTKHDF":
         group["NumberOfCells"] = np.array([len(counts)])
     group["NumberOfConnectivityIds"] = np.array([len(corners)])

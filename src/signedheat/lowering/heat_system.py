@@ -73,7 +73,7 @@ def bend_around_corners(
     heights : (n,) float
         Logarithm of that heat.
     neighbors : (n, k) int
-        Cells or nodes beside each; −1 where there is none.
+        Cells or nodes next to each; −1 where there is none.
     straight : (n,) bool
         What the source reaches along a straight line: there X stays.
     """

@@ -33,7 +33,7 @@ FEW = 0.75
 NEARLY_CLOSED = 0.8
 """Share of votes (see `LEAST_VOTE`) from which a doubled part is a solid drawn from both sides, no wall."""
 SMALL = 0.03
-"""Share of the area up to which a part that lines tell nothing of asks its neighbours."""
+"""Share of the area up to which a part that lines do not decide follows its neighbours."""
 SOUP = 0.1
 """Share of the area of small loose parts from which a shape is a soup, in part."""
 UNEVEN = 0.04
@@ -118,20 +118,20 @@ class Orientation(Frozen, ShortRepr):
 
     @property
     def note(self) -> ShapeOriented:
-        """What is told of it in diagnostics."""
+        """The note about it in diagnostics."""
         return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
 
 
 def orientation(shape: Mesh | ForeignShape) -> Orientation:
-    """Orient a mesh, and tell what was turned, merged and left.
+    """Orient a mesh, and say what was turned, merged and left.
 
     Vertices at one place, to roundoff, count as one. Faces on the same corners count as one. Walls between closed cells
     are left out (`inner_walls`). Across edges of two faces orientation is carried on, and each part so found takes that
-    of the most of its area. Lines laid through the whole shape then tell which way each part faces (`orient_parts`).
+    of the most of its area. Lines through the whole shape then decide which way each part faces (`orient_parts`).
     Small pieces that touch other parts at corners face as they do; of those that touch nothing, each turns only if its
     neighbours clearly disagree with it. Where they are a tenth of the shape or more, and lines do not leave it as often
-    as they enter it, points on them tell which way they face, all together (`orient_triangles`): that is taken if lines
-    then find fewer contradictions.
+    as they enter it, points on them decide which way they face, all together (`orient_triangles`): that is taken if
+    lines then find fewer contradictions.
 
     A part that is there twice, once facing each way, is a doubled wall: both its sides stay. If it is closed, or holes
     make up less than a ninth of its area, it is a solid drawn from both sides, and one side goes.
@@ -326,8 +326,8 @@ def _ask_neighbors(
     if not small.any():
         return odds, undecided
     normals = faces.normals(surface.orientation.turned)[surface.owners]
-    told = odds_at_corners(surface.tails, surface.orientation.parts[surface.owners], normals, odds, small)
-    return told, undecided & (np.abs(told - odds) < 1.0)
+    found = odds_at_corners(surface.tails, surface.orientation.parts[surface.owners], normals, odds, small)
+    return found, undecided & (np.abs(found - odds) < 1.0)
 
 
 def _turned_together(
@@ -337,7 +337,7 @@ def _turned_together(
     lines: LineCrossings,
     crossed: NDArray[np.int64],
 ) -> NDArray[np.bool_] | None:
-    """Turn loose parts as points on them tell together; None if lines find no fewer contradictions then."""
+    """Turn loose parts all together, by points on them; None if lines find no fewer contradictions then."""
     surface, agreeing = faces.surface, faces.surface.orientation.turned
 
     def unevenness(turned: NDArray[np.bool_]) -> float:

@@ -22,7 +22,7 @@ def orient(
 ) -> Mesh | list[CurveOrPoints]:
     """A mesh with its faces turned so that neighbours agree and every part points outwards; or curves that agree.
 
-    See `orientation` and `curve_orientation`, which also tell what was turned.
+    See `orientation` and `curve_orientation`, which also say what was turned.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ LEAST_CLOSED = 0.5
 LEAST_AGREEMENT = 0.6
 """From this share of its area on, that given the same way round, a part's own orientation is a hint."""
 CERTAIN = 20.0
-"""Logarithm of the odds of what is told by a closed part's own volume."""
+"""Logarithm of the odds where a closed part's own volume decides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class PartOrientation:
     odds : (n_parts,) float
         Logarithms of the odds that a part faces the right way; negative for those that must turn.
     decided : (n_parts,) bool
-        Whether lines told anything. The others have but the orientation they were given.
+        Whether lines decided. The others have only the orientation they were given.
     nested : (n_parts,) int
         Part in which each lies that is hidden in another; −1 for none.
     cavity : (n_parts,) bool
@@ -71,7 +71,7 @@ class PartOrientation:
 def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64]) -> PartOrientation:
     """Let each part face out of the solid.
 
-    Closed parts first face out of themselves, which their volume tells. Parts that are seen from outside, closed or
+    Closed parts first face out of themselves, by the sign of their volume. Parts that are seen from outside, closed or
     open, then face to where they are seen from: lines enter a solid where they first meet it. A part hidden in another
     is a body inside a body if both were given the same way round, and the wall of a cavity if not, or if a part was
     given without a clear majority; whatever lies in a cavity is a body. Open parts that cannot be seen face so that
@@ -113,9 +113,9 @@ def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.
     return signs, by_volume | clear(found.own_votes, found.own, LEAST_VOTE)
 
 
-def clear(ballots: NDArray[np.int64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
+def clear(balance: NDArray[np.int64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
     """Whether a vote is no accident of few lines: beyond the share and two standard deviations of a coin's."""
-    return np.abs(ballots) > share * cast + 2.0 * np.sqrt(cast)
+    return np.abs(balance) > share * cast + 2.0 * np.sqrt(cast)
 
 
 def _by_sight(found: Votes) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -132,14 +132,14 @@ def _by_sight(found: Votes) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
 
 
 def _hint(parts: Parts, found: Votes) -> NDArray[np.float64]:
-    """What the votes for all other parts tell of the orientation as it was given, as logarithms of odds: 3 at most.
+    """Evidence for the orientation as given, from the votes for all other parts, as logarithms of odds: 3 at most.
 
     Parts of which a tenth was given the other way round count less: so may a small part have been.
     """
     trust = np.where(parts.fixed, 0.0, 2 * parts.agreement - 1)
-    ballots = trust * found.seen_votes
+    balance = trust * found.seen_votes
     total = max(float(np.abs(found.seen_votes).sum()), 1.0)
-    return 3.0 * np.where(parts.agreement >= LEAST_AGREEMENT, (ballots.sum() - ballots) / total, 0.0)
+    return 3.0 * np.where(parts.agreement >= LEAST_AGREEMENT, (balance.sum() - balance) / total, 0.0)
 
 
 def _nested(

@@ -30,9 +30,9 @@ class PointOrientation(ShortRepr):
     noisy : bool
         Whether noise called for neighbourhoods larger than the smallest.
     sided : bool
-        Whether anything told which side is out; points in a plane, say, tell nothing.
+        Whether anything decided which side is out; for points in a plane, say, nothing does.
     coherence : float
-        How far points confirm each other: 1 where all do. A low value means doubt; a high one is no proof, since thin
+        How far points confirm each other: 1 where all do. A low value is a warning; a high one is no proof, since thin
         sheets of noisy points can agree on a wrong side.
     """
 
@@ -62,7 +62,7 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
 
     Notes
     -----
-    Growth is n log n; up to 100,000 points, which stand for all, tell the sides.
+    Growth is n log n; the sides are decided with at most 100,000 of the points.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Small pieces that hang together with nothing: which way they face is told by what lies near them."""
+"""Orientation of small pieces without neighbours across edges, by what lies near them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from .axes import outward_signs
 from .plane_fits import fit_planes, noise_scale
 
 N_NEIGHBORS = 12
-"""Neighbours of a piece that are asked."""
+"""Neighbours that a piece is compared with."""
 N_AROUND = 24
 """Neighbours of a piece, itself included, whose agreement is measured."""
 SMOOTH = 0.7
-"""Mean square of the cosines between normals of neighbours from which they tell something; ⅓ if normals are random."""
+"""Mean square of the cosines between normals of neighbours from which they are evidence; ⅓ if normals are random."""
 LEAST_AGREEMENT = 0.6
 """How clearly neighbours must agree (1: all their normals along one line, the same way) to turn a piece."""
 AT_CORNERS = 5.0
@@ -34,7 +34,7 @@ def orient_triangles(
     groups : (m,) int, optional
         Triangles of the same group, which agree with each other, share one sign.
     n_samples : int
-        Points that stand for the triangles, at least one for each, as many more as their areas ask for.
+        Points on the triangles: at least one on each, and as many more as its share of the area is.
 
     Notes
     -----
@@ -100,7 +100,7 @@ def odds_at_corners(
     odds : (n_parts,) float
         Logarithms of the odds that parts face the right way.
     small : (n_parts,) bool
-        Parts that ask others, and only such as do not ask or have been told.
+        Parts that follow others: those that do not, or that have followed some already.
 
     Returns
     -------
@@ -108,20 +108,20 @@ def odds_at_corners(
         Logarithms of the odds, those of small parts with those of what they touch.
     """
     odds = odds.copy()
-    asking = small.copy()
+    undecided = small.copy()
     n_places = int(corners.max(initial=-1)) + 1
     for _ in range(16):
-        weights = np.where(asking, 0.0, np.tanh(0.5 * odds))[parts]
+        weights = np.where(undecided, 0.0, np.tanh(0.5 * odds))[parts]
         sums = np.stack([np.bincount(corners, weights * column, n_places) for column in normals.T], axis=1)
-        here = np.flatnonzero(asking[parts])
-        told = sums[corners[here]]
-        ballots = np.bincount(parts[here], np.einsum("ij,ij->i", told, normals[here]), len(odds))
-        cast = np.bincount(parts[here], np.linalg.norm(told, axis=1), len(odds))
-        found = asking & (cast > 0.5)
+        here = np.flatnonzero(undecided[parts])
+        around = sums[corners[here]]
+        balance = np.bincount(parts[here], np.einsum("ij,ij->i", around, normals[here]), len(odds))
+        cast = np.bincount(parts[here], np.linalg.norm(around, axis=1), len(odds))
+        found = undecided & (cast > 0.5)
         if not found.any():
             break
-        odds[found] += AT_CORNERS * ballots[found] / cast[found]
-        asking &= ~found
+        odds[found] += AT_CORNERS * balance[found] / cast[found]
+        undecided &= ~found
     return odds
 
 
@@ -140,19 +140,19 @@ def agreement(centroids: NDArray[np.float64], vectors: NDArray[np.float64]) -> f
 
 
 def disagreeing_with_neighbors(
-    centroids: NDArray[np.float64], normals: NDArray[np.float64], asking: NDArray[np.bool_], rounds: int = 4
+    centroids: NDArray[np.float64], normals: NDArray[np.float64], chosen: NDArray[np.bool_], rounds: int = 4
 ) -> NDArray[np.bool_]:
-    """Which of the asking pieces to turn so that they face as their neighbours do.
+    """Which of the chosen pieces to turn so that they face as their neighbours do.
 
-    Neighbours count the less the farther they are off the piece's plane, so that the other side of a thin wall is not
-    asked. Where normals scatter they tell nothing: noise turns as many one way as the other, and turning these back
-    would be a bias.
+    Neighbours count the less the farther they are off the piece's plane, so that the other side of a thin wall does
+    not count. Where normals scatter they are no evidence: noise turns as many one way as the other, and turning these
+    back would be a bias.
 
     Parameters
     ----------
     centroids, normals : (n, 3) float
         Where the pieces are, and unit normals; zero normals have no say.
-    asking : (n,) bool
+    chosen : (n,) bool
         Pieces that may turn.
 
     Returns
@@ -160,7 +160,7 @@ def disagreeing_with_neighbors(
     (n,) bool
         Pieces to turn.
     """
-    here = np.flatnonzero(asking)
+    here = np.flatnonzero(chosen)
     if len(centroids) < 3:
         return np.zeros(len(centroids), dtype=bool)
     distance, near = scipy.spatial.cKDTree(centroids).query(centroids[here], k=min(N_NEIGHBORS + 1, len(centroids)))
@@ -173,8 +173,8 @@ def disagreeing_with_neighbors(
     along *= weights
     signs = np.ones(len(centroids))
     for _ in range(rounds):
-        ballots = (along * signs[near]).sum(axis=1) * signs[here]
-        wrong = smooth & (ballots < -LEAST_AGREEMENT * total)
+        balance = (along * signs[near]).sum(axis=1) * signs[here]
+        wrong = smooth & (balance < -LEAST_AGREEMENT * total)
         if not wrong.any():
             break
         signs[here[wrong]] *= -1

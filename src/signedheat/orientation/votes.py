@@ -1,4 +1,4 @@
-"""What lines through a shape tell about which way its parts face."""
+"""Votes of lines through a shape on which way its parts face."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Votes:
 
     A line enters a solid where it meets it first and leaves it where it meets it last. Where that is the same
     crossing, it is seen from both sides and has no vote, so that sheets that lie open to both sides get none. Of a line
-    with any other odd number of crossings something is missing, nobody knows where: it tells nothing.
+    with any other odd number of crossings something is missing somewhere: it has no vote.
 
     Attributes
     ----------

@@ -66,8 +66,8 @@ def complete(
     Faces are turned to agree and to face outwards. Parts that bound something are closed by lids: thin plates that go
     on over their rims where the surface bends towards them, and are flat elsewhere. Points, and loose triangles that
     scatter around a surface, are completed by the signed heat method. Bodies that overlap are united. Sheets bound
-    nothing: distance to them is positive on both sides. None of this depends on where anybody asks, nor on rotation,
-    position and scale.
+    nothing: distance to them is positive on both sides. None of this depends on where distance is wanted, nor on
+    rotation, position and scale.
 
     Parameters
     ----------

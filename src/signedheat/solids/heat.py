@@ -23,7 +23,7 @@ from ..operators.grid.winding import winding_numbers
 from .parts import FRAGMENTS
 
 ROOM = 0.15
-"""Room around the shape, over its longest side: the surface stays within it, whatever room somebody asks for later."""
+"""Room around the shape, over its longest side: the surface stays within it, whatever the room of later grids."""
 NODES = (32, 144)
 """Least and most nodes along the longest side."""
 NEAR = 2.0
@@ -45,7 +45,7 @@ def heat_surface(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
     """Vertices and faces of the zero set of φ around a shape, closed; None where the shape bounds nothing.
 
-    Cells are as large as noise is wide, or a share of the gaps between points, within bounds; 0 asks for the smallest.
+    Cells are as large as noise is wide, or a share of the gaps between points, within bounds; 0 means the smallest.
     Away from the shape, winding numbers over what they are on a shape that is as complete decide the side where they
     are sure of it.
     """

@@ -100,7 +100,7 @@ class Offset:
     def _mitred(
         self,
         away: NDArray[np.float64],
-        feet: NDArray[np.float64],
+        places: NDArray[np.float64],
         heights: NDArray[np.float64],
         gradients: NDArray[np.float64],
         reach: NDArray[np.float64],
@@ -120,7 +120,7 @@ class Offset:
             )
             return found
 
-        above, faces = in_chunks(part, np.concatenate([feet[near], sides[:, None] * away[near]], axis=1))
+        above, faces = in_chunks(part, np.concatenate([places[near], sides[:, None] * away[near]], axis=1))
         beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # of the ball that cuts off
         planar = (faces >= 0) & (above > beyond)
         heights, gradients = heights.copy(), gradients.copy()

@@ -80,7 +80,7 @@ def thickness(shape: Mesh) -> Thickness:
 
 
 def _widths(faces: MeshFaces, lines: LineCrossings, wall: bool) -> tuple[NDArray[np.float64], int]:
-    """Widths between opposite faces along lines, and how many ways lead through walls, or gaps, of any kind."""
+    """Widths along lines of walls, else of gaps, between opposite faces; and how many of either sort are crossed."""
     last = np.zeros(len(lines.triangles), dtype=bool)
     last[lines.starts[1:][np.diff(lines.starts) > 0] - 1] = True
     here = np.flatnonzero(~last[:-1] & (lines.entering[:-1] == wall) & (lines.entering[1:] != wall))

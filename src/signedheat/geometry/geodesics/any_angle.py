@@ -37,8 +37,8 @@ def _seen(planes, neighbors, tets, points, first_tet, tets_at, v, target, slack)
 
 
 @compiled
-def _foot(rows, triangles_at, first_triangle, corners, near, x, y, z):
-    """Nearest point to (x, y, z) on the triangles that share a corner with triangle `near`: triangle and position."""
+def nearest_around(rows, triangles_at, first_triangle, corners, near, x, y, z):
+    """The triangle nearest to (x, y, z) of those that share a corner with triangle `near`, and its nearest point."""
     best, found, place = np.inf, near, np.zeros(3)
     for c in range(3):
         for i in range(first_triangle[corners[near, c]], first_triangle[corners[near, c] + 1]):
@@ -137,19 +137,19 @@ def any_angle_distance(
                     continue
                 x, y, z = points[v]
                 if bend[u] >= 0:
-                    via, near, foot, length = bend[u], nearest[u], places[u], distance[bend[u]]
+                    via, near, place, length = bend[u], nearest[u], places[u], distance[bend[u]]
                     target = points[via]
                 else:
-                    near, foot = _foot(rows, triangles_at, first_triangle, corners, nearest[u], x, y, z)
-                    via, length, target = -1, 0.0, foot
+                    near, place = nearest_around(rows, triangles_at, first_triangle, corners, nearest[u], x, y, z)
+                    via, length, target = -1, 0.0, place
                 length += _length(target, x, y, z)
                 if length >= distance[v]:
                     continue
                 if not _seen(planes, neighbors, tets, points, first_tet, tets_at, v, target, slack):
-                    via, near, foot, length = u, nearest[u], places[u], distance[u] + _length(points[u], x, y, z)
+                    via, near, place, length = u, nearest[u], places[u], distance[u] + _length(points[u], x, y, z)
                 if length < distance[v]:
                     distance[v], bend[v], nearest[v] = length, via, near
                     for d in range(3):
-                        places[v, d] = foot[d]
+                        places[v, d] = place[d]
                     push(queue, v, length)
     return distance, nearest, places, hidden

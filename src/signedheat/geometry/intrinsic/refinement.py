@@ -74,9 +74,11 @@ def refine_all(
 def refined(
     gluing: Gluing, agenda: Agenda, goal: Goal, progress: Callable[[float], None] | None
 ) -> tuple[Gluing, Agenda, int]:
-    """Refine until the goal is met or out of reach; the arrays, perhaps longer ones, and why it ended."""
+    """Refine until the goal is met or no vertex is left; the arrays, longer where they were full, and why it ended."""
     list_all(gluing, agenda, goal)
-    listed = np.flatnonzero(agenda.bins >= 0)  # lists by size, large faces first: the current list shows the progress
+    listed = np.flatnonzero(
+        agenda.bins >= 0
+    )  # faces to refine, by size: the largest come first, so that their list says how far it is
     done = 0.0
     while True:
         status = refine(gluing, agenda, goal, PATIENCE)

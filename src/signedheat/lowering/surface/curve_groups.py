@@ -1,4 +1,4 @@
-"""Pieces of broken curves in groups that are likely to be one curve each, told by their ends alone."""
+"""Pieces of broken curves in groups that are likely to be one curve each, by their ends alone."""
 
 from __future__ import annotations
 

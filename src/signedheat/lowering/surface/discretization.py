@@ -57,7 +57,7 @@ class SurfaceDiscretization:
         Positions in space of the vertices, or of the corners of each face (up to translation) if every face lies in a
         plane of its own; needed for curves with given normals. By default those of the domain's triangulation.
     triangulation : IntrinsicTriangulation, optional
-        That of the domain whose vertices are the first of the triangles; φ on it is kept beside that on the domain.
+        That of the domain whose vertices are the first of the triangles; φ on it is kept as well.
     spacing : float, optional
         h. By default half the mean edge length, the mean distance between neighbouring edge midpoints.
     notes : tuple of Note
@@ -225,7 +225,7 @@ def memory_estimate(n_triangles: int) -> float:
     return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
 
 
-def refuse_too_many(triangles: int, count: int, elements: str, beside: float = 0.0) -> None:
+def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0) -> None:
     """Raise `MemoryLimitError` if distance on so many triangles does not fit into memory.
 
     Parameters
@@ -236,14 +236,14 @@ def refuse_too_many(triangles: int, count: int, elements: str, beside: float = 0
         The number of elements of the domain that they stand for: triangles, polygons, points, faces of voxels.
     elements : str
         What these are called.
-    beside : float
+    more : float
         Bytes that are needed besides.
     """
     each = triangles / max(count, 1)
     refuse_beyond_memory(
         f"distance on {count:,} {elements}",
         count,
-        lambda number: memory_estimate(math.ceil(each * number)) + beside * number / count,
+        lambda number: memory_estimate(math.ceil(each * number)) + more * number / count,
         lambda number: f"use at most {number:,} {elements}, coarsened or in parts",
     )
 
@@ -305,7 +305,7 @@ def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
 
 
 NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
-"""Bytes of the libraries that find neighbours, and of neighbours, beside those of triangles. Measured."""
+"""Bytes of the libraries that find neighbours, and of neighbours, in addition to those of triangles. Measured."""
 
 
 @discretize.register
@@ -314,9 +314,7 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
 
     h is the mean distance between neighbouring points, the scale below which the samples do not determine the surface.
     """
-    refuse_too_many(
-        2 * domain.n_points, domain.n_points, "points", beside=NEIGHBORS + BYTES_PER_POINT * domain.n_points
-    )
+    refuse_too_many(2 * domain.n_points, domain.n_points, "points", more=NEIGHBORS + BYTES_PER_POINT * domain.n_points)
     mesh = domain.triangulation
     used = np.zeros(domain.n_points, dtype=bool)
     used[mesh.faces] = True
@@ -338,7 +336,7 @@ def _(domain: DigitalSurface) -> SurfaceDiscretization:
     smaller scale the shape of the surface is unknown, and diffusion would follow the directions of the lattice.
     """
     faces = count_surfels(domain.volume)
-    refuse_too_many(4 * faces, faces, "faces of voxels", beside=BYTES_PER_VOXEL * domain.volume.size)
+    refuse_too_many(4 * faces, faces, "faces of voxels", more=BYTES_PER_VOXEL * domain.volume.size)
     mesh, corners = domain.triangulation, domain.smooth_vertices
     positions = np.concatenate([corners, corners[domain.surfels.corners].mean(axis=1)])
     placed = positions[mesh.faces]

@@ -34,13 +34,13 @@ ANGLE = 20.0
 """Smallest angle of "auto", in degrees: vertices that 28 would take are better spent on large triangles."""
 
 COARSEST = 1.41
-"""Largest triangles of "auto", beside the mean one: curves on coarser ones are not resolved."""
+"""Largest triangles of "auto", over the mean one: curves on coarser ones are not resolved."""
 
 BYTES_REFINED = 750
 """What each triangle of a refinement takes itself, besides distance on it."""
 
 SHARE_OF_PIECE = 0.5
-"""h beside the length of the pieces of a curve that is to be completed, where triangles are larger."""
+"""h over the length of the pieces of a curve that is to be completed, where triangles are larger."""
 
 THICKNESS = 1e-9
 """Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
@@ -70,8 +70,8 @@ class Retriangulated:
 class RetriangulatedForZeroSet(Retriangulated):
     """The same for those who want the zero set alone: h suits pieces of curves, not triangles far away.
 
-    With the t of large triangles, pieces of a curve that is smaller than these are one blot of heat, which tells
-    nothing of how the curve goes on between them. Gaps are about as long as pieces are, or shorter. Of several curves
+    With the t of large triangles, pieces of a curve that is smaller than these are one blot of heat, and
+    how the curve goes on between them is lost. Gaps are about as long as pieces are, or shorter. Of several curves
     the smallest counts.
     """
 
@@ -84,8 +84,8 @@ class RetriangulatedForZeroSet(Retriangulated):
             return surface, groups
         areas = surface.triangles.face_areas[np.concatenate([part.faces for part in parts])]
         lengths = np.concatenate([part.lengths for part in parts])
-        beside = 0.5 * float(np.average(np.sqrt(4 / 3**0.5 * areas), weights=lengths))
-        return replace(surface, spacing=min(surface.spacing, max(SHARE_OF_PIECE * scales.min(), beside))), groups
+        own = 0.5 * float(np.average(np.sqrt(4 / 3**0.5 * areas), weights=lengths))
+        return replace(surface, spacing=min(surface.spacing, max(SHARE_OF_PIECE * scales.min(), own))), groups
 
 
 def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
@@ -126,7 +126,7 @@ def refined(
     coarsest: float = np.inf,
 ) -> SurfaceDiscretization:
     """The intrinsic Delaunay refinement of a mesh; fields are reported on the mesh, and kept on the refinement."""
-    refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", beside=BYTES_REFINED * mesh.n_faces)  # which only grow
+    refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_REFINED * mesh.n_faces)  # which only grow
     domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=progress)
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     lowered_mesh = lowered(domain, domain=mesh, restriction=np.arange(mesh.n_vertices))

@@ -29,7 +29,7 @@ SMOOTHING = 1.0
 """Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Of balls, half spaces and boxes, 24 to 96
 nodes wide, distances come out best with .7 to 1; more rounds the edges of boxes."""
 LEAST, MOST = 0.3, 0.6
-"""Between these a smoothed sign is kept, so that contours cross the middle third of an edge: the signs tell no more.
+"""Between these a smoothed sign is kept, so that contours cross the middle third of an edge: signs contain no more.
 With the middle three fifths balls and half spaces come out a tenth better, and boxes a tenth worse."""
 UNEVEN = 0.05
 """Cells by which crossings may lie off the paraboloid of the next where the zero set is smooth. Of balls of four cells'
