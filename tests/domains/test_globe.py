@@ -78,6 +78,22 @@ def test_geojson_land_is_positive_whichever_way_its_rings_run(globe, tmp_path):
         assert (phi[at] > 0).tolist() == [True, False, False, False]
 
 
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize(("ring", "inside", "outside"), [
+    ([[170, -20], [-160, -20], [-160, 30], [170, 30]], (-175, 0), (0, 0)),  # over the 180th meridian
+    ([[x, -60] for x in range(-180, 180, 20)], (40, -80), (40, 0)),  # around the south pole
+    ([[x, 50] for x in range(-170, 180, 20)] + [[180, 50], [180, 90], [-180, 90], [-180, 50]], (0, 80), (0, -10)),
+])  # fmt: skip
+def test_land_over_the_last_meridian_and_around_poles(globe, tmp_path, ring, inside, outside, way):
+    ring = ring[::way]
+    text = json.dumps({"type": "Polygon", "coordinates": [[*ring, ring[0]]]})
+    (tmp_path / "land.geojson").write_text(text)
+    phi = sh.SignedHeatSolver(globe).distance(sh.io.read_globe_curves(tmp_path / "land.geojson", globe)).values
+    longitude, latitude = places(globe)
+    at = [np.argmin(np.hypot(longitude - x, latitude - y)) for x, y in (inside, outside)]
+    assert (phi[at] > 0).tolist() == [True, False]
+
+
 def test_what_is_no_curve_on_a_globe_is_refused(globe, tmp_path):
     for wrong, element in (
         ([[0, 95], [1, 0]], "point 0"),

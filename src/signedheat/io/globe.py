@@ -102,9 +102,12 @@ def _line(places: list[list[float]]) -> Line:
 
 
 def _turns_left(points: NDArray[np.float64]) -> float:
-    """1 if a ring runs counter-clockwise in the plane of longitude and latitude, else −1."""
-    x, y = points.T
-    return 1.0 if float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0 else -1.0
+    """1 if what a ring encloses is left of it, else −1; around a pole that is the side of the pole that is nearer."""
+    x, y = np.append(points, points[:1], axis=0).T
+    x = np.unwrap(x, period=360.0)  # the shorter way, over the 180th meridian, too
+    turns = round(float(x[-1] - x[0]) / 360.0)
+    size = turns * float(y.mean()) if turns else float(x[:-1] @ y[1:] - y[:-1] @ x[1:])
+    return 1.0 if size > 0 else -1.0
 
 
 def _geojson(path: PathLike) -> list[Line]:
