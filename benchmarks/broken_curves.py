@@ -19,6 +19,7 @@ seeds. A failure of a program is counted, not averaged.
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 import warnings
 from pathlib import Path
@@ -27,12 +28,14 @@ import numpy as np
 import potpourri3d as pp3d
 import trimesh
 from scipy.spatial import Delaunay, cKDTree
-from surface_winding import winding_side
 
 import signedheat as sh
 from signedheat.discretization import discretize
 from signedheat.geometry.geodesics.exact import distance_to_segments
 from signedheat.geometry.geodesics.sources import PlacedSegments
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from surface_winding import winding_side
 
 N_PIECES = 12
 DAMAGES = {

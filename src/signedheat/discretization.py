@@ -142,6 +142,12 @@ class Levels:
     values: NDArray[np.float64]
     groups: NDArray[np.int64] | None = None
 
+    def at(self, places: Any) -> Levels:
+        """The levels at means of samples: sparse (r, s), each of samples of one group."""
+        return Levels(
+            places @ self.values, None if self.groups is None else self.groups[places.indices[places.indptr[:-1]]]
+        )
+
 
 @singledispatch
 def discretize(domain: Any, **options: Any) -> Discretization:

@@ -247,3 +247,22 @@ def test_pieces_with_normals_on_faces_that_look_either_way():
     ]
     phi = sh.signed_distance(pieces, mesh)
     assert np.mean(np.sign(phi.values) != np.sign(height)) < 0.01
+
+
+@pytest.mark.parametrize("times", [2, 5])
+def test_more_points_on_the_same_lines_change_nothing(times):
+    """A level set of a ball, in pieces, with further points on each of its segments."""
+    mesh = sphere(3)
+    whole = mesh.level_set(mesh.vertices @ [0.2, 0.1, 1.0], 0.2)[0]
+    n = whole.n_points
+    pieces = [sh.Curve(whole.faces[k : k + n // 5], whole.barycentric[k : k + n // 5]) for k in range(0, n - 2, n // 4)]
+    finer = []
+    for piece in pieces:
+        # the points of a level set lie on edges: every two that follow each other are in one face
+        at = np.einsum("nk,nkd->nd", piece.barycentric, mesh.vertices[mesh.faces[piece.faces]])
+        steps = (np.arange(times) / times)[None, :, None]
+        between = np.concatenate([(at[:-1, None] + steps * np.diff(at, axis=0)[:, None]).reshape(-1, 3), at[-1:]])
+        finer.append(mesh.polyline(between))
+        assert finer[-1].n_points == times * (piece.n_points - 1) + 1
+    coarse, fine = (sh.signed_distance(curves, mesh).values for curves in (pieces, finer))
+    np.testing.assert_allclose(fine, coarse, atol=1e-6 * np.ptp(coarse))

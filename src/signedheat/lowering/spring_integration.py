@@ -47,8 +47,8 @@ class SpringIntegration(DirectIntegration):
         S is the diagonal matrix of the `springs`, in place of the multipliers of Eq. 14. A group of one sample, whose
         constant may be anything, has no spring.
         """
-        rows = source.interpolation
-        springs = self.springs(source)
+        places, springs = self.held(source)
+        rows, levels = sparse.csr_matrix(places @ source.interpolation), levels.at(places)
         if levels.groups is not None:
             springs = np.where(np.bincount(levels.groups)[levels.groups] > 1, springs, 0.0)
         factor = self._pulled_factor(rows, springs)
@@ -77,6 +77,10 @@ class SpringIntegration(DirectIntegration):
         """Factor of C with φ held at zero along the source, however small a part of it lies in the domain."""
         springs, least = self.springs(source), ANCHOR * float(self.stiffness.diagonal().max())
         return self._pulled_factor(source.interpolation, springs * max(1.0, least / float(springs.sum())))
+
+    def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
+        """(r, s) where springs of `fit` hold φ, as means of samples, and (r,) their stiffness."""
+        return sparse.eye_array(len(source.weights), format="csr"), self.springs(source)
 
     def springs(self, source: SourceTerm) -> NDArray[np.float64]:
         """(s,) stiffness of the springs: stiff for samples at vertices, soft for those inside cells."""

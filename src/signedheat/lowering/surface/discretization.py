@@ -32,7 +32,7 @@ from ...operators.cotan import cotan_matrix, divergence
 from ..direct_integration import DirectIntegration, refuse_contradictions
 from ..spring_integration import SpringIntegration
 from .nonmanifold_frames import nonmanifold_frames
-from .source import surface_source
+from .source import SurfaceSource, ends_among, surface_source
 from .vector_heat import VectorHeat, extrapolated
 
 TIMES = 2
@@ -267,6 +267,23 @@ class SurfaceIntegration(SpringIntegration):
     def anchored(self, source: SourceTerm) -> Factor:
         """Factor of C with φ held at zero along the source, as stiffly at every sample."""
         return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
+
+    def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, NDArray[np.float64]]:
+        """Springs all along segments, so that more points on them change nothing; at vertices, and isolated points.
+
+        What is linear along a segment has the same square there as at its two Gauss points.
+        """
+        assert isinstance(source, SurfaceSource)
+        n, springs = len(source.weights), self.springs(source)
+        ends, lengths = ends_among(source.parts, np.arange(n)), np.concatenate([p.lengths for p in source.parts])
+        shares = 0.5 + np.array([[1.0, -1.0], [-1.0, 1.0]]) / 12**0.5
+        along = np.repeat(ends, 2, axis=0), np.tile(shares, (len(ends), 1))
+        alone = np.bincount(ends.ravel(), minlength=n) == 0
+        points = np.flatnonzero(alone | (np.diff(source.interpolation.indptr) == 1))
+        starts = np.concatenate([np.arange(0, 4 * len(ends), 2), 4 * len(ends) + np.arange(len(points) + 1)])
+        entries = np.concatenate([along[1].ravel(), np.ones(len(points))]), np.concatenate([along[0].ravel(), points])
+        places = sparse.csr_matrix((*entries, starts), shape=(len(starts) - 1, n))
+        return places, np.concatenate([np.repeat(0.5 * self.strength * lengths, 2), springs[points]])
 
     def fit(self, divergence: NDArray[np.float64], source: SourceTerm, levels: Levels) -> NDArray[np.float64]:
         """Impose levels: exactly along edges, to some hundredths of h across faces (Eq. 14)."""
