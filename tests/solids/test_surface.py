@@ -12,7 +12,7 @@ from signedheat.errors import OutsideError
 from signedheat.geometry.conforming import conforming
 from signedheat.geometry.edges import edge_table
 from signedheat.geometry.self_intersections import self_intersections
-from signedheat.solids import simplification
+from signedheat.solids import features, simplification
 from signedheat.solids.complete import complete
 from signedheat.solids.simplification import is_within
 
@@ -75,6 +75,29 @@ def test_corners_and_edges_of_boxes_are_exact(seed):
     off = np.abs(surface.distance(along)) / spacing
     assert np.quantile(off, 0.95) < 1e-3
     assert off.max() < 0.15
+
+
+def test_edges_that_cut_creases_off_are_divided(monkeypatch):
+    """Nuts, some of whose creases pass through cells without crossing their edges: sums of the largest distances."""
+    angles = np.linspace(0, 2 * np.pi, 7)[:-1]
+    rim = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    points = np.concatenate([np.c_[rim, np.zeros(6)], np.c_[rim, np.full(6, 0.8)]])
+    hull = scipy.spatial.ConvexHull(points)
+    outside = np.cross(*(points[hull.simplices[:, k]] - points[hull.simplices[:, 0]] for k in (1, 2)))
+    backwards = (outside * hull.equations[:, :3]).sum(axis=1) < 0
+    faces = np.where(backwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+    solids = [complete(turned(sh.TriangleMesh(points, faces), seed)) for seed in range(12)]
+    largest = []
+    for divisions in (features.DIVISIONS, 0):
+        monkeypatch.setattr(features, "DIVISIONS", divisions)
+        largest.append(0.0)
+        for solid in solids:
+            surface = solid.surface(spacing=0.1)
+            assert_closed_manifold(surface)
+            assert not len(self_intersections(surface.vertices, surface.faces))
+            middles = surface.vertices[surface.faces] + surface.vertices[np.roll(surface.faces, 1, axis=1)]
+            largest[-1] += np.abs(solid.distance(0.5 * middles.reshape(-1, 3))).max() / 0.1
+    assert largest[0] < 0.85 * largest[1]
 
 
 def test_inner_offsets_have_edges_and_outer_ones_are_round():

@@ -20,7 +20,7 @@ from ..geometry.dual_cells import DualCells, cells_around, dual_cells, open_cell
 from ..geometry.marching import CLEARANCE
 from ..operators.grid.blocks import SIDE, Blocks
 from ..progress import Progress
-from .features import placed
+from .features import divided_along_creases, placed
 from .fields import in_threads, prepared, tiles_of
 from .nodes import solved
 from .offsets import Offset
@@ -114,8 +114,9 @@ def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) 
     report(0.9, "faces")
     shares = np.clip(shares, CLEARANCE, 1 - CLEARANCE)
     vertices, faces = separate_triangles(cells, nodes, axes, crossings.rising, shares, choices)
+    vertices, faces = divided_along_creases(offset, grid.spacing, grid.origin + vertices * grid.spacing, faces)
     report(1.0, "faces")
-    return TriangleMesh(grid.origin + vertices * grid.spacing, faces)
+    return TriangleMesh(vertices, faces)
 
 
 def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCells]:
