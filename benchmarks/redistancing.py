@@ -1,6 +1,7 @@
 """Distance from arrays: `redistance` beside fast marching (scikit-fmm, if it is installed) and a distance transform.
 
-Errors in cells, the largest and the mean square, over all nodes; the worst of four random positions each.
+Errors in cells, the largest and the mean square, over all nodes; the worst of four random positions each. Around a
+wall, one node thick, distance is that over its end; on periodic axes to the nearest of all balls. Processor seconds.
 """
 
 from __future__ import annotations
@@ -37,6 +38,28 @@ def shapes(n: int, dimension: int, rng: np.random.Generator) -> dict[str, tuple[
     }
 
 
+def around(n: int, dimension: int, rng: np.random.Generator) -> dict[str, tuple[Array, Array, bool]]:
+    """Arrays with walls or on periodic axes, their distances, and whether axes are periodic."""
+    axes = [np.arange(n) - (n - 1) // 2] * dimension
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).astype(float)
+    middle = rng.uniform(-0.5, 0.5, dimension) * n
+    ball = np.linalg.norm((points - middle + n / 2) % n - n / 2, axis=-1) - 0.2 * n
+    beside = np.zeros(dimension)
+    beside[:2] = -0.25 * n + rng.uniform(-0.5, 0.5), -0.2 * n
+    flat = np.linalg.norm(points[..., :2] - beside[:2], axis=-1)  # the same along the third axis
+    wall = (points[..., 0] == 0) & (points[..., 1] <= 0)
+    corner, far = np.array([[-0.5, 0.5], [0.5, 0.5]]), points[..., 0] > 0
+    seen = (0.5 - beside[1]) * (points[..., 0] - beside[0]) < (points[..., 1] - beside[1]) * (-0.5 - beside[0])
+    past = np.linalg.norm(points[..., :2] - corner[1], axis=-1) + 1.0
+    steep = (points[..., 1] - 0.5) > 0  # over the first corner only
+    bent = np.where(steep, np.linalg.norm(points[..., :2] - corner[0], axis=-1), past)
+    way = np.where(far & ~seen, bent + np.linalg.norm(corner[0] - beside[:2]), flat) - 0.1 * n
+    return {
+        "ball, periodic": (ball, ball, True),
+        "cylinder, around a wall": (np.ma.masked_array(way, wall), way, False),
+    }
+
+
 def transform(values: Array) -> Array:
     """Distance to the nearest node of the other side, less half a cell."""
     inside, outside = (scipy.ndimage.distance_transform_edt(part) for part in (values < 0, values >= 0))
@@ -44,12 +67,12 @@ def transform(values: Array) -> Array:
 
 
 def main() -> None:
-    methods: dict[str, Callable[[Array], Array]] = {"redistance": sh.redistance, "transform": transform}
+    methods: dict[str, Callable[..., Array]] = {"redistance": sh.redistance, "transform": transform}
     if find_spec("skfmm"):
         import skfmm
 
         methods["fast marching"] = skfmm.distance
-    print(f"{'':>30}", *(f"{name:>18}" for name in methods))
+    print(f"{'':>35}", *(f"{name:>18}" for name in methods))
     for dimension, n in ((2, 48), (2, 192), (3, 48)):
         rng, errors = np.random.default_rng(0), dict[str, dict[str, list[tuple[float, float]]]]()
         for _ in range(4):
@@ -61,13 +84,22 @@ def main() -> None:
         for name, of in errors.items():
             worst = (np.max(of[method], axis=0) for method in methods)
             print(f"{dimension}-D, {n:>3}, {name:<25}", *(f"{most:>9.2g} {mean:>8.1g}" for most, mean in worst))
-    values, _ = shapes(128, 3, np.random.default_rng(0))["ball, distance"]
-    times = []
-    for measured in methods.values():
-        begin = time.perf_counter()
-        measured(values)
-        times.append(time.perf_counter() - begin)
-    print(f"{'seconds, 128³ nodes':<35}", *(f"{seconds:>18.2f}" for seconds in times))
+    del methods["transform"]
+    for dimension, n in ((2, 192), (3, 48)):
+        for name, (values, exact, again) in around(n, dimension, np.random.default_rng(0)).items():
+            found = [np.abs(measured(values, periodic=again) - exact) for measured in methods.values()]
+            both = (f"{e.max():>9.2g} {np.sqrt((e**2).mean()):>8.1g}" for e in found)
+            print(f"{dimension}-D, {n:>3}, {name:<25}", *both)
+    for name, values, again in (
+        ("128³", shapes(128, 3, np.random.default_rng(0))["ball, distance"][0], False),
+        *((f"128³, {key}", of[0], of[2]) for key, of in around(128, 3, np.random.default_rng(0)).items()),
+    ):
+        times = []
+        for measured in methods.values():
+            begin = time.process_time()
+            measured(values, periodic=again)
+            times.append(time.process_time() - begin)
+        print(f"{'seconds, ' + name:<35}", *(f"{seconds:>18.2f}" for seconds in times))
 
 
 if __name__ == "__main__":
