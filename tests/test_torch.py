@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
 from signedheat import samples
 
 torch = pytest.importorskip("torch")
@@ -71,8 +72,8 @@ def test_on_the_surface_the_gradient_is_the_normal():
 def test_other_vertices_are_refused():
     solid, points = sh.complete(samples.sphere(1)), torch.zeros((1, 3))
     for vertices in (torch.zeros((42, 3)), torch.zeros((3, 3))):
-        with pytest.raises(sh.errors.SourceError, match="vertices are not those"):
+        with refused(sh.errors.SourceError, "vertices"):
             sh.torch.distance(solid, points, vertices)
     cloud = sh.complete(samples.oriented_points(samples.sphere(2), 500))
-    with pytest.raises(sh.errors.SourceError, match="triangle mesh"):
+    with refused(sh.errors.SourceError, "solid"):
         sh.torch.distance(cloud, points, torch.zeros((42, 3)))

@@ -5,6 +5,7 @@ import pytest
 import scipy
 
 import signedheat as sh
+from refusals import refused
 from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold
 from signedheat import samples
@@ -139,9 +140,9 @@ def test_smooth_surfaces_are_those_of_the_field():
 
 
 def test_levels_that_are_not_taken():
-    with pytest.raises(OutsideError, match="nowhere"):
+    with refused(OutsideError):
         complete(samples.sphere(2)).surface(-2.0, resolution=16)
-    with pytest.raises(OutsideError, match="smaller cells"):
+    with refused(OutsideError):
         complete(turned(box((0, 0, 0), (1, 1, 1e-6)))).surface(resolution=16)
 
 
@@ -223,9 +224,9 @@ def test_whole_shapes_keep_their_faces_as_they_are():
 
 
 def test_faces_cannot_be_kept_elsewhere_or_of_sheets():
-    with pytest.raises(sh.errors.SignedHeatError, match="level 0"):
+    with refused(sh.errors.SignedHeatError):
         complete(samples.sphere(2)).surface(0.1, keep_faces=True)
-    with pytest.raises(sh.errors.GeometryError, match="bounds a solid"):
+    with refused(sh.errors.GeometryError):
         complete(sh.TriangleMesh([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])).surface(
             keep_faces=True
         )
@@ -242,7 +243,7 @@ def test_simplified_surfaces_are_closed_and_within_the_tolerance(name):
     for one, other in ((simple, plain), (plain, simple)):
         places = np.concatenate([one.vertices, one.vertices[one.faces].mean(axis=1)])
         assert np.abs(complete(other).distance(places)).max() <= 0.01 * (1 + 1e-9)
-    with pytest.raises(sh.errors.SignedHeatError, match="tolerance"):
+    with refused(sh.errors.SignedHeatError):
         solid.surface(tolerance=-1)
 
 

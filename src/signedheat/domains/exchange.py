@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import GeometryError, UnsupportedTypeError
 from ..geometry.components import members_of
-from ..geometry.tet_faces import face_table
-from ..operators.tetrahedral import signed_volumes
+from ..geometry.tet_shapes import face_table, signed_volumes
 from ..packages import lazy_module
 from .validation import array_of, coordinates, element_ids
 

@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..frozen import Frozen
-from ..geometry.box_tree import BoxTree
 from ..geometry.components import element_components
-from ..geometry.tet_faces import FaceTable, face_table
-from ..operators.tetrahedral import Tetrahedra, signed_volumes
+from ..geometry.tet_shapes import FaceTable, signed_volumes
+from ..operators.tetrahedral import Tetrahedra
 from ..packages import lazy_module
 from .exchange import Displayed, shapes, tets_of_meshio, tets_of_pyvista
 from .triangle_mesh import TriangleMesh
@@ -98,10 +97,10 @@ class TetMesh(Displayed, Frozen):
         """Areas, volumes and operators of the tets."""
         return Tetrahedra(self.vertices, self.tets)
 
-    @cached_property
+    @property
     def faces(self) -> FaceTable:
         """The triangular faces of the tets."""
-        return face_table(self.tets)
+        return self.geometry.faces
 
     @property
     def tet_volumes(self) -> NDArray[np.float64]:
@@ -123,12 +122,6 @@ class TetMesh(Displayed, Frozen):
     def parts(self) -> NDArray[np.int64]:
         """(m,) connected component of each tet, through shared faces."""
         return element_components(self.faces.tet_faces)
-
-    @cached_property
-    def search_tree(self) -> BoxTree:
-        """Tree of the bounding boxes of the tets."""
-        corners = self.vertices[self.tets]
-        return BoxTree.of(corners.min(axis=1), corners.max(axis=1))
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:

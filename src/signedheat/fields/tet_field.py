@@ -156,7 +156,7 @@ class TetField(Displayed, Combinable, Frozen):
             If φ does not take the level anywhere in the mesh.
         """
         level = finite_number(level, "level")
-        return TriangleMesh(*closed_level_set(self.mesh, self.values, self._vertex_gradients, level))
+        return TriangleMesh(*closed_level_set(self.mesh.geometry, self.values, self._vertex_gradients, level))
 
     def offset(self, distance: float) -> TriangleMesh:
         """The offset of the shape at a signed distance: `contour`, but refused if the mesh is too small for it.
@@ -216,7 +216,7 @@ class TetField(Displayed, Combinable, Frozen):
 
     @cached_property
     def _planes(self) -> Planes:
-        return Planes.of(self.mesh)
+        return Planes.of(self.mesh.geometry)
 
     @cached_property
     def _wall_tree(self) -> TriangleTree:
@@ -227,12 +227,12 @@ class TetField(Displayed, Combinable, Frozen):
 
         The offset is the vector (k, 3) from the closest point of the mesh to the point, zero inside the mesh.
         """
-        tets = containing_tets(self.mesh, self._planes, points)
+        tets = containing_tets(self.mesh.geometry, self._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
         corners = np.zeros((len(points), 4), dtype=np.int64)
         weights, away = np.zeros((len(points), 4)), np.zeros((len(points), 3))
         corners[inside] = self.mesh.tets[tets[inside]]
-        weights[inside] = barycentric(self.mesh, tets[inside], points[inside])
+        weights[inside] = barycentric(self.mesh.geometry, tets[inside], points[inside])
         if len(outside):
             walls = self.mesh.boundary
             faces, coordinates = self._wall_tree.nearest(points[outside])

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from ..errors import OutsideError
 from .components import connected_components
-from .meshes import Tets
-from .tet_faces import face_table
+from .tet_shapes import TetShapes, face_table
 
 CLEARANCE = 1e-3
 """Crossings stay this fraction of an edge away from its ends, so that no two vertices of a surface coincide."""
@@ -37,7 +36,7 @@ _LIDS = {
 
 
 def closed_level_set(
-    mesh: Tets, values: NDArray[np.float64], gradients: NDArray[np.float64], level: float
+    mesh: TetShapes, values: NDArray[np.float64], gradients: NDArray[np.float64], level: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices and triangles of the surface that separates mesh vertices below a level from the others.
 
@@ -60,11 +59,11 @@ def closed_level_set(
             remedy="choose another level or a larger mesh",
             element=f"level {level:g}",
         )
-    keys, _ = _triangles(tets, used, mesh.n_vertices, _CUTS)
+    keys, _ = _triangles(tets, used, len(mesh.vertices), _CUTS)
     faces = face_table(tets)
     walls = faces.vertices[faces.tet_counts == 1]
     if below[walls].any() and not below[walls].all():
-        keys = np.concatenate([keys, _triangles(walls, below[walls], mesh.n_vertices, _LIDS)[0]])
+        keys = np.concatenate([keys, _triangles(walls, below[walls], len(mesh.vertices), _LIDS)[0]])
     return manifold(*_crossings(mesh.vertices, values, gradients, level, keys, CLEARANCE))
 
 

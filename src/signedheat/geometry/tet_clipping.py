@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..parallel import CHUNK, in_chunks
-from .meshes import Tets
+from .tet_shapes import TetShapes
 
 FLAT = 1e-10
 """Tets whose volume, over the cube of the longest edge, is below this contain no part of a source."""
@@ -85,17 +85,17 @@ class Planes(NamedTuple):
     center: NDArray[np.float64]
 
     @classmethod
-    def of(cls, mesh: Tets) -> Planes:
+    def of(cls, mesh: TetShapes) -> Planes:
         """The planes of the faces of a tet mesh."""
-        faces, geometry = mesh.faces, mesh.geometry
+        faces = mesh.faces
         center = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
         points = mesh.vertices - center
         a, b, c = (points[faces.vertices[:, k]] for k in range(3))
         normals = np.cross(b - a, c - a)
         twice_area = np.linalg.norm(normals, axis=1)
         normals /= np.where(twice_area > 0, twice_area, 1)[:, None]
-        signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], geometry.area_vectors))
-        solid = geometry.thickness > FLAT
+        signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], mesh.area_vectors))
+        solid = mesh.thickness > FLAT
         counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
         return cls(
             tet_faces=np.ascontiguousarray(faces.tet_faces),
@@ -109,13 +109,12 @@ class Planes(NamedTuple):
         )
 
 
-def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -> ClippedPolygons:
+def clip_triangles(mesh: TetShapes, planes: Planes, triangles: NDArray[np.float64]) -> ClippedPolygons:
     """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped.
 
     Examples
     --------
-    >>> from signedheat import TetMesh
-    >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    >>> mesh = TetShapes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
     >>> across = np.array([[[0.0, 0.0, 0.5], [2.0, 0.0, 0.5], [0.0, 2.0, 0.5]]])
     >>> clip_triangles(mesh, Planes.of(mesh), across).area_vectors
     array([[0.   , 0.   , 0.125]])
@@ -132,13 +131,12 @@ def clip_triangles(mesh: Tets, planes: Planes, triangles: NDArray[np.float64]) -
     return ClippedPolygons(tets, parents, vectors, areas, barycentric(mesh, tets, centers + planes.center), in_face)
 
 
-def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
+def containing_tets(mesh: TetShapes, planes: Planes, points: NDArray[np.float64]) -> NDArray[np.int64]:
     """(k,) a tet that contains each point, −1 outside the mesh.
 
     Examples
     --------
-    >>> from signedheat import TetMesh
-    >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+    >>> mesh = TetShapes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
     >>> containing_tets(mesh, Planes.of(mesh), np.array([[0.1, 0.1, 0.1], [1.0, 1.0, 1.0]]))
     array([ 0, -1])
     """
@@ -151,17 +149,17 @@ def containing_tets(mesh: Tets, planes: Planes, points: NDArray[np.float64]) -> 
     return in_chunks(found, points)[0]
 
 
-def _slack(mesh: Tets) -> NDArray[np.float64]:
+def _slack(mesh: TetShapes) -> NDArray[np.float64]:
     """(3,) how far beyond its box a tet is looked for: rounding may put a point there."""
     lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
     slack: NDArray[np.float64] = 1e-9 * (upper - lower)
     return slack
 
 
-def barycentric(mesh: Tets, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def barycentric(mesh: TetShapes, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(k, 4) barycentric coordinates of points in given tets, clamped to be nonnegative, each row with sum one."""
     from_corner = points[:, None] - mesh.vertices[mesh.tets[tets][:, [1, 0, 0, 0]]]  # on the face opposite each corner
-    inward = -np.einsum("pki,pki->pk", mesh.geometry.area_vectors[tets], from_corner)
+    inward = -np.einsum("pki,pki->pk", mesh.area_vectors[tets], from_corner)
     inward = np.maximum(inward / np.maximum(np.abs(inward).max(axis=1, keepdims=True), np.finfo(float).tiny), 0)
     total = inward.sum(axis=1, keepdims=True)
     return np.divide(inward, total, out=np.full_like(inward, 0.25), where=total > 0)  # flat tets: their middle

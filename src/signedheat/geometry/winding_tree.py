@@ -115,7 +115,7 @@ def _winding(
                 real, imaginary = 1.0, 0.0
                 for k in range((node - leaves) * LEAF, (node - leaves + 1) * LEAF):
                     if items[k] >= 0:
-                        rest, volume = _solid_angle(corners, items[k], x, y, z)
+                        rest, volume = solid_angle(corners, items[k], x, y, z)
                         if rest > abs(volume):  # less than an eighth of a turn each: their product has their sum
                             share = volume / rest
                             real, imaginary = real - imaginary * share, imaginary + real * share
@@ -128,7 +128,7 @@ def _winding(
 
 
 @compiled
-def _solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> tuple[float, float]:
+def solid_angle(corners: NDArray[np.float64], face: int, x: float, y: float, z: float) -> tuple[float, float]:
     """Parts of a complex number whose argument is half the signed solid angle of a triangle from a point.
 
     Positive from behind it (van Oosterom & Strackee 1983).

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.tet_faces import FaceTable
+from ..geometry.tet_shapes import TetShapes
 
 THIN = 1e-2
 """Volume over the cube of the longest edge below which a tet has a reduced weight; it is 0.118 for a regular tet."""
@@ -23,49 +23,8 @@ FLAT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Tetrahedra:
-    """Areas, volumes and operators of tets.
-
-    Attributes
-    ----------
-    vertices : (n, 3) float
-        Positions.
-    tets : (m, 4) int
-        Corners; of positive volume, or degenerate.
-    """
-
-    vertices: NDArray[np.float64]
-    tets: NDArray[np.int64]
-
-    @cached_property
-    def area_vectors(self) -> NDArray[np.float64]:
-        """(m, 4, 3) N_k: area times outward normal of the face opposite each corner."""
-        a, b, c, d = (self.vertices[self.tets[:, k]] for k in range(4))
-        vectors = np.empty((len(self.tets), 4, 3))
-        vectors[:, 0] = np.cross(c - b, d - b)
-        vectors[:, 1] = np.cross(d - a, c - a)
-        vectors[:, 2] = np.cross(b - a, d - a)
-        vectors[:, 3] = np.cross(c - a, b - a)
-        vectors *= 0.5
-        return vectors
-
-    @cached_property
-    def volumes(self) -> NDArray[np.float64]:
-        """(m,) signed volumes."""
-        return signed_volumes(self.vertices, self.tets)
-
-    @cached_property
-    def longest_edges(self) -> NDArray[np.float64]:
-        """(m,) length of each tet's longest edge."""
-        points = [self.vertices[self.tets[:, k]] for k in range(4)]
-        squares = [np.square(points[i] - points[j]).sum(axis=1) for i in range(4) for j in range(i)]
-        return np.asarray(np.sqrt(np.max(squares, axis=0)))
-
-    @cached_property
-    def thickness(self) -> NDArray[np.float64]:
-        """(m,) volume over the cube of the longest edge; zero for tets whose corners coincide."""
-        cubes = self.longest_edges**3
-        return np.maximum(self.volumes, 0) / np.where(cubes > 0, cubes, 1)
+class Tetrahedra(TetShapes):
+    """Operators of tets."""
 
     @cached_property
     def stiffness_factors(self) -> NDArray[np.float64]:
@@ -88,21 +47,22 @@ class Tetrahedra:
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
         return np.asarray(lengths * (1 - np.minimum(self.thickness / FLAT, 1)))
 
-    def face_mass(self, faces: FaceTable) -> NDArray[np.float64]:
+    def face_mass(self) -> NDArray[np.float64]:
         """(f,) M of Eq. 12, lumped: a quarter of the volume at each face.
 
         The consistent mass of Eq. 23 has 2/5 of the volume on its diagonal and −1/20 between two faces of a tet. These
         quarters are its row sums; they are as accurate, and simpler.
         """
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
-        return np.asarray(np.bincount(faces.tet_faces.ravel(), quarter, len(faces.vertices)), np.float64)
+        return np.asarray(np.bincount(self.faces.tet_faces.ravel(), quarter, len(self.faces.vertices)), np.float64)
 
-    def face_laplacian(self, faces: FaceTable) -> sparse.csr_matrix:
+    def face_laplacian(self) -> sparse.csr_matrix:
         """(f, f) Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T|, −(3/2) |e| cot θ between two faces.
 
         e is the edge that the two faces share, θ the dihedral angle of the tet there.
         The faces of flat tets are coupled by the `ties` besides, so that directions pass through these unchanged.
         """
+        faces = self.faces
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
 
     def vertex_laplacian(self, corners: NDArray[np.int64], n: int) -> sparse.csr_matrix:
@@ -134,18 +94,6 @@ class Tetrahedra:
         volumes = np.bincount(corners.ravel(), np.repeat(self.weights * self.volumes, 4), n)
         totals = [np.bincount(corners.ravel(), np.repeat(column, 4), n) for column in sums.T]
         return np.asarray(np.stack(totals, axis=1) / np.where(volumes > 0, volumes, 1)[:, None])
-
-
-def signed_volumes(vertices: NDArray[np.float64], tets: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(m,) volumes, negative for inverted tets.
-
-    Examples
-    --------
-    >>> signed_volumes(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]])) * 6
-    array([1.])
-    """
-    a, b, c, d = (vertices[tets[:, k]] for k in range(4))
-    return np.asarray(np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) / 6)
 
 
 def _assemble(

@@ -168,7 +168,7 @@ def distance_around(
     )
     curved = np.flatnonzero(np.isfinite(distance) & (surface.owners[nearest] >= 0))
     tets, places = surface.owners[nearest[curved]], found[curved]
-    weights = barycentric(mesh, tets, places + planes.center)
+    weights = barycentric(mesh.geometry, tets, places + planes.center)
     gradients = mesh.geometry.mean_gradients(np.nan_to_num(values), unknowns, len(values))[unknowns[tets]]
     slope = np.linalg.norm(np.einsum("pk,pki->pi", weights, gradients), axis=1)
     rise = 0.5 * np.einsum("pk,pki,pki->p", weights, gradients, places[:, None] - points[unknowns[tets]])

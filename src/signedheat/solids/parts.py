@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from ..geometry.components import connected_components, element_components
 from ..geometry.edges import edge_table
-from ..geometry.winding_tree import WindingTree
+from ..geometry.winding_tree import WindingTree, solid_angle
 from .rims import meeting_edges, open_edges
 
 SHEET = 0.15
@@ -153,15 +153,7 @@ def _among_few(corners: NDArray[np.float64], starts: NDArray[np.int64], few: int
             total = 0.0
             for j in range(starts[p], starts[p + 1]):
                 if j != i:
-                    ax, ay, az = corners[j, 0] - x, corners[j, 1] - y, corners[j, 2] - z
-                    bx, by, bz = corners[j, 3] - x, corners[j, 4] - y, corners[j, 5] - z
-                    cx, cy, cz = corners[j, 6] - x, corners[j, 7] - y, corners[j, 8] - z
-                    a = np.sqrt(ax * ax + ay * ay + az * az)
-                    b = np.sqrt(bx * bx + by * by + bz * bz)
-                    c = np.sqrt(cx * cx + cy * cy + cz * cz)
-                    volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-                    rest = a * b * c + (ax * bx + ay * by + az * bz) * c
-                    rest += (bx * cx + by * cy + bz * cz) * a + (cx * ax + cy * ay + cz * az) * b
+                    rest, volume = solid_angle(corners, j, x, y, z)
                     total += 2.0 * np.arctan2(volume, rest)
             levels[i] = total / (4.0 * np.pi)
     return levels

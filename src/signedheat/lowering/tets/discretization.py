@@ -74,7 +74,7 @@ class TetDiscretization(DiffusesEach):
     @cached_property
     def planes(self) -> Planes:
         """The planes of the faces, against which sources are clipped."""
-        return Planes.of(self.mesh)
+        return Planes.of(self.mesh.geometry)
 
     @cached_property
     def spacing(self) -> float:
@@ -133,7 +133,7 @@ class TetDiscretization(DiffusesEach):
 
     def _heat_system(self, time: float) -> HeatSystem:
         """M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
-        matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass(self.mesh.faces)
+        matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass()
         matrix.setdiag(matrix.diagonal() + mass)
         return HeatSystem(matrix, self.direct, DIRECTION_ERROR)
 
@@ -163,7 +163,7 @@ class TetDiscretization(DiffusesEach):
 
     @cached_property
     def _laplacian(self) -> sparse.csr_matrix:
-        return self.mesh.geometry.face_laplacian(self.mesh.faces)
+        return self.mesh.geometry.face_laplacian()
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """X at the tets: `diffuse` has averaged it already."""

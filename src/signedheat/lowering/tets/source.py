@@ -141,13 +141,13 @@ def tet_source(
 
 def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygons:
     if elements.corners.shape[1] == 3:
-        polygons = clip_triangles(mesh, planes, elements.corners)
+        polygons = clip_triangles(mesh.geometry, planes, elements.corners)
         sizes = np.linalg.norm(elements.vectors, axis=1)
         counted = elements.weights / np.where(sizes > 0, sizes, 1)  # −1 for fan triangles outside their polygon
         return replace(polygons, areas=polygons.areas * counted[polygons.parents])
-    tets = containing_tets(mesh, planes, elements.corners[:, 0])
+    tets = containing_tets(mesh.geometry, planes, elements.corners[:, 0])
     k = np.flatnonzero(tets >= 0)
-    centers = barycentric(mesh, tets[k], elements.corners[k, 0])
+    centers = barycentric(mesh.geometry, tets[k], elements.corners[k, 0])
     return ClippedPolygons(tets[k], k, elements.vectors[k], elements.weights[k], centers, np.full(len(k), -1))
 
 
