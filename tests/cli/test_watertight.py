@@ -61,3 +61,24 @@ def test_bad_usage(tmp_path, folder, capsys):
     for options in (["--resolution", "9", "--spacing", "1"], ["--thickness", "-1"], ["--surface", "txt"]):
         assert main(["watertight", str(folder), "-o", str(tmp_path / "out"), *options]) == 2
         assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_samples_for_trainers(tmp_path, folder, capsys):
+    """Of a box with a face gone: all in closed form."""
+    (found,) = figures(tmp_path, capsys, folder / "plank.ply", "--sample", "300")["shapes"]
+    assert found["output"] == ["plank.stl", "plank_sdf.npz", "plank_surface.npz"]
+    low, high = np.array([-1, -0.7, -0.2]), np.array([1, 0.6, 0.3])
+    with np.load(tmp_path / "out" / "plank_surface.npz") as on, np.load(tmp_path / "out" / "plank_sdf.npz") as around:
+        for name, fixed, length in (("random_surface", 1, 1.0), ("sharp_surface", 2, np.sqrt(2))):
+            places, normals = np.split(on[name], 2, axis=1)
+            assert places.shape == (300, 3)
+            ahead, behind = np.abs(places - high) < 1e-6, np.abs(places - low) < 1e-6
+            assert ((ahead | behind).sum(axis=1) >= fixed).all()
+            np.testing.assert_allclose(normals * length, ahead.astype(float) - behind, atol=1e-6)
+        for name in ("vol", "random_near", "sharp_near"):
+            beyond = np.maximum(low - around[f"{name}_points"], around[f"{name}_points"] - high)
+            expected = np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+            np.testing.assert_allclose(around[f"{name}_label"], expected, atol=1e-6)
+    figures(tmp_path, capsys, folder / "plank.ply", "--sample", "300", "--normalize")
+    with np.load(tmp_path / "out" / "plank_surface.npz") as on:
+        assert np.linalg.norm(on["random_surface"][:, :3], axis=1).max() <= 1

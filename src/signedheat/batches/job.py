@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -14,9 +14,10 @@ from ..domains.grid import Grid, room_around
 from ..domains.kinds import ShapeLike
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import positive_number
+from ..domains.validation import positive_number, whole_number
 from ..errors import FileFormatError, InexactWarning, SignedHeatError
 from ..fields.grid_field import GridField
+from ..io.arrays import write_npz
 from ..io.fields import BAND_FORMATS
 from ..io.figures import describe, shape_figures
 from ..io.files import distinct_names
@@ -26,6 +27,7 @@ from ..orientation.orient import orient
 from ..solids.complete import complete
 from ..solids.distance import distance_to_shapes
 from ..solids.sampling import WIDTHS, Layout, sample
+from ..solids.training import training_points
 from ..solids.watertight import closed_surface, figures_of
 from ..solver import SignedHeatSolver, as_list
 from .inputs import Input
@@ -201,6 +203,12 @@ class Watertight:
         Simplify the surface, by no more than this distance.
     resolution, spacing
         Of the contour, as for `Solid.surface`.
+    samples : int, optional
+        Points of each kind that are taken of the surface, in two files in the layout of public trainers of generators:
+        ``_surface.npz`` with ``random_surface`` and ``sharp_surface``, places and normals; ``_sdf.npz`` with points in
+        the volume, near the surface and near sharp edges, and their signed distances.
+    normalize : bool
+        Move and scale the shape into the unit sphere, for the samples.
 
     Examples
     --------
@@ -219,8 +227,12 @@ class Watertight:
     tolerance: float | None = None
     resolution: int = 256
     spacing: float | None = None
+    samples: int | None = None
+    normalize: bool = False
 
     def __post_init__(self) -> None:
+        if self.samples is not None:
+            whole_number(self.samples, "the number of samples", 1, SignedHeatError)
         if self.thickness is not None:
             positive_number(self.thickness, "thickness")
         if self.tolerance is not None:
@@ -230,10 +242,15 @@ class Watertight:
         """Make it of one shape, in a file that begins with `stem`; figures, and all notes under "notes"."""
         shape = read(path)
         solid = complete(shape.smooth_surface if isinstance(shape, DigitalSurface) else shape)
-        options = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "surfaces"}
+        names = ("thickness", "contoured", "tolerance", "resolution", "spacing")
+        options = {name: getattr(self, name) for name in names}
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", InexactWarning)
             surface, way = closed_surface(solid, **options)
         save(surface, f"{stem}{self.surfaces}")
+        if self.samples is not None:
+            on, around = training_points(surface, self.samples, self.normalize)
+            write_npz(f"{stem}_surface.npz", **on)
+            write_npz(f"{stem}_sdf.npz", **around)
         notes = [str(note) for note in solid.diagnostics.notes] + [str(each.message) for each in caught]
         return {"way": way, **figures_of(surface, solid, 0.5 * (self.thickness or 0.0)), "notes": notes}

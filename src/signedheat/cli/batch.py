@@ -121,6 +121,14 @@ def batch(arguments: Namespace) -> Summary:
     option("--tolerance", type=positive, metavar="D", help="fewer triangles, no farther away than this (manifold3d)"),
     option("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side, for contours (256)"),
     option("--spacing", type=positive, metavar="H", help="cells of contours, in units of the file"),
+    option(
+        "--sample",
+        type=whole_number(1),
+        metavar="N",
+        help="write N points of each kind, for trainers of generators: on the surface and on sharp edges with normals, "
+        "in the volume and near both with distances",
+    ),
+    option("--normalize", action="store_true", help="move and scale the shape of the samples into the unit sphere"),
     check=lambda arguments: refuse_together(arguments, "--spacing", "--resolution"),
 )
 def watertight(arguments: Namespace) -> Summary:
@@ -132,6 +140,8 @@ def watertight(arguments: Namespace) -> Summary:
         tolerance=arguments.tolerance,
         resolution=arguments.resolution or 256,
         spacing=arguments.spacing,
+        samples=arguments.sample,
+        normalize=arguments.normalize,
     )
     done = made_of_each(arguments, job, in_words)
     summary = {

@@ -179,7 +179,7 @@ def sample(
     points = np.empty((n, 3))
     ends = np.rint(np.linspace(0, n_near, len(scales) + 1)).astype(int) if scales else np.zeros(1, dtype=int)
     for start, stop, width in zip(ends[:-1], ends[1:], scales, strict=True):
-        places = _on_triangles(triangles, stop - start, random)
+        places, _ = evenly_on(triangles, stop - start, random)
         points[start:stop] = places + random.normal(scale=width * radius, size=places.shape)
     points[n_near:] = center + radius * random.uniform(-1.0, 1.0, (n - n_near, 3))
     found = field.solid.closest(points)
@@ -187,8 +187,10 @@ def sample(
     return Samples(points, found.distances, found.gradients, is_near, found.completed, center, radius)
 
 
-def _on_triangles(triangles: NDArray[np.float64], n: int, random: np.random.Generator) -> NDArray[np.float64]:
-    """(n, 3) points on triangles, evenly by area: one in each nth of it."""
+def evenly_on(
+    triangles: NDArray[np.float64], n: int, random: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """(n, 3) points on triangles, evenly by area, one in each nth of it; and the triangle of each."""
     a, b, c = triangles.transpose(1, 0, 2)
     areas = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
     marks = (np.arange(n) + random.random(n)) / max(n, 1) * areas[-1]
@@ -197,5 +199,4 @@ def _on_triangles(triangles: NDArray[np.float64], n: int, random: np.random.Gene
     over = u + v > 1
     u, v = np.where(over, 1 - u, u)[:, None], np.where(over, 1 - v, v)[:, None]
     a, b, c = a[faces], b[faces], c[faces]
-    result: NDArray[np.float64] = a + u * (b - a) + v * (c - a)
-    return result
+    return a + u * (b - a) + v * (c - a), faces
