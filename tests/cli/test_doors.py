@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from shapes.bodies import box
 from signedheat import samples
 from signedheat.cli import main
 
@@ -81,8 +82,24 @@ def test_a_measure_of_ones_own(tmp_path):
     assert len(asked) == 3
 
 
+def test_shells_keep_their_outside_and_have_a_drain(tmp_path):
+    given = box((0, 0, 0), (2, 1.3, 1))
+    given.save(tmp_path / "box.ply")
+    options = "--keep-outside", "--drain", "0.2", "--resolution", "48"
+    assert (
+        main(["morph", "shell", str(tmp_path / "box.ply"), "-0.15", "0", "-o", str(tmp_path / "a.ply"), *options]) == 0
+    )
+    made = sh.read(tmp_path / "a.ply")
+    corners = made.vertices[made.faces]
+    volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    assert volume == pytest.approx(2 * 1.3 - 1.7 * 1.0 * 0.7 - np.pi * 0.1**2 * 0.15, rel=1e-3)
+    assert {tuple(v) for v in given.vertices} <= {tuple(v) for v in made.vertices.round(9)}
+    assert made.n_vertices - made.n_faces // 2 == 2  # outside and inside are joined by one hole
+
+
 @pytest.mark.parametrize(
-    "options", [["--spacing", "0.1", "--resolution", "20"], ["--spacing", "0.1", "0.1"], ["--plain", "thicken"]]
+    "options",
+    [["--spacing", "0.1", "--resolution", "20"], ["--spacing", "0.1", "0.1"], ["--plain", "thicken"], ["--drain", "1"]],
 )
 def test_bad_usage_of_morph(tmp_path, ball, capsys, options):
     operation = "thicken" if "thicken" in options else "dilate"

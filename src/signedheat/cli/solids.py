@@ -27,9 +27,11 @@ from .options import (
     command,
     finite,
     format_option,
+    group,
     is_planar,
     option,
     output,
+    positive,
     refuse_together,
     shape_option,
     whole_number,
@@ -170,6 +172,8 @@ def check_morph(arguments: Namespace) -> None:
     check_grid(arguments)
     if arguments.operation == "thicken" and (arguments.as_oriented or arguments.keep_overlaps or arguments.plain):
         arguments.parser.error("--as-oriented, --keep-overlaps and --plain are for solids, and thicken takes sheets")
+    if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
+        arguments.parser.error("--keep-outside and --drain are for shells")
     fewest, most = DISTANCES[arguments.operation]
     if not fewest <= len(arguments.distances) <= most:
         wanted = str(fewest) if fewest == most else f"{fewest} or {most}"
@@ -188,6 +192,11 @@ def check_morph(arguments: Namespace) -> None:
     option("distances", metavar="DISTANCE", type=finite, nargs="+", help="in the units of the file"),
     output(SURFACES),
     *(PLACE, ROOM, STEPS, METHOD),
+    group(
+        "shells",
+        option("--keep-outside", action="store_true", help="keep the faces given, and make the inner side only (D 0)"),
+        option("--drain", type=positive, metavar="DIAMETER", help="a hole straight down (-z) from the largest cavity"),
+    ),
     option("--preview", metavar="PNG", help="draw the distance to the shape in slices, with the offsets"),
     format_option("stl"),
     check=check_morph,
@@ -204,7 +213,9 @@ def morph(arguments: Namespace) -> Summary:
         fields.append(shapes.compute(part, grid, arguments))
         return fields[-1]
 
-    options = {} if arguments.operation == "thicken" else {"measure": measure}
+    options: dict[str, Any] = {} if arguments.operation == "thicken" else {"measure": measure}
+    if arguments.operation == "shell":
+        options |= {"keep_outside": arguments.keep_outside, "drain": arguments.drain}
     with shapes.prefix_errors(arguments.shape):
         grid = shapes.grid_for(shape, arguments, max(map(abs, arguments.distances)))
         surface = getattr(sh.morphology, arguments.operation)(shape, *arguments.distances, domain=grid, **options)
