@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
@@ -151,7 +151,7 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     found = replace(fine, values=values).contour(0.0)
     given = [each for each in flattened(curves) if isinstance(each, Curve) and each.oriented]
     shortest = min(length(field.domain, each) for each in given)
-    near = cKDTree(np.concatenate([places(field.domain, each) for each in given]))
+    near = scipy.spatial.cKDTree(np.concatenate([places(field.domain, each) for each in given]))
     whole = [
         curve
         for curve in found
