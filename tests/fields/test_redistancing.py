@@ -173,3 +173,14 @@ def test_crossings_at_nodes_that_are_all_but_zero_do_not_end_the_search(dimensio
     points = nodes(21, dimension)
     exact = ball(points, 5.0)
     np.testing.assert_allclose(sh.redistance(np.where(np.abs(exact) < 1e-9, near, exact)), exact, atol=0.03)
+
+
+@pytest.mark.parametrize("shape", [(24,), (1, 24), (18, 24), (12, 18, 14), (8, 10, 1, 9)])
+def test_periodic_arrays_are_like_repeated_ones(shape):
+    """The middle of three copies along each axis: of a bumpy ball across the corners of the array."""
+    axes = np.meshgrid(*(2 * np.pi * np.arange(n) / n for n in shape), indexing="ij")
+    values = sum(np.cos(axis + 0.3 * k) for k, axis in enumerate(axes) if axis.shape[k] > 1) - 0.4
+    steps = 0.5 + 0.25 * np.arange(len(shape))
+    thrice = sh.redistance(np.tile(values, [3] * len(shape)), steps)
+    middle = thrice[tuple(slice(n, 2 * n) for n in shape)]
+    np.testing.assert_allclose(sh.redistance(values, steps, periodic=True), middle, atol=1e-9)

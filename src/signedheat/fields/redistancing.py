@@ -12,7 +12,7 @@ from ..domains.validation import flag, numbers, positive_steps
 from ..errors import GeometryError, OutsideError
 from ..operators.grid.walls import distances_around_walls
 from ..operators.grid.wavefront import padded_shape
-from ..operators.grid.zero_contour import distances_to_contour, nearest_crossings, smoothed_signs, zero_contour
+from ..operators.grid.zero_contour import distances_to_contour, moved, nearest_crossings, smoothed_signs, zero_contour
 
 
 def redistance(
@@ -77,11 +77,11 @@ def redistance(
             remedy="repeat the array along its periodic axes, or fill in what is masked",
             element="periodic",
         )
-    pads = [(n // 2 + 1 if wraps else 0,) * 2 for n, wraps in zip(given.shape, again, strict=True)]
-    whole = np.pad(_filled(given, walls), pads, mode="wrap")
+    pads = np.where(again, np.array(given.shape) // 2 + 2, 0)
+    whole = np.pad(_filled(given, walls), np.stack([pads, pads], axis=1), mode="wrap")
     wide = np.array(whole.shape) > 1
-    distances = _distances(whole.squeeze(), steps[wide], walls.squeeze() if walls.any() else None).reshape(whole.shape)
-    distances = distances[tuple(slice(pad, pad + n) for (pad, _), n in zip(pads, given.shape, strict=True))]
+    around = walls.squeeze() if walls.any() else None
+    distances = _distances(whole.squeeze(), steps[wide], around, pads[wide]).reshape(given.shape)
     result, lost = np.where(given == 0, 0.0, np.copysign(distances, given)), walls | np.isinf(distances)
     return np.ma.masked_array(np.where(lost, 0.0, result), lost) if masked else np.where(lost, np.nan, result)
 
@@ -104,9 +104,12 @@ def _filled(values: NDArray[np.float64], walls: NDArray[np.bool_]) -> NDArray[np
 
 
 def _distances(
-    values: NDArray[np.float64], spacing: NDArray[np.float64], walls: NDArray[np.bool_] | None
+    values: NDArray[np.float64],
+    spacing: NDArray[np.float64],
+    walls: NDArray[np.bool_] | None,
+    pads: NDArray[np.int64],
 ) -> NDArray[np.float64]:
-    """Distance of each node, infinite where no way leads; axes have at least two nodes."""
+    """Distance of each node that is no padding, infinite where no way leads; axes have at least two nodes."""
     signs = values.ndim > 1 and bool((np.abs(values) == 1).all())
     if signs:
         values = smoothed_signs(values)
@@ -122,6 +125,10 @@ def _distances(
     if signs and values.ndim < 4:  # which say nothing of how the zero set bends
         contour = contour._replace(smooth=np.zeros_like(contour.smooth))
     nearest = nearest_crossings(contour, shape, steps)
+    if pads.any():
+        first = np.concatenate([np.zeros(4 - values.ndim, dtype=np.int64), pads])
+        inner = tuple(slice(pad, n - pad) for pad, n in zip(first, shape, strict=True))
+        nearest, contour = np.ascontiguousarray(nearest[inner]), moved(contour, -first * steps)
     distances = distances_to_contour(contour, nearest, steps)
     if walls is not None:
         distances_around_walls(contour, nearest, distances, walls.reshape(shape), steps)

@@ -253,6 +253,14 @@ def nearest_crossings(contour: Contour, shape: tuple[int, ...], steps: NDArray[n
     return nearest
 
 
+def moved(contour: Contour, way: NDArray[np.float64]) -> Contour:
+    """The same in another place, (4,) `way` from there; its edges and zeros stay numbered as they are."""
+    curved, rows = contour.curved.copy(), contour.rows.copy()
+    curved[:, :4] += way
+    rows[:, :3] += way[1:]
+    return contour._replace(points=contour.points + way, curved=curved, rows=rows)
+
+
 def distances_to_contour(
     contour: Contour, nearest: NDArray[np.int32], steps: NDArray[np.float64]
 ) -> NDArray[np.float64]:
