@@ -128,7 +128,7 @@ def draw(outcomes: list[Outcome], fine: int, file: str) -> None:
                     line = pv.lines_from_points(strokes.positions(mesh, curve))
                     plotter.add_mesh(line.tube(radius=radius * size), color=color)
             plotter.add_text(f"{o.damage} {o.seed}: {o.share:.0%}{' w' * bool(o.warned)}", font_size=7)
-            middle, reach = mesh.vertices.mean(axis=0), np.ptp(mesh.vertices)
+            middle, reach = mesh.vertices.mean(axis=0), np.ptp(mesh.vertices, axis=0).max()
             plotter.camera_position = [middle + side * reach * np.array([1.2, -1.0, 1.0]), middle, (0, 0, 1)]
     plotter.screenshot(file)
 
