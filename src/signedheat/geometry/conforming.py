@@ -63,9 +63,8 @@ def conforming(
     sides = _open_sides(faces)
     alone, counts = np.unique(sides // 3, return_counts=True)  # flat ones, which came of dividing, between closed edges
     idle = alone[(counts == 3) & (_heights(vertices[faces[alone]]) <= SLITS[-1] * tolerance)]
-    if len(idle):
-        faces = np.delete(faces, idle, axis=0)
-        sides = _open_sides(faces)
+    faces = _without_doubles(np.delete(faces, idle, axis=0))
+    sides = _open_sides(faces)
     return vertices, faces, np.stack([faces[sides // 3, sides % 3], faces[sides // 3, (sides + 1) % 3]], axis=1)
 
 
@@ -78,6 +77,17 @@ def _welded(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.f
     vertices, faces = points[used], numbers.reshape(-1, 3)
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     return vertices, faces[_heights(vertices[faces]) > tolerance]
+
+
+def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces without pairs on the same vertices that face opposite ways."""
+    first = faces.argmin(axis=1)[:, None]
+    turned = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
+    _, same, counts = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
+    same = same.ravel()
+    ways = np.bincount(same, np.where(turned[:, 1] < turned[:, 2], 1, -1))
+    kept: NDArray[np.int64] = faces[~((counts == 2) & (ways == 0))[same]]
+    return kept
 
 
 def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:

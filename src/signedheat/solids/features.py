@@ -33,6 +33,8 @@ CHORD = 0.02
 """Cells off the level from which on an edge along a crease is divided."""
 DIVISIONS = 6
 """Times that edges are divided; with three the largest distance of a bracket is .08 cells, with six .05."""
+NEAR = 4.0
+"""Cells between a new vertex and others of what its triangles may meet: vertices leave their cells by less than one."""
 BETWEEN = 0.1, 0.3, 0.6
 """Shares of the way from the middle of an edge to the corner across at which planes are looked for."""
 AHEAD = 0.1, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5
@@ -168,7 +170,9 @@ def divided_along_creases(
         edges, points = _creases_off(offset, spacing, vertices, faces)
         while len(edges):
             found, made = _divided(vertices, faces, edges, points)
-            meeting = made[self_intersections(found, made)]
+            away, _ = scipy.spatial.cKDTree(points).query(found, distance_upper_bound=NEAR * float(spacing.max()))
+            near = made[np.isfinite(away)[made].any(axis=1)]  # all else is as it was
+            meeting = near[self_intersections(found, near)]
             if not len(meeting):
                 break
             wrong = np.unique(meeting[meeting >= len(vertices)]) - len(vertices)

@@ -98,15 +98,15 @@ def given_surface(
             "nothing of the shape bounds a solid", remedy="thicken it, or take the surface at a distance above zero"
         )
     turned = turned[~_covered(turned, _parts(solid)[bounds], TOGETHER * size)]
-    found: tuple[TriangleMesh, Boxes | None] | None = None
+    found: tuple[int, TriangleMesh, Boxes | None] | None = None
     boxes: Boxes | None = None
     bad: list[NDArray[np.float64]] = []
     pieces = turned
     for attempt in range(ATTEMPTS):
         vertices, faces, gaps = conforming(pieces, TOGETHER * size)
         meeting = faces[np.unique(self_intersections(vertices, faces))]
-        if not len(gaps):
-            found = _compact(vertices, faces), boxes
+        if not len(gaps) and (found is None or len(meeting) < found[0]):
+            found = len(meeting), _compact(vertices, faces), boxes
             if not len(meeting):
                 break
         if not bad:
@@ -123,7 +123,7 @@ def given_surface(
             remedy="leave out keep_faces: the sharp surface is closed",
             element="surface",
         )
-    whole, boxes = found
+    _, whole, boxes = found
     return (whole, np.zeros((0, 3))) if boxes is None else (_without_crumbs(whole, boxes), boxes.middles)
 
 
