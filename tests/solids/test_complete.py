@@ -109,6 +109,32 @@ def test_faces_missing_at_random_leave_the_ball(share):
     assert (solid.inside(points[clear]) == (radius[clear] < 1)).all()
 
 
+def wrong_share(solid, n_vertices):
+    """Share of the unit ball whose sign is wrong."""
+    points = np.random.default_rng(n_vertices).uniform(-1.4, 1.4, (4000, 3))
+    real = np.linalg.norm(points, axis=1) < 1
+    return (solid.inside(points) != real).sum() / real.sum()
+
+
+@pytest.mark.parametrize("share", [0.6, 0.65, 0.7])
+def test_a_large_part_of_a_ball_is_completed_with_the_fragments_around_it(share):
+    sphere = samples.sphere(3)
+    for seed in range(3):
+        kept = sphere.faces[np.random.default_rng(seed).random(sphere.n_faces) > share]
+        assert wrong_share(sh.complete((sphere.vertices, kept)), seed) < 0.05
+
+
+def test_litter_around_an_open_box_changes_nothing_of_its_completion():
+    random = np.random.default_rng(0)
+    litter = [
+        grid_sheet(random.uniform(-0.4, 1.4, 3), 0.05 * random.normal(size=3), 0.05 * random.normal(size=3), 2)
+        for _ in range(40)
+    ]
+    solid = sh.complete(joined(box(without=(5,)), *litter))
+    points = random.uniform(-0.2, 1.2, (1000, 3))
+    assert (solid.inside(points) == ((points > 0) & (points < 1)).all(axis=1)).all()
+
+
 def pipe(sections, inner=0.3, outer=0.5, height=1.4):
     """A thick pipe of long thin triangles."""
     angles = 2 * np.pi * np.arange(sections) / sections
@@ -207,6 +233,19 @@ def test_the_lip_of_a_bowl_closes_between_its_rims(inner):
     solid = sh.complete(shell(inner, 0.05))
     assert 0.9 < volume(solid) / (2 / 3 * np.pi * (1 - inner**3)) < 1.1
     assert not solid.inside([[0.0, 0.0, -0.5], [0.0, 0.0, 0.3]]).any()
+
+
+def test_zigzag_rims_of_a_bowl_close_to_the_same_lip_however_finely_faces_are_cut():
+    outer = samples.sphere(4)
+    kept = outer.faces[outer.vertices[outer.faces].mean(axis=1)[:, 2] < 0.3]
+    inner = outer.faces[0.9 * outer.vertices[outer.faces].mean(axis=1)[:, 2] < 0.3][:, ::-1]
+    mesh = sh.TriangleMesh(*joined((outer.vertices, kept), (0.9 * outer.vertices, inner)))
+    middles = (mesh.vertices[mesh.faces] + mesh.vertices[np.roll(mesh.faces, -1, axis=1)]) / 2
+    (a, b, c), (d, e, f) = mesh.vertices[mesh.faces].transpose(1, 0, 2), middles.transpose(1, 0, 2)
+    quarters = np.concatenate([np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
+    fine = np.unique(quarters.reshape(-1, 3), axis=0, return_inverse=True)
+    solids = sh.complete(mesh), sh.complete((fine[0], fine[1].reshape(-1, 3)))
+    np.testing.assert_allclose(volume(solids[1]), volume(solids[0]), rtol=0.01)
 
 
 @pytest.mark.parametrize(("inner", "height"), [(0.6, 0.97), (0.95, 0.95), (0.95, 0.8)])

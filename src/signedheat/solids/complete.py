@@ -31,8 +31,9 @@ from .bounding import pieces_of
 from .closing import lids_of
 from .heat import Heat, heat_surface
 from .joining import Shape, joined_shape
-from .loose import bound_together, clusters_of, scatter_of, without_copies
+from .loose import bound_together, fragments, scatter_of, without_copies
 from .lost_faces import lost_faces
+from .rims import open_edges
 from .solid import Solid
 from .walls import wall_ends
 from .winding import Windings
@@ -236,24 +237,26 @@ def _by_lids(given: Surface, added: NDArray[np.int64], vertices: NDArray[np.floa
         True,
     )
     labels, is_body = parts.bodies(whole.triangles, whole.ids)
-    bodies = _some(whole, is_body[labels], True)
-    lids = lids_of(bodies.triangles, bodies.ids, labels[is_body[labels]], vertices)
-    surfaces = [bodies, *(Surface(lid, _new_ids(lid), np.full(len(lid), -1), True) for lid in lids)]
-    loose = _some(whole, ~is_body[labels], False)
-    if not len(loose.triangles):
-        return surfaces
-    labels = np.unique(labels[~is_body[labels]], return_inverse=True)[1]
-    kept = without_copies(loose.triangles, labels, bodies.triangles)
-    loose, labels = _some(loose, kept, False), labels[kept]
-    for chosen in clusters_of(loose.triangles, labels):
-        surfaces += _loose(_some(loose, chosen, False), labels[chosen], method)
-    return surfaces
+    kept = is_body[labels]
+    if not kept.all():
+        kept[~kept] = without_copies(whole.triangles[~kept], labels[~kept], whole.triangles[kept])
+    whole, labels = _some(whole, kept, True), labels[kept]
+    surfaces, lidded = [], is_body[labels]
+    opened = np.isin(np.arange(len(is_body)), open_edges(whole.ids, labels)[1])
+    for chosen in fragments(whole.triangles, labels, ~is_body, is_body & opened):
+        pieces, loose = _some(whole, chosen, False), ~is_body[labels[chosen]]
+        if bound_together(pieces.triangles, labels[chosen], loose):
+            surfaces += _scattered(pieces, labels[chosen], method)
+            lidded[chosen] = False
+        else:
+            surfaces.append(_some(pieces, loose, False))
+    bodies = _some(whole, lidded, True)
+    lids = lids_of(bodies.triangles, bodies.ids, labels[lidded], vertices)
+    return [bodies, *(Surface(lid, _new_ids(lid), np.full(len(lid), -1), True) for lid in lids), *surfaces]
 
 
-def _loose(pieces: Surface, labels: NDArray[np.int64], method: Heat) -> list[Surface]:
-    """Pieces near each other: the surface that they scatter around; or what closes them; or sheets."""
-    if not bound_together(pieces.triangles, labels):
-        return [pieces]
+def _scattered(pieces: Surface, labels: NDArray[np.int64], method: Heat) -> list[Surface]:
+    """The surface that pieces scatter around; or they and what closes them."""
     if scatter := scatter_of(pieces.triangles, labels):
         made = _heat_of(pieces, method, scatter)
         return [pieces] if made is None else [made]

@@ -10,6 +10,7 @@ from ..geometry.components import connected_components
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.welding import same_positions
+from ..geometry.winding_tree import WindingTree
 from .parts import FRAGMENTS, face_areas, level
 
 COPY = 0.5
@@ -19,6 +20,9 @@ REACH = 1.5
 CHANCE = 0.35
 """Joint level, times √n, up to which n pieces bound nothing: two parallel sheets, each a side of them apart, have .22,
 three sides of a box .22, and six .5."""
+CLOSING = 0.4
+"""Rise of the level of a part by pieces, over that if all were faces of one body, from which on they are: what is left
+at random of balls, boxes and parts has .43 to .95, sheets in an open box .37, litter in and around it .16."""
 MATCH = (1e-6, 0.75)
 """Distance of corners over the size of pieces between which they were one corner, before noise moved them."""
 
@@ -89,14 +93,52 @@ def clusters_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> li
     return np.split(np.argsort(clusters, kind="stable"), np.cumsum(np.bincount(clusters))[:-1])
 
 
-def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> bool:
-    """Whether pieces are fragments of a body: their joint winding number at their faces is no matter of chance.
+def fragments(
+    triangles: NDArray[np.float64], labels: NDArray[np.int64], loose: NDArray[np.bool_], opened: NDArray[np.bool_]
+) -> list[NDArray[np.int64]]:
+    """Triangles of each cluster of loose pieces, with the open parts that these were torn from.
+
+    Parameters
+    ----------
+    triangles, labels : (m, 3, 3) float, (m,) int
+        Corners, and the part that each is of.
+    loose, opened : (p,) bool
+        Parts that bound nothing by themselves; and those that do, and have rims.
+    """
+    pieces, some = loose.copy(), np.flatnonzero((loose | opened)[labels])
+    for cluster in clusters_of(triangles[some], labels[some]) if opened.any() else []:
+        here = some[cluster]
+        found = np.unique(labels[here][pieces[labels[here]]])
+        while len(found):
+            torn = pieces[labels[here]]
+            found = np.array(
+                [k for k in np.unique(labels[here[~torn]]) if _closes(triangles[here[torn]], triangles[labels == k])]
+            )
+            pieces[found.astype(np.int64)] = True
+    some = np.flatnonzero(pieces[labels])
+    return [some[cluster] for cluster in clusters_of(triangles[some], labels[some])]
+
+
+def _closes(pieces: NDArray[np.float64], part: NDArray[np.float64]) -> bool:
+    """Whether pieces lie and face as the rest of a part does: they raise its level by some `CLOSING` of what they would
+    if all were faces of one body, taken at random."""
+    areas, places = face_areas(part), part.mean(axis=1)
+    own = WindingTree.of(part).behind(np.arange(len(part)), places) - 0.5
+    raised = float(WindingTree.of(pieces).numbers(places) @ areas)
+    return raised > CLOSING * float(own @ areas) * min(1.0, float(face_areas(pieces).sum() / areas.sum()))
+
+
+def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64], loose: NDArray[np.bool_]) -> bool:
+    """Whether loose pieces are fragments of a body: the winding number of all at their faces is no matter of chance.
 
     That of n pieces anywhere is random, and falls as 1 / √n; n counts pieces of equal area.
     """
-    areas = np.bincount(labels, face_areas(triangles))
-    n = areas.sum() ** 2 / max(float((areas**2).sum()), np.finfo(float).tiny)
-    joint = level(triangles)
+    areas = face_areas(triangles[loose])
+    if not areas.any():
+        return False
+    pieces = np.bincount(labels[loose], areas)
+    n = pieces.sum() ** 2 / (pieces**2).sum()
+    joint = level(triangles, np.flatnonzero(loose))
     return joint >= FRAGMENTS and joint * float(np.sqrt(n)) >= CHANCE
 
 

@@ -122,14 +122,14 @@ def _sums(owners: NDArray[np.int64], vectors: NDArray[np.float64], n: int) -> ND
     return np.stack([np.bincount(owners, column, n) for column in vectors.T], axis=1)
 
 
-def level(triangles: NDArray[np.float64]) -> float:
-    """The mean over all faces of the winding number, between the two sides of a face."""
-    some = slice(None, None, max(1, len(triangles) // PLACES))
+def level(triangles: NDArray[np.float64], faces: NDArray[np.int64] | None = None) -> float:
+    """The mean over all faces, or some, of the winding number of all, between the two sides of a face."""
+    some = np.arange(len(triangles)) if faces is None else faces
+    some = some[:: max(1, len(some) // PLACES)]
     areas = face_areas(triangles[some])
     if not areas.any():
         return 0.0
-    where = np.arange(len(triangles))[some]
-    behind = WindingTree.of(triangles).behind(where, triangles[some].mean(axis=1))
+    behind = WindingTree.of(triangles).behind(some, triangles[some].mean(axis=1))
     return float(np.average(behind, weights=areas)) - 0.5
 
 
