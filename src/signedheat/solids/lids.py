@@ -338,7 +338,7 @@ def stiffness(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> sparse
     for k in range(3):
         u, v = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
         cosine, sine = (u * v).sum(axis=1), np.linalg.norm(np.cross(u, v), axis=1)
-        weight = 0.5 * np.clip(cosine / np.maximum(sine, 1e-300), -100.0, 100.0)
+        weight = 0.5 * cosine / np.maximum(np.maximum(sine, np.abs(cosine) / 100.0), 1e-300)
         i, j = faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
         rows += [i, j, i, j]
         columns += [j, i, i, j]

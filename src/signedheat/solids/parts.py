@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..geometry.components import connected_components, element_components
+from ..geometry.directions import unit
 from ..geometry.edges import edge_table
 from ..geometry.winding_tree import WindingTree, solid_angle
 from .rims import meeting_edges, open_edges
@@ -108,8 +109,7 @@ def uprightness(
     start, stop = corners[alone], np.roll(triangles, -1, axis=1).reshape(-1, 3)[alone]
     a, b, c = triangles.transpose(1, 0, 2)
     normals = np.repeat(np.cross(b - a, c - a), 3, axis=0)[alone]
-    across = np.cross(stop - start, normals)
-    across *= (np.linalg.norm(stop - start, axis=1) / np.maximum(np.linalg.norm(across, axis=1), 1e-300))[:, None]
+    across = unit(np.cross(stop - start, normals)) * np.linalg.norm(stop - start, axis=1)[:, None]
     owners = owners[alone]
     opening = _sums(owners, -0.5 * np.cross(start, stop), n_parts)  # lids run along rims the other way
     length = np.linalg.norm(opening, axis=1)
