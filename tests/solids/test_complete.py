@@ -8,6 +8,7 @@ import pytest
 import signedheat as sh
 from signedheat import samples
 from signedheat.diagnostics import LeftOut
+from signedheat.solids.loose import fragments
 
 
 def grid_sheet(origin, one, other, n=8):
@@ -133,6 +134,22 @@ def test_litter_around_an_open_box_changes_nothing_of_its_completion():
     solid = sh.complete(joined(box(without=(5,)), *litter))
     points = random.uniform(-0.2, 1.2, (1000, 3))
     assert (solid.inside(points) == ((points > 0) & (points < 1)).all(axis=1)).all()
+
+
+@pytest.mark.parametrize("inwards", [False, True])
+def test_litter_is_torn_from_no_open_shell_whichever_way_it_faces(inwards):
+    random = np.random.default_rng(0)
+    vertices, faces = box(without=(5,))
+    litter = [
+        grid_sheet(random.uniform(-0.4, 1.4, 3), 0.05 * random.normal(size=3), 0.05 * random.normal(size=3), 2)
+        for _ in range(40)
+    ]
+    vertices, faces = joined((vertices, faces[:, ::-1] if inwards else faces), *litter)
+    labels = np.minimum(np.arange(len(faces)) // (5 * 128), 1)
+    labels[labels > 0] += (np.arange(len(faces))[labels > 0] - 5 * 128) // 8
+    loose = np.arange(labels.max() + 1) > 0
+    for cluster in fragments(vertices[faces], labels, loose, ~loose):
+        assert loose[labels[cluster]].all()
 
 
 def pipe(sections, inner=0.3, outer=0.5, height=1.4):

@@ -11,7 +11,7 @@ from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.welding import same_positions
 from ..geometry.winding_tree import WindingTree
-from .parts import FRAGMENTS, face_areas, level
+from .parts import FRAGMENTS, face_areas, level, own_levels
 
 COPY = 0.5
 """Distance from a body, over the size of a piece, up to which the piece is a copy of what is there."""
@@ -108,24 +108,31 @@ def fragments(
     pieces, some = loose.copy(), np.flatnonzero((loose | opened)[labels])
     for cluster in clusters_of(triangles[some], labels[some]) if opened.any() else []:
         here = some[cluster]
-        found = np.unique(labels[here][pieces[labels[here]]])
-        while len(found):
+        torn, found = pieces[labels[here]], True
+        while found and torn.any() and not torn.all():
+            pieces[_closed_by(triangles[here[torn]], triangles[here[~torn]], labels[here[~torn]])] = True
+            found = bool((pieces[labels[here]] & ~torn).any())
             torn = pieces[labels[here]]
-            found = np.array(
-                [k for k in np.unique(labels[here[~torn]]) if _closes(triangles[here[torn]], triangles[labels == k])]
-            )
-            pieces[found.astype(np.int64)] = True
     some = np.flatnonzero(pieces[labels])
     return [some[cluster] for cluster in clusters_of(triangles[some], labels[some])]
 
 
-def _closes(pieces: NDArray[np.float64], part: NDArray[np.float64]) -> bool:
-    """Whether pieces lie and face as the rest of a part does: they raise its level by some `CLOSING` of what they would
-    if all were faces of one body, taken at random."""
-    areas, places = face_areas(part), part.mean(axis=1)
-    own = WindingTree.of(part).behind(np.arange(len(part)), places) - 0.5
-    raised = float(WindingTree.of(pieces).numbers(places) @ areas)
-    return raised > CLOSING * float(own @ areas) * min(1.0, float(face_areas(pieces).sum() / areas.sum()))
+def _closed_by(
+    pieces: NDArray[np.float64], triangles: NDArray[np.float64], labels: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """The parts among whose faces pieces lie, facing as they do.
+
+    These raise the level of such a part by some `CLOSING` of what they would if all were faces of one body, taken at
+    random.
+    """
+    names, owners = np.unique(labels, return_inverse=True)
+    every = face_areas(triangles)
+    areas = np.maximum(np.bincount(owners, every), np.finfo(float).tiny)
+    raised = np.bincount(owners, every * WindingTree.of(pieces).numbers(triangles.mean(axis=1))) / areas
+    own = own_levels(triangles, owners)
+    closed = raised * np.sign(own) > CLOSING * np.abs(own) * np.minimum(1.0, face_areas(pieces).sum() / areas)
+    found: NDArray[np.int64] = names[closed]
+    return found
 
 
 def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64], loose: NDArray[np.bool_]) -> bool:
