@@ -19,6 +19,7 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples
 from signedheat.curves.piecewise import memory_estimate as piecewise_estimate
+from signedheat.domains.foreign import SurfaceShape
 from signedheat.geometry.surfels import count_surfels
 from signedheat.lowering.grid.discretization import bytes_of_area
 from signedheat.lowering.grid.discretization import memory_estimate as grid_estimate
@@ -30,7 +31,6 @@ from signedheat.memory import libraries
 from signedheat.operators.grid.blocks import NODES
 from signedheat.solids.complete import bytes_to_complete, complete
 from signedheat.solids.fields import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_NODE, blocks_near
-from signedheat.solids.joining import Shape
 from signedheat.solids.sampling import BYTES_PER_SAMPLE
 
 SIZES = {
@@ -130,7 +130,7 @@ def phi_alone(balls: int, size: int) -> tuple[Callable[[], object], float]:
     return lambda: sh.SignedHeatSolver(grid).distance(mesh), grid_estimate(grid) + surface - libraries()
 
 
-def solid(shape: Callable[[], Shape], closed: bool, size: int) -> tuple[Callable[[], object], float]:
+def solid(shape: Callable[[], SurfaceShape], closed: bool, size: int) -> tuple[Callable[[], object], float]:
     """A solid in a grid of this resolution."""
     made = shape()
     grid = sh.Grid.around(made.bounds, size)

@@ -17,10 +17,13 @@ FLOORS = [
         "#f3d9c1",
     ),
     (
-        "signed_distance morphology solids curves orientation sharpening tets",
-        "complete a shape, orient curves, measure exactly; jumps, morphology, tets",
+        "signed_distance   morphology   solids",
+        "complete a shape, and measure exactly to it; offsets, shells",
         "#f7e6d0",
     ),
+    ("orientation", "which way faces, points and curves face", "#f7e6d0"),
+    ("curves", "broken curves on surfaces: close them, measure to them, jumps", "#f7e6d0"),
+    ("sharpening   tets", "distance to the zero set of φ; tets of a box", "#f7e6d0"),
     ("solver   fields", "SignedHeatSolver; values that know their domain", "#fbf1de"),
     ("method   extrapolation   constraints", "diffuse → normalize → integrate, once, on discretisations", "#fff6c9"),
     ("lowering", "every domain and every source to its discretisation: surface, grid, tets", "#e3efd3"),
@@ -35,10 +38,10 @@ FLOORS = [
     ),
 ]
 FLOW = [
-    (6, "shapes, curves, grids"),
-    (4, "X₀, t;  M + tL, C;  A"),
-    (3, "X  →  Y  →  φ"),
-    (2, "Field"),
+    (9, "shapes, curves, grids"),
+    (7, "X₀, t;  M + tL, C;  A"),
+    (6, "X  →  Y  →  φ"),
+    (5, "Field"),
     (0, "files, pictures, numbers"),
 ]
 """Floor at which each thing is, from the top, in the order in which data pass through."""
@@ -46,7 +49,7 @@ FLOW = [
 
 def draw(path: Path) -> None:
     """Floors on the left, from the bottom up; data on the right."""
-    figure = Figure(figsize=(11, 6.2), dpi=100)
+    figure = Figure(figsize=(11, 7.6), dpi=100)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, 11), ylim=(-0.55, len(FLOORS) + 0.55))
     axes.axis("off")

@@ -14,14 +14,7 @@ from import_graph import circles, import_graph, upward_imports
 PACKAGE = Path(signedheat.__file__).parent
 
 FLOORS = [
-    {
-        "cache",
-        "compiled",
-        "diagnostics",
-        "errors",
-        "frozen",
-        "memory",
-    }
+    {"cache", "compiled", "diagnostics", "errors", "frozen", "memory"}
     | {"jobs", "packages", "parallel", "progress", "reprs"},
     {"geometry"},
     {"linear"},
@@ -33,7 +26,11 @@ FLOORS = [
     {"method", "extrapolation"},
     {"fields"},
     {"solver"},
-    {"curves", "orientation", "sharpening", "solids", "tets", "signed_distance"} | {"morphology"},
+    {"sharpening", "tets"},
+    {"curves"},
+    {"orientation"},
+    {"solids"},
+    {"signed_distance", "morphology"},
     {"io", "torch"},
     {"view"},
     {"batches"},

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ..diagnostics import Note, RoundCorners, SharpenedToShape
 from ..discretization import SourceTerm
-from ..domains.foreign import as_shapes
+from ..domains.foreign import SurfaceShape, as_shapes
+from ..domains.joining import joined_triangles
 from ..domains.kinds import Shapes
 from ..domains.point_cloud import PointCloud
 from ..errors import SourceError
@@ -28,7 +29,6 @@ from ..jobs import run_cancellable
 from ..lowering.tets.discretization import TetDiscretization, lowered_tets
 from ..operators.linear_elements import LinearElements
 from ..progress import Progress
-from ..solids.joining import Shape, joined_triangles
 from .methods import Nearest, nearest
 from .sharpen import Method, sharpen_field, sharpened
 
@@ -55,7 +55,7 @@ def _(
     lowered: TetDiscretization,
     values: NDArray[np.float64],
     source: SourceTerm | None,
-    given: Sequence[Shape] | None,
+    given: Sequence[SurfaceShape] | None,
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
@@ -91,7 +91,7 @@ def _(
     return Nearest(found.distances, sides, (RoundCorners(found.hidden), *notes))
 
 
-def faces_of(shapes: Sequence[Shape], center: NDArray[np.float64]) -> FaceFeatures | None:
+def faces_of(shapes: Sequence[SurfaceShape], center: NDArray[np.float64]) -> FaceFeatures | None:
     """The faces of some shapes around a centre; None if none has any extent.
 
     Raises

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from ..constraints import Constraint
 from ..diagnostics import BoundsNothing, CompletedArea, Diagnostics, FacesRestored, LeftOut, Note, OrientedPoints
+from ..domains.foreign import SurfaceShape
+from ..domains.joining import joined_shape
 from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
@@ -30,7 +32,6 @@ from . import parts
 from .bounding import pieces_of
 from .closing import lids_of
 from .heat import Heat, heat_surface
-from .joining import Shape, joined_shape
 from .loose import bound_together, fragments, scatter_of, without_copies
 from .lost_faces import lost_faces
 from .rims import open_edges
@@ -131,7 +132,7 @@ def complete(
     return _noting(solid, notes, stopwatch, names, source)
 
 
-def refuse_what_does_not_fit(shape: Shape) -> None:
+def refuse_what_does_not_fit(shape: SurfaceShape) -> None:
     """Raise `MemoryLimitError`, before anything is allocated, if completing a shape would not fit in memory."""
     count = shape.n_points if isinstance(shape, PointCloud) else shape.triangulation.n_faces
     refuse_beyond_memory(
@@ -142,7 +143,7 @@ def refuse_what_does_not_fit(shape: Shape) -> None:
     )
 
 
-def bytes_to_complete(shape: Shape, count: int) -> float:
+def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
     """Peak memory of completing a shape that is like this one but has so many faces."""
     if isinstance(shape, PointCloud):
         return BYTES_OF_HEAT + BYTES_PER_FACE * count
@@ -152,7 +153,7 @@ def bytes_to_complete(shape: Shape, count: int) -> float:
     return BYTES_PER_FACE * count
 
 
-def oriented(shape: Shape) -> tuple[Shape, tuple[Note, ...]]:
+def oriented(shape: SurfaceShape) -> tuple[SurfaceShape, tuple[Note, ...]]:
     """A shape whose faces or normals point outwards, and what was done for it."""
     if isinstance(shape, PointCloud):
         points = orient_points(shape)

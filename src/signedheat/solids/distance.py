@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..constraints import Constraint
 from ..domains.grid import Grid
+from ..domains.joining import joined_shape
 from ..domains.kinds import Shapes
 from ..domains.point_cloud import PointCloud
 from ..domains.tet_mesh import TetMesh
@@ -21,7 +22,6 @@ from ..progress import Progress, within
 from ..sharpening.sharpen import sharpen
 from ..solver import SignedHeatSolver, checked
 from .complete import complete
-from .joining import joined_shape
 
 
 def distance_to_shapes(

@@ -6,23 +6,27 @@ from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..domains.curves import Curve, SurfacePoints
-from ..domains.foreign import as_shape, as_shapes
-from ..domains.kinds import ShapeLike
-from ..domains.point_cloud import PointCloud
-from ..domains.polygon_mesh import PolygonMesh
-from ..domains.polyline import Polyline
-from ..domains.tet_mesh import TetMesh
-from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
+from .curves import Curve, SurfacePoints
+from .foreign import SurfaceShape, as_shape, as_shapes
+from .kinds import ShapeLike
+from .point_cloud import PointCloud
+from .polygon_mesh import PolygonMesh
+from .polyline import Polyline
+from .tet_mesh import TetMesh
+from .triangle_mesh import TriangleMesh
 
-Shape = TriangleMesh | PolygonMesh | PointCloud
 
+def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
+    """The shape itself, or one mesh of several; tets are their boundary.
 
-def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
-    """One shape of several meshes."""
+    Raises
+    ------
+    SourceError
+        If there is no shape, or it is a curve or polyline, or one of several is no mesh.
+    """
     shapes = as_shapes(shape)
     if not shapes:
         raise SourceError("there is no shape", remedy="pass at least one")
@@ -32,7 +36,7 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
             return whole.boundary
         if not isinstance(whole, TriangleMesh | PolygonMesh | PointCloud):
             if not isinstance(whole, Curve | SurfacePoints | Polyline):
-                as_shape(cast("Shape", whole))  # which refuses paths and bare arrays
+                as_shape(cast("SurfaceShape", whole))  # which refuses paths and bare arrays
             raise SourceError(
                 f"distance in space is measured to meshes and points, not to a {type(whole).__name__}",
                 remedy="pass a mesh, or a point cloud; curves are measured on their surface",
@@ -46,16 +50,14 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> Shape:
                 f"several meshes make one solid, and shape {index} is a {type(each).__name__}",
                 element=f"shape {index}",
             )
-        meshes.append(each.triangulation)
-    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+        meshes.append(each)
+    return TriangleMesh(*joined_triangles(meshes))
 
 
 def joined_triangles(
-    parts: Sequence[TriangleMesh | PolygonMesh], origin: NDArray[np.float64]
+    parts: Sequence[TriangleMesh | PolygonMesh], origin: ArrayLike = 0.0
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices around `origin` and triangles of meshes."""
+    """(n, 3) vertices, relative to `origin`, and (m, 3) triangles of all meshes together."""
     meshes = [part.triangulation for part in parts]
     starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
