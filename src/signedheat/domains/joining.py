@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..errors import SourceError
 from .curves import Curve, SurfacePoints
@@ -55,7 +55,7 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
 
 
 def joined_triangles(
-    parts: Sequence[TriangleMesh | PolygonMesh], origin: ArrayLike = 0.0
+    parts: Sequence[TriangleMesh | PolygonMesh], origin: NDArray[np.float64] | float = 0.0
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """(n, 3) vertices, relative to `origin`, and (m, 3) triangles of all meshes together."""
     meshes = [part.triangulation for part in parts]
