@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,9 @@ SAMPLES = 4
 """Samples across that strip."""
 MOST = 4096
 """Samples around a rim at most, or nearly."""
+DIVIDED = 1 << 20
+"""Triangles behind a rim that are made by division at most, of which `MOST` are taken: a smooth surface behind the
+narrowest opening that is no slit is divided into 200,000, balls and boxes with round holes into some 1,000."""
 NEAR = 0.05
 """Part of that strip nearest to a place of the rim, which gives the normal there."""
 STIFF = 0.1
@@ -66,7 +70,7 @@ def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> ND
 def samples_near(
     triangles: NDArray[np.float64], patches: NDArray[np.int64], rim: scipy.spatial.cKDTree, reach: float
 ) -> Samples:
-    """Samples of triangles that are within reach of a rim, at most reach / `SAMPLES` apart."""
+    """Samples of triangles that are within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
     size = reach / SAMPLES
     a, b, c = triangles.transpose(1, 0, 2)
     in_box = (np.maximum(np.maximum(a, b), c) > rim.mins - reach) & (
@@ -74,13 +78,15 @@ def samples_near(
     )
     in_box = in_box.all(axis=1)
     triangles, patches = triangles[in_box], patches[in_box]
-    near, labels = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)]
+    near, labels, divided = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
     while len(triangles):
         centres = triangles.mean(axis=1)
         radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
         away = rim.query(centres)[0]
         triangles, patches, radii, away = (each[away < reach + radii] for each in (triangles, patches, radii, away))
         fine = radii <= size
+        divided += 4 * int((~fine).sum())
+        fine |= divided > DIVIDED
         chosen = fine & (away < reach)
         near.append(triangles[chosen])
         labels.append(patches[chosen])
@@ -136,7 +142,7 @@ def continuation(
     def sums(weights: NDArray[np.float64], *factors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sums over the samples near each place, of products."""
         columns = np.einsum("k,k...->k...", weights, np.prod(np.broadcast_arrays(*factors), axis=0))
-        flat = columns.reshape(len(rows), -1)
+        flat = columns.reshape(len(rows), math.prod(columns.shape[1:]))
         totals = np.stack([np.bincount(rows, column, n) for column in flat.T], axis=1)
         return np.asarray(totals.reshape(n, *columns.shape[1:]))
 
