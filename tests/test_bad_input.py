@@ -152,6 +152,25 @@ def test_close_curves(arguments, keywords, error):
         sh.close_curves(*arguments, **keywords)
 
 
+SOLID = sh.complete(BALL)
+
+
+@pytest.mark.parametrize("value", ["yes", 2**70, 1.0, None, np.zeros(3)], ids=lambda value: type(value).__name__)
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        *((lambda **flags: sh.complete(BALL, **flags), name) for name in ("as_oriented", "keep_overlaps")),
+        *((lambda **flags: sh.signed_distance(RING, BALL, **flags), name) for name in ("as_oriented", "every_piece")),
+        *((lambda **flags: sh.close_curves(BALL, RING, **flags), name) for name in ("as_oriented", "every_piece")),
+        *((lambda **flags: SOLID.surface(resolution=8, **flags), name) for name in ("sharp", "keep_faces")),
+        (lambda **flags: sh.intrinsic_delaunay(BALL, **flags), "refine"),
+    ],
+)
+def test_flags_are_true_or_false(call, name, value):
+    with refused(sh.errors.SignedHeatError, element=name):
+        call(**{name: value})
+
+
 def with_one(values, value):
     values = np.array(values, dtype=float)
     values.ravel()[5] = value

@@ -16,6 +16,7 @@ from ..domains.curves import Curve, CurveOrPoints, CurvesAndPoints, SurfacePoint
 from ..domains.foreign import ForeignShape, converted
 from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import flag
 from ..errors import GeometryError, SourceError
 from ..fields.vertex_field import VertexField
 from ..geometry.components import connected_components
@@ -109,6 +110,7 @@ def conforming_distance(
 
     Other domains than triangle meshes, and meshes too thin to be triangulated anew, are taken as they are.
     """
+    as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     own_levels = isinstance(constraint, EachComponent | LevelValues)
 
     def measured(solver: SignedHeatSolver[SurfaceDomain]) -> VertexField:

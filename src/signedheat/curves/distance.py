@@ -16,6 +16,7 @@ from ..domains.given_curves import given_curves
 from ..domains.kinds import AnySurface, SurfaceDomain
 from ..domains.level_sets import is_consistent
 from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import flag
 from ..errors import (
     CancellingNormalsError,
     ConstraintError,
@@ -175,6 +176,7 @@ def distance_to_curves(
             f"distance to curves is zero on all of them, which {constraint!r} denies",
             remedy="use SignedHeatSolver.distance",
         )
+    as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
     solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
     listed, left_out = given_curves(solver.domain, as_list(curves))

@@ -32,7 +32,7 @@ from .foreign import ForeignShape, converted
 from .level_sets import is_consistent, level_set, without_repeats
 from .segments import segments_of, segments_of_each
 from .triangle_mesh import TriangleMesh
-from .validation import finite_rows, frozen
+from .validation import finite_rows, flag, frozen
 
 if TYPE_CHECKING:
     import pyvista
@@ -309,7 +309,7 @@ def intrinsic_delaunay(
     >>> bool(abs(better.triangles.face_areas.sum() - 10) < 1e-12)
     True
     """
-    mesh = triangle_mesh(mesh)
+    mesh, refine = triangle_mesh(mesh), flag(refine, "refine")
     if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
         raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}", element="angle")
     if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):

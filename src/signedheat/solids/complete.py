@@ -19,6 +19,7 @@ from ..domains.kinds import ShapeLike
 from ..domains.point_cloud import PointCloud
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
+from ..domains.validation import flag
 from ..errors import SignedHeatError, SourceError
 from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
@@ -109,6 +110,7 @@ def complete(
     """
     if completion not in ("lids", "heat"):
         raise SignedHeatError(f'completion must be "lids" or "heat", not {completion!r}', element="completion")
+    as_oriented, keep_overlaps = flag(as_oriented, "as_oriented"), flag(keep_overlaps, "keep_overlaps")
     joined = joined_shape(shape)
     refuse_what_does_not_fit(joined)
     method = Heat(constraint, diffusion)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..diagnostics import Diagnostics
 from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
-from ..domains.validation import finite_number, positive_number, query_points
+from ..domains.validation import finite_number, flag, positive_number, query_points
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..fields.grid_field import GridField
 from ..fields.known_solid import Closest
@@ -280,6 +280,7 @@ class Solid(Frozen, ShortRepr):
         >>> bool(np.abs(np.linalg.norm(surface.vertices, axis=1) - 0.8).max() < 0.01)
         True
         """
+        sharp, keep_faces = flag(sharp, "sharp"), flag(keep_faces, "keep_faces")
         if tolerance is not None:
             within = positive_number(tolerance, "tolerance")
             whole = self.surface(
