@@ -71,6 +71,8 @@ FOUND = [
     ("surface curves", 1123, 2399), ("surface curves", 1124, 2141),
     # curves in faces that do not exist
     ("surface curves", 1124, 1932),
+    # segments on the line of huge ones, to rounding
+    ("surface curves", 20261124, 415),
     # tets of no corners beside others, in a VTK file
     ("files tet fields", 1123, 6794),
     # parts of a surface without curves, told by a command on standard output alone

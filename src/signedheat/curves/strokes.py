@@ -209,7 +209,7 @@ def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> spar
     gaps = np.abs(corners - share * step)
     heights = (np.conj(step) * corners).imag / np.abs(step) * placed.sides[rows, None]
     size = triangles.edge_lengths[faces].max(axis=1, keepdims=True)
-    sines = np.abs(heights) / np.maximum(gaps, 1e-300)
+    sines = np.abs(heights) / np.maximum(np.maximum(gaps, np.abs(heights)), np.finfo(float).tiny)
     steps_away = np.rint(gaps / (LEVEL * size))  # rounding must not decide which of two segments is nearer
     sides = np.where(np.abs(heights) <= LEVEL * size, 0.0, np.sign(heights))
     keys = (owners[rows, None] * triangles.n_vertices + triangles.corner_vertices[faces]).ravel()
