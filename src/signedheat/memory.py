@@ -106,8 +106,8 @@ def available_memory() -> int | None:
     The least of what is free in the machine, what the container or job leaves (cgroups, those around them too), and
     what the process's own limits leave on address space (``ulimit -v``) and data (``ulimit -d``).
     """
-    known = [bound for bound in (_free(), *_containers(), *_own_limits()) if bound is not None]
-    return max(min(known), 0) if known else None
+    limits = [bound for bound in (_free(), *_containers(), *_own_limits()) if bound is not None]
+    return max(min(limits), 0) if limits else None
 
 
 def _free() -> int | None:

@@ -2,7 +2,7 @@
 
 from .curves.orientation import CurveOrientation
 from .diagnostics import Diagnostics
-from .fields.known_solid import Closest
+from .fields.solid_queries import Closest
 from .orientation.meshes import Orientation
 from .solids.deviation import Deviation
 from .solids.sampling import Samples

@@ -63,11 +63,11 @@ class Manifest:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / "manifest.jsonl"
-        self.known = _read(self.path)
+        self.outcomes = _read(self.path)
 
     def still_holds(self, name: str, path: Path, job: str) -> Outcome | None:
         """The outcome of a shape that is done: the same file, the same job, and all its results still there."""
-        outcome = self.known.get(name)
+        outcome = self.outcomes.get(name)
         if outcome is None or not outcome.is_done or outcome.job != job or outcome.source != source_of(path):
             return None
         return outcome if all((self.path.parent / output).is_file() for output in outcome.outputs) else None
@@ -107,14 +107,14 @@ def _read(path: Path) -> dict[str, Outcome]:
     FileFormatError
         If something else has its name: a folder, a pipe.
     """
-    known: dict[str, Outcome] = {}
+    outcomes: dict[str, Outcome] = {}
     if not os.path.lexists(path) or (path.is_file() and not path.stat().st_size):
-        return known
+        return outcomes
     for line in contents(path).decode("utf-8", errors="replace").split("\n"):
         with suppress(ValueError, TypeError, KeyError, RecursionError):
             outcome = _outcome(json.loads(line))
-            known[outcome.name] = outcome
-    return known
+            outcomes[outcome.name] = outcome
+    return outcomes
 
 
 def _outcome(entries: dict[str, Any]) -> Outcome:

@@ -141,10 +141,10 @@ def run(
         scratch = stack.enter_context(_locked(target))
         manifest = Manifest(target)
         found = {each.name: manifest.still_holds(each.name, each.path, described) for each in every}
-        known = {name: outcome for name, outcome in found.items() if outcome is not None}
-        skipped = len(known)
-        manifest.write(known.values())
-        todo = [each for each in every if each.name not in known]
+        done = {name: outcome for name, outcome in found.items() if outcome is not None}
+        skipped = len(done)
+        manifest.write(done.values())
+        todo = [each for each in every if each.name not in done]
         tasks = [Task(job, described, each, target.absolute(), scratch / str(k)) for k, each in enumerate(todo)]
         if scheduler is not None:
             outcomes = _on_cluster(tasks, scheduler, threads, time_limit)
@@ -155,18 +155,18 @@ def run(
         if progress is not None:
             progress(skipped / len(every), f"{skipped} of {len(every)} shapes")
         for now, outcome in enumerate(outcomes, 1):
-            known[outcome.name] = outcome
+            done[outcome.name] = outcome
             manifest.add(outcome)
             logger.info("%s: %s (%.1f s) %s", outcome.name, outcome.state, outcome.seconds, outcome.message)
             if report is not None:
                 report(outcome)
             failed += not outcome.is_done
             if progress is not None:
-                text = f"{len(known)} of {len(every)} shapes" + (f", {failed} not done" if failed else "")
+                text = f"{len(done)} of {len(every)} shapes" + (f", {failed} not done" if failed else "")
                 left = (time.perf_counter() - begin) / now * (len(todo) - now)
-                progress(len(known) / len(every), text + (f", about {duration(left)} left" if now < len(todo) else ""))
-        manifest.write(known[each.name] for each in every)
-    return Batch(tuple(known[each.name] for each in every), manifest.path, skipped)
+                progress(len(done) / len(every), text + (f", about {duration(left)} left" if now < len(todo) else ""))
+        manifest.write(done[each.name] for each in every)
+    return Batch(tuple(done[each.name] for each in every), manifest.path, skipped)
 
 
 def _described(job: Function) -> str:

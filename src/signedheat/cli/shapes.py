@@ -270,7 +270,7 @@ def section_of(field: TetField) -> GridField:
 
 
 def field_or_image(path: str) -> Any:
-    """A field, or the image that a file holds whose axes are not x, y, z; None for formats of neither."""
+    """The field in a file; the image in it, if its axes are not x, y, z; None if the format holds neither."""
     if extension(path) in NIFTI:
         return read_labels(path)
     if extension(path) not in FIELD_FORMATS:

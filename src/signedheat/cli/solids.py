@@ -270,8 +270,8 @@ def sample(arguments: Namespace) -> Summary:
 def contour(arguments: Namespace) -> Summary:
     """Load, contour, write."""
     path = arguments.output
-    known = (sh.io.SHAPE_FORMATS | sh.io.CURVE_FORMATS | sh.io.POLYLINE_FORMATS) - {".xyz", ".pc"}
-    sh.io.ensure_writable(path, known, "a surface, curves or lines")
+    formats = (sh.io.SHAPE_FORMATS | sh.io.CURVE_FORMATS | sh.io.POLYLINE_FORMATS) - {".xyz", ".pc"}
+    sh.io.ensure_writable(path, formats, "a surface, curves or lines")
     image: sh.io.LabelImage | None = None
     field = shapes.field_or_image(arguments.field)
     if field is None:

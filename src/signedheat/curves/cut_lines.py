@@ -308,9 +308,9 @@ def on_lines(
 
 def slope_error(triangles: IntrinsicMesh, at_corners: NDArray[np.float64], directions: NDArray[np.complex128]) -> float:
     """Root mean square of ∇φ − Y, where φ is known."""
-    known = ~np.isnan(at_corners[:, 0])
+    finite = ~np.isnan(at_corners[:, 0])
     error = np.abs(gradients(triangles, at_corners) - directions)
-    return float(np.sqrt(np.average(error[known] ** 2, weights=triangles.face_areas[known])))
+    return float(np.sqrt(np.average(error[finite] ** 2, weights=triangles.face_areas[finite])))
 
 
 def integration_error(phi: PiecewiseField, directions: NDArray[np.complex128]) -> float:

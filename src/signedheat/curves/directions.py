@@ -117,8 +117,8 @@ class Decision:
         return mostly_loose(self.pieces.strokes, self.best)
 
     @property
-    def ends_agree_in_vain(self) -> bool:
-        """Whether most of the length bounds nothing although there are pieces that follow each other."""
+    def joined_but_bounds_nothing(self) -> bool:
+        """Whether some pieces follow each other, but most of the length bounds no region."""
         if not (self.smooth or self.bounds_nothing):
             return False
         movable, signs = self.pieces.movable, self.best.signs
@@ -132,9 +132,10 @@ class Decision:
         return not self.bounds_nothing and bool((self.best.explained[kept] >= EXPLAINED).all())
 
     def turned_loops(self) -> NDArray[np.int64]:
-        """Numbers of the pieces that are turned against most of the length of their own loop.
+        """Numbers of the pieces of loops of which most of the length is turned.
 
-        None if they are few, or if there are complete curves, not against their own loop, which show how others face.
+        None if these are a small share of the length; or if a complete curve is in a loop of which most is not turned:
+        that curve shows how the others face.
         """
         strokes, best = self.pieces.strokes, self.best
         triangles = strokes.surface.triangles
@@ -157,8 +158,11 @@ class Decision:
         result: NDArray[np.int64] = self.pieces.numbers[wholly & (not few) & (not complete)]
         return result
 
-    def doubtful(self) -> NDArray[np.int64]:
-        """Numbers of the curves that bound something else if it is decided in another way that is nearly as good."""
+    def ambiguous(self) -> NDArray[np.int64]:
+        """Numbers of the curves that another solution turns or leaves out, and that costs hardly more.
+
+        Solutions whose sides differ on a small area only are not counted.
+        """
         strokes, best, areas = self.pieces.strokes, self.best, self.pieces.strokes.areas
         most = cost(strokes, best) + NEARLY * strokes.lengths.sum()
         found = np.zeros(len(best.signs), dtype=bool)

@@ -108,7 +108,7 @@ def distance_to_pieces(
 
 def warn_of_guesses(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> None:
     """Warn if what the pieces bound is a guess."""
-    if decision.ends_agree_in_vain:
+    if decision.joined_but_bounds_nothing:
         warn_user(
             "most of the curves bound nothing together: which side is which away from them is a guess. Draw what is "
             "missing, or turn curves that face the wrong way; as_oriented=True takes curves as they are",
@@ -123,10 +123,10 @@ def warn_of_guesses(decision: Decision, field: VertexField[Surface], curves: Seq
             InexactWarning,
         )
         return
-    doubtful = decision.doubtful()
-    if len(doubtful):
+    ambiguous = decision.ambiguous()
+    if len(ambiguous):
         warn_user(
-            f"{named(doubtful)} may as well be left out, or run the other way: what is bounded then is nearly as "
+            f"{named(ambiguous)} may as well be left out, or run the other way: what is bounded then is nearly as "
             "likely. Turn or remove them, or draw more; as_oriented=True takes curves as they are",
             InexactWarning,
         )

@@ -282,7 +282,13 @@ def conforms(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoi
 def conforming(
     discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
 ) -> SurfaceDiscretization:
-    """The discretisation; refused if its triangles do not conform, be it that rounding moved curves on flat faces."""
+    """The discretisation itself, if unoriented curves run along its edges; rounding may move them off edges.
+
+    Raises
+    ------
+    SourceError
+        If one does not.
+    """
     if conforms(discretization, sources):
         return discretization
     raise SourceError(

@@ -216,10 +216,10 @@ def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> spar
     order = np.lexsort((-sines.ravel(), steps_away.ravel(), keys))
     first = order[np.concatenate([[True], np.diff(keys[order]) > 0])[: len(order)]]
     on = steps_away.ravel()[first] == 0
-    known = first[on | (sines.ravel()[first] > AHEAD)]
-    values = np.where(steps_away.ravel()[known] == 0, 0.0, sides.ravel()[known]) + 2.0
+    clear = first[on | (sines.ravel()[first] > AHEAD)]
+    values = np.where(steps_away.ravel()[clear] == 0, 0.0, sides.ravel()[clear]) + 2.0
     shape = (len(parts), triangles.n_vertices)
-    return sparse.csr_matrix((values, np.divmod(keys[known], triangles.n_vertices)), shape=shape)
+    return sparse.csr_matrix((values, np.divmod(keys[clear], triangles.n_vertices)), shape=shape)
 
 
 def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, widths: NDArray[np.float64]) -> sparse.csr_matrix:

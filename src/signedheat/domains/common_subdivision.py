@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from ..errors import GeometryError
-from ..geometry.intrinsic.history import turned_lines
+from ..geometry.intrinsic.history import misplaced_lines
 from ..geometry.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .polygon_mesh import PolygonMesh
@@ -75,7 +75,7 @@ def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], 
     """
     triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
-    lost = turned_lines(triangles, lines, triangulation.history.before.lengths_of_edges)
+    lost = misplaced_lines(triangles, lines, triangulation.history.before.lengths_of_edges)
     if len(lost):
         raise GeometryError(
             f"edge {lost[0]} of the mesh crosses triangles as thin as rounding, which turn it",
@@ -121,12 +121,12 @@ def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
     places = defaultdict(list)
     for k, corner in enumerate(outline):
         places[corner].append(k)
-    known = [(a, b) for a, b in chords if a in places and b in places]
-    known.sort(key=lambda ends: abs(places[ends[0]][0] - places[ends[1]][0]))
+    found = [(a, b) for a, b in chords if a in places and b in places]
+    found.sort(key=lambda ends: abs(places[ends[0]][0] - places[ends[1]][0]))
     following = [*range(1, len(outline)), 0]
     alive = [True] * len(outline)
     parts, left = [], len(outline)
-    for chord in known:
+    for chord in found:
         ends = [next((k for k in places[corner] if alive[k]), -1) for corner in chord]
         first, last = min(ends), max(ends)
         if first < 0 or following[first] == last:

@@ -28,8 +28,8 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     """
     faces, edges = mesh.faces, mesh.edges
     values = snapped(values, edges.vertices, level)
-    known = np.asarray(np.isfinite(values)[faces].all(axis=1))
-    crossed, sides = crossed_sides((values >= level)[faces], known)
+    finite = np.asarray(np.isfinite(values)[faces].all(axis=1))
+    crossed, sides = crossed_sides((values >= level)[faces], finite)
     on_edges = edges.face_edges[crossed[:, None], sides]
 
     tail, head = (values[edges.vertices[:, k]] for k in (0, 1))

@@ -168,8 +168,8 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         return frozen(normals[self.representatives])
 
     def _triangulation_vertices(self, vertices: NDArray[np.int64]) -> NDArray[np.int64]:
-        known = (vertices >= 0) & (vertices < self.n_points)
-        return np.where(known, self.representatives[np.where(known, vertices, 0)], vertices)
+        exists = (vertices >= 0) & (vertices < self.n_points)
+        return np.where(exists, self.representatives[np.where(exists, vertices, 0)], vertices)
 
     def __repr__(self) -> str:
         return f"PointCloud({self.n_points} points, {'with' if self.normals is not None else 'without'} normals)"

@@ -27,8 +27,8 @@ from ..operators.grid.blocks import SIDE, Blocks
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from .booleans import Combinable, Rule
-from .known_solid import Closest, KnownSolid
 from .levels import on_level
+from .solid_queries import Closest, SolidQueries
 
 files = lazy_module("signedheat.io.fields", "files")
 ply = lazy_module("signedheat.io.ply", "files")
@@ -85,7 +85,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     values: NDArray[np.float64]
     diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
     confidence: NDArray[np.float32] | None = field(default=None, repr=False)
-    solid: KnownSolid | None = field(default=None, repr=False)
+    solid: SolidQueries | None = field(default=None, repr=False)
     blocks: Blocks | None = field(default=None, repr=False)
     coarse: GridField[Dimension] | None = field(default=None, repr=False)
     width: float = math.inf

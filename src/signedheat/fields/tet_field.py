@@ -206,12 +206,12 @@ class TetField(Displayed, Combinable, Frozen):
         tets, n = self.mesh.tets, self.mesh.n_vertices
         volumes = np.maximum(self.mesh.tet_volumes, 0)
         gradients = self.tet_gradients
-        known = ~np.isnan(gradients).any(axis=1)
-        vertices = tets[known].ravel()
+        finite = ~np.isnan(gradients).any(axis=1)
+        vertices = tets[finite].ravel()
         sums = np.stack(
-            [np.bincount(vertices, np.repeat((volumes * g)[known], 4), minlength=n) for g in gradients.T], axis=1
+            [np.bincount(vertices, np.repeat((volumes * g)[finite], 4), minlength=n) for g in gradients.T], axis=1
         )
-        total = np.bincount(vertices, np.repeat(volumes[known], 4), minlength=n)
+        total = np.bincount(vertices, np.repeat(volumes[finite], 4), minlength=n)
         return np.where(total[:, None] > 0, sums / np.where(total > 0, total, 1)[:, None], np.nan)
 
     @cached_property

@@ -176,9 +176,9 @@ def spread(points: NDArray[np.float64], values: NDArray[np.float64], used: NDArr
         (np.maximum(far[:, 1:].ravel(), 1e-300), (rows, near[:, 1:].ravel())), shape=(len(ids),) * 2
     )
     graph = sparse.csr_matrix(graph.minimum(graph.T))  # joined from both sides
-    known = np.flatnonzero(~lacking[ids])
-    start = np.abs(values[ids[known]])
-    tail, head = known, np.full(len(known), len(ids))
+    finite = np.flatnonzero(~lacking[ids])
+    start = np.abs(values[ids[finite]])
+    tail, head = finite, np.full(len(finite), len(ids))
     coo = graph.tocoo()
     whole = sparse.csr_matrix(
         (

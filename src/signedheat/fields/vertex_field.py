@@ -161,8 +161,8 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
             If φ does not take the level.
         """
         field, level = self.finest, finite_number(level, "level")
-        known = field.values[np.isfinite(field.values)]
-        low, high = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
+        finite = field.values[np.isfinite(field.values)]
+        low, high = (float(finite.min()), float(finite.max())) if len(finite) else (np.nan, np.nan)
         least = 1e-12 * max(high - low, 0.0)
         if not low - least <= level <= high + least:
             raise OutsideError(

@@ -101,8 +101,8 @@ class MergedSources:
     def _part(self, mine: NDArray[np.int64], old: NDArray[np.int64], oriented: bool) -> CurveSegments:
         """The source that has some of the pieces; its old nodes come first."""
         nodes = np.concatenate([old, np.setdiff1d(self.ends[mine], old)]).astype(np.int64)
-        known, first = np.unique(nodes, return_index=True)
-        ends = first[np.searchsorted(known, self.ends[mine])]
+        distinct, first = np.unique(nodes, return_index=True)
+        ends = first[np.searchsorted(distinct, self.ends[mine])]
         return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
 
 

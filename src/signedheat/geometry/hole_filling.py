@@ -40,14 +40,14 @@ def hole_fillings(
     following = next_around_gap(points, normals, tails, heads)
     at_boundary = np.zeros(len(points), dtype=bool)
     at_boundary[tails] = True
-    known = {_pair(i, j) for i, j in edges.vertices[at_boundary[edges.vertices].all(axis=1)].tolist()}
+    existing = {_pair(i, j) for i, j in edges.vertices[at_boundary[edges.vertices].all(axis=1)].tolist()}
     fillings: list[tuple[int, int, int]] = []
     passed = np.zeros(len(tails), dtype=bool)
     for start in range(len(tails)):
         loop = [] if passed[start] else _loop_from(start, following)
         passed[loop] = True
         if loop:
-            fillings += _ears(points, normals, tails[loop[::-1]].tolist(), known)
+            fillings += _ears(points, normals, tails[loop[::-1]].tolist(), existing)
     return np.array(fillings, dtype=np.int64).reshape(-1, 3)
 
 
@@ -84,11 +84,11 @@ def _loop_from(start: int, following: NDArray[np.int64]) -> list[int]:
 
 
 def _ears(
-    points: NDArray[np.float64], normals: NDArray[np.float64], loop: list[int], known: set[tuple[int, int]]
+    points: NDArray[np.float64], normals: NDArray[np.float64], loop: list[int], existing: set[tuple[int, int]]
 ) -> list[tuple[int, int, int]]:
     """Triangles that fill a loop of vertices, counter-clockwise around the hole; none if it is not a hole.
 
-    Edges of the new triangles are added to `known`.
+    Edges of the new triangles are added to `existing`.
     """
     if len(set(loop)) < max(len(loop), 3):
         return []
@@ -97,8 +97,8 @@ def _ears(
     fan = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
     if fan @ normal <= 0:
         return []
-    ears = cut_into_ears(corners, normal, lambda i, k: _pair(loop[i], loop[k]) not in known)
-    known |= {_pair(loop[i], loop[k]) for i, _, k in ears[:-1]}
+    ears = cut_into_ears(corners, normal, lambda i, k: _pair(loop[i], loop[k]) not in existing)
+    existing |= {_pair(loop[i], loop[k]) for i, _, k in ears[:-1]}
     return [(loop[i], loop[j], loop[k]) for i, j, k in ears]
 
 

@@ -90,8 +90,8 @@ def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], lev
         If the values do not take the level.
     """
     height = values - level
-    known = height[np.isfinite(height)]
-    low, high = float(known.min(initial=np.inf)), float(known.max(initial=-np.inf))
+    finite = height[np.isfinite(height)]
+    low, high = float(finite.min(initial=np.inf)), float(finite.max(initial=-np.inf))
     if not low < 0 < high:
         raise OutsideError(
             f"level {level:g} is outside the values of the grid, {low + level:g} to {high + level:g}",

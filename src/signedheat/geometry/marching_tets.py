@@ -71,9 +71,9 @@ def level_triangles(
     vertices: NDArray[np.float64], tets: NDArray[np.int64], values: NDArray[np.float64], level: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """The level set of the linear interpolant, open at the boundary: positions (n, 3), triangles (k, 3), tets (k,)."""
-    known = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
-    keys, owners = _triangles(tets[known], (values < level)[tets[known]], len(vertices), _CUTS)
-    return *_crossings(vertices, values, np.zeros_like(vertices), level, keys, 0.0), known[owners]
+    finite = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
+    keys, owners = _triangles(tets[finite], (values < level)[tets[finite]], len(vertices), _CUTS)
+    return *_crossings(vertices, values, np.zeros_like(vertices), level, keys, 0.0), finite[owners]
 
 
 def _crossings(

@@ -167,8 +167,8 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[NDArray[np
         faces[alone], weights[alone] = points.faces, points.barycentric
     several = np.flatnonzero(count > 1).tolist()
     wanted = np.zeros(mesh.n_vertices + 1, dtype=bool)
-    known = np.array([v for k in several for v in nodes[k].vertices], dtype=np.int64)
-    wanted[known[(known >= 0) & (known < mesh.n_vertices)]] = True
+    named = np.array([v for k in several for v in nodes[k].vertices], dtype=np.int64)
+    wanted[named[(named >= 0) & (named < mesh.n_vertices)]] = True
     around: dict[int, list[int]] = {}
     for face in np.flatnonzero(wanted[mesh.faces].any(axis=1)).tolist() if several else []:
         for v in mesh.faces[face].tolist():

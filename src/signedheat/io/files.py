@@ -74,11 +74,11 @@ def damaged(cause: str, element: str | None = None) -> FileFormatError:
     return FileFormatError(cause, remedy="write or download it again", element=element)
 
 
-def unknown_extension(path: PathLike, known: Collection[str], purpose: str) -> FileFormatError:
+def unknown_extension(path: PathLike, formats: Collection[str], purpose: str) -> FileFormatError:
     """The error for an extension that is not supported."""
     ending = extension(path)
     cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
-    return FileFormatError(f"{cause} for {purpose}", remedy=f"use one of {' '.join(sorted(known))}", path=path)
+    return FileFormatError(f"{cause} for {purpose}", remedy=f"use one of {' '.join(sorted(formats))}", path=path)
 
 
 def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileFormatError:
@@ -218,7 +218,7 @@ def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
         raise FileFormatError(f"this is no name of a file ({error})", remedy="check the name", path=path) from error
 
 
-def contents_beside(path: PathLike, name: str) -> bytes:
+def companion_contents(path: PathLike, name: str) -> bytes:
     """The bytes of a file that another one names, which must lie in the same folder or below it.
 
     Raises
@@ -275,14 +275,14 @@ def text(path: PathLike) -> str:
     return contents(path).decode("utf-8", errors="replace")
 
 
-def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> None:
+def ensure_writable(path: PathLike, formats: Collection[str], purpose: str) -> None:
     """Check before a long computation that its result can be written.
 
     Parameters
     ----------
     path : path
         The file.
-    known : collection of str
+    formats : collection of str
         Supported extensions, with the dot.
     purpose : str
         What is to be written, for the message.
@@ -294,8 +294,8 @@ def ensure_writable(path: PathLike, known: Collection[str], purpose: str) -> Non
     MissingPackageError
         If the format needs a package that is not installed.
     """
-    if extension(path) not in known:
-        raise unknown_extension(path, known, purpose)
+    if extension(path) not in formats:
+        raise unknown_extension(path, formats, purpose)
     if extension(path) in NEEDED:
         require(*NEEDED[extension(path)])
     with writing(path):

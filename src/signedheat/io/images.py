@@ -25,8 +25,8 @@ from ..packages import lazy_module, require
 from .arrays import read_npy, read_npz
 from .files import (
     PathLike,
+    companion_contents,
     contents,
-    contents_beside,
     damaged,
     ensure_fits,
     format_for,
@@ -160,7 +160,7 @@ def _read_nrrd(path: PathLike) -> Image:
     if companion is not None:
         if companion.startswith("LIST") or "%" in companion:
             raise FileFormatError("its data are in several files", remedy="save it as one")
-        rest = contents_beside(path, companion)
+        rest = companion_contents(path, companion)
     sizes = [int(n) for n in header["sizes"]]
     code = _CODES.get(header["type"])
     if code is None or len(sizes) != header["dimension"] or min(sizes, default=0) < 1:

@@ -109,11 +109,11 @@ def read_pcd(path: PathLike) -> Elements:
     if not {"x", "y", "z"} <= table.keys():
         raise FileFormatError(f"the fields are {', '.join(table)}, without x, y and z")
     points = np.column_stack([table[axis] for axis in "xyz"])
-    known = np.isfinite(points).all(axis=1)
+    finite = np.isfinite(points).all(axis=1)
     names = [f"normal_{axis}" for axis in "xyz"]
     normals = np.column_stack([table[name] for name in names]) if set(names) <= table.keys() else None
-    whole = normals is not None and np.isfinite(normals[known]).all()
-    return Elements(points[known], normals=normals[known] if normals is not None and whole else None)
+    whole = normals is not None and np.isfinite(normals[finite]).all()
+    return Elements(points[finite], normals=normals[finite] if normals is not None and whole else None)
 
 
 def _table(header: dict[str, list[str]], body: bytes) -> dict[str, NDArray[np.float64]]:

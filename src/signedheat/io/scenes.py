@@ -20,7 +20,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError
 from ..geometry.welding import welded
 from ..packages import lazy_module
-from .files import PathLike, contents, contents_beside, damaged, ensure_fits, extension, parsed_by_others, reading
+from .files import PathLike, companion_contents, contents, damaged, ensure_fits, extension, parsed_by_others, reading
 
 trimesh = lazy_module("trimesh", ".glb and .gltf files")
 messages = lazy_module("OCP.Message", ".step files")
@@ -105,7 +105,7 @@ def _without_looks(data: bytes, path: PathLike) -> tuple[bytes, dict[str, bytes]
     length = int.from_bytes(data[12:16], "little") if is_binary else len(data)
     tree = json.loads(data[20 : 20 + length] if is_binary else data)
     files = {
-        buffer["uri"]: contents_beside(path, unquote(buffer["uri"]))
+        buffer["uri"]: companion_contents(path, unquote(buffer["uri"]))
         for buffer in tree.get("buffers", [])
         if "uri" in buffer and "base64," not in buffer["uri"]
     }

@@ -190,8 +190,8 @@ def _band(field: GridField) -> tuple[VdbGrid, Outside]:
     """The blocks of a band; what is not there is plus or minus the background, as in the coarse field."""
     assert field.blocks is not None
     grid, background = field.grid, np.float32(field.width)
-    known = ~np.isnan(field.values)
-    values = np.where(known, np.clip(field.values, -background, background), background)
+    finite = ~np.isnan(field.values)
+    values = np.where(finite, np.clip(field.values, -background, background), background)
 
     def outside(places: NDArray[np.int64], size: int) -> NDArray[np.float32]:
         middle = places + 0.5 * (size - 1)
@@ -201,7 +201,7 @@ def _band(field: GridField) -> tuple[VdbGrid, Outside]:
         result[np.flatnonzero(on_grid)[inside]] *= -1
         return result
 
-    active = known & (np.abs(field.values) < background)
+    active = finite & (np.abs(field.values) < background)
     return _in_blocks(field, field.blocks, values, active, float(background)), outside
 
 
@@ -234,9 +234,10 @@ def _in_blocks(
 
 
 class _Stream:
-    """What is in a file, one thing after another, to be written (where `outside` is given) or read.
+    """What is in a file, one thing after another. The same description serves for writing and for reading.
 
-    Each method is given what to write, or nothing, and returns what is there.
+    The file is written if `outside` is given, and read otherwise. Each method takes what to write, or None to read it,
+    and returns what it has written or read.
     """
 
     def __init__(self, file: BinaryIO, grid: VdbGrid, outside: Outside | None = None) -> None:
@@ -293,24 +294,24 @@ class _Stream:
 
     def file(self, kind: str | None = None) -> VdbGrid:
         """Header and description; then the grid of that kind, or the first float grid that is found."""
-        is_new = kind is not None
-        magic, version = self.numbers("qI", *([MAGIC, FILE_VERSION] if is_new else []))
+        is_written = kind is not None
+        magic, version = self.numbers("qI", *([MAGIC, FILE_VERSION] if is_written else []))
         if magic != MAGIC or version < 222:
             raise ValueError(f"version {version}" if magic == MAGIC else "another format")
-        *_, has_offsets = self.numbers("IIB", *([*LIBRARY, 1] if is_new else []))
-        self.raw(36, str(uuid.uuid4()).encode() if is_new else None)
-        self.metadata({} if is_new else None)
-        for _ in range(*self.numbers("I", *([1] if is_new else []))):
-            self.text(NAME if is_new else None)
-            found, parent = self.text(kind), self.text("" if is_new else None)
+        *_, has_offsets = self.numbers("IIB", *([*LIBRARY, 1] if is_written else []))
+        self.raw(36, str(uuid.uuid4()).encode() if is_written else None)
+        self.metadata({} if is_written else None)
+        for _ in range(*self.numbers("I", *([1] if is_written else []))):
+            self.text(NAME if is_written else None)
+            found, parent = self.text(kind), self.text("" if is_written else None)
             places = self.stream.tell()
-            begin, _, end = self.numbers("qqq", *([0, 0, 0] if is_new else []))
+            begin, _, end = self.numbers("qqq", *([0, 0, 0] if is_written else []))
             if found.startswith("Tree_float_5_4_3") and not parent:
                 self.kind = np.dtype("<f2" if found.endswith("_HalfFloat") else "<f4")
-                begin = begin if has_offsets and not is_new else self.stream.tell()
+                begin = begin if has_offsets and not is_written else self.stream.tell()
                 self.stream.seek(begin)
                 voxels = self.volume()
-                if is_new:
+                if is_written:
                     end = self.stream.tell()
                     self.stream.seek(places)
                     self.numbers("qqq", begin, voxels, end)
@@ -320,49 +321,49 @@ class _Stream:
 
     def volume(self) -> int:
         """Metadata, transform, topology and voxels of the grid; where its voxels begin."""
-        grid, is_new = self.grid, self.outside is not None
-        (self.flags,) = self.numbers("I", *([ZIP] if is_new else []))
+        grid, is_written = self.grid, self.outside is not None
+        (self.flags,) = self.numbers("I", *([ZIP] if is_written else []))
         if self.flags & BLOSC:
             raise ValueError("its values are compressed by Blosc; write it with zlib")
-        grid.metadata = self.metadata(grid.metadata if is_new else None)
+        grid.metadata = self.metadata(grid.metadata if is_written else None)
         self.transform()
-        self.numbers("I", *([1] if is_new else []))  # buffers of values
+        self.numbers("I", *([1] if is_written else []))  # buffers of values
         background = np.array([grid.background]).astype(self.kind)
-        grid.background = float(self.array("<f4", 1, background if is_new else None)[0])
+        grid.background = float(self.array("<f4", 1, background if is_written else None)[0])
         cube, size = SIZES[0], SIDES[0] * SIZES[0]
         cubes_of, blocks_of = _by_parent(grid.places // cube * cube, size), _by_parent(grid.places, cube)
         tops = [*cubes_of]
-        n_tiles, n_tops = self.numbers("II", *([0, len(tops)] if is_new else []))
+        n_tiles, n_tops = self.numbers("II", *([0, len(tops)] if is_written else []))
         for _ in range(n_tiles):
             place, value = np.array(self.numbers("iii")), self.array("<f4", 1)[0]
             grid.tiles.append((place, size, float(value)))
             self.raw(1)
         leaves: list[NDArray[np.int64]] = []
         for number in range(n_tops):
-            top = np.array(self.numbers("iii", *(tops[number] if is_new else [])), dtype=np.int64)
+            top = np.array(self.numbers("iii", *(tops[number] if is_written else [])), dtype=np.int64)
             for corner in self.node(top, 0, cubes_of):
                 leaves += self.node(corner, 1, blocks_of, grid.active[len(leaves) :])
-        if not is_new:
+        if not is_written:
             grid.places = np.array(leaves, dtype=np.int64).reshape(-1, 3)
             grid.values = np.empty((len(leaves), 8, 8, 8), dtype=np.float32)
             grid.active = np.empty((len(leaves), 8, 8, 8), dtype=bool)
         voxels = self.stream.tell()
         for active, values in zip(grid.active.reshape(-1, SIDE**3), grid.values.reshape(-1, SIDE**3), strict=True):
-            active[:] = self.mask(SIDE**3, active if is_new else None)
-            values[:] = self.values(active, values if is_new else None)
+            active[:] = self.mask(SIDE**3, active if is_written else None)
+            values[:] = self.values(active, values if is_written else None)
         return voxels
 
     def transform(self) -> None:
         """Translation, scale, voxel size, and what the library keeps of the scale's inverse."""
-        grid, is_new = self.grid, self.outside is not None
+        grid, is_written = self.grid, self.outside is not None
         uniform = "Uniform" if bool((grid.spacing == grid.spacing[0]).all()) else ""
-        kind = self.text(f"{uniform}ScaleTranslateMap" if is_new else None)
+        kind = self.text(f"{uniform}ScaleTranslateMap" if is_written else None)
         n_rows = {"ScaleMap": 5, "ScaleTranslateMap": 6}.get(kind.removeprefix("Uniform"), 0)
         if not n_rows:
             raise ValueError(f"its axes are not x, y, z but a {kind}")
         step = grid.spacing
         given = np.concatenate([grid.origin, step, step, 1 / step, 1 / step**2, 0.5 / step])
-        rows = self.array("<f8", 3 * n_rows, given if is_new else None).reshape(n_rows, 3)
+        rows = self.array("<f8", 3 * n_rows, given if is_written else None).reshape(n_rows, 3)
         grid.origin, grid.spacing = (rows[0], rows[1]) if n_rows == 6 else (np.zeros(3), rows[0])
 
     def node(
@@ -376,7 +377,7 @@ class _Stream:
 
         Those of the second level are blocks, of which a mask follows that says which of their voxels are `active`.
         """
-        side, size, is_new = SIDES[level], SIZES[level], self.outside is not None
+        side, size, is_written = SIDES[level], SIZES[level], self.outside is not None
         n = side**3
         inner = place + size * np.stack(np.unravel_index(np.arange(n), (side,) * 3), axis=1)
         given = values = None
@@ -385,13 +386,13 @@ class _Stream:
             given[np.ravel_multi_index(tuple((below[tuple(place.tolist())] - place).T // size), (side,) * 3)] = True
             values = np.where(given, np.float32(0), self.outside(inner, size))
         children = self.mask(n, given)
-        values = self.values(self.mask(n, np.zeros(n, dtype=bool) if is_new else None), values)
-        if not is_new:
+        values = self.values(self.mask(n, np.zeros(n, dtype=bool) if is_written else None), values)
+        if not is_written:
             tiles = np.flatnonzero(~children & (values != np.float32(self.grid.background)))
             self.grid.tiles += [(inner[k], size, float(values[k])) for k in tiles]
         if active is not None:
             for number in range(int(children.sum())):
-                self.mask(SIDE**3, active[number] if is_new else None)
+                self.mask(SIDE**3, active[number] if is_written else None)
         return [*inner[children]]
 
     def values(self, active: NDArray[np.bool_], given: NDArray[np.float32] | None = None) -> NDArray[np.float32]:

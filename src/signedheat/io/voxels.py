@@ -92,11 +92,11 @@ class LabelImage:
             If no voxel has it, or it is left out and there are several.
         """
         if label is None:
-            known = np.unique(self.labels)
-            others = known[known != 0]
+            found = np.unique(self.labels)
+            others = found[found != 0]
             if len(others) != 1:
                 raise GeometryError(
-                    f"the image has {_listed(known)}", remedy="choose one with --label", element="labels"
+                    f"the image has {_listed(found)}", remedy="choose one with --label", element="labels"
                 )
             label = float(others[0])
         inside = self.labels == label

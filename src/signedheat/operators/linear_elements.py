@@ -86,5 +86,5 @@ class LinearElements:
         return self._mean(np.minimum(np.abs(np.linalg.norm(self.slopes(values), axis=1) - 1.0), 1.0))
 
     def _mean(self, errors: NDArray[np.float64]) -> float:
-        known = np.isfinite(errors) & (self.sizes > 0)
-        return float(np.average(errors[known], weights=self.sizes[known])) if known.any() else float("nan")
+        finite = np.isfinite(errors) & (self.sizes > 0)
+        return float(np.average(errors[finite], weights=self.sizes[finite])) if finite.any() else float("nan")

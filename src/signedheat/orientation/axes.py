@@ -86,11 +86,12 @@ def outward_signs(
     axes : (n, 3) float
         Unit normals, up to sign.
     given : bool
-        Whether the axes' own signs are evidence. It is weak, and relative: if most are inverted, that is found out.
-        They stay, or are all inverted, where hardly more of them seem wrong than points contradict each other.
+        Whether the axes' own signs are evidence. It is weak, and says only which signs agree: all may be inverted. If
+        hardly more of them seem wrong than points contradict each other, they are kept, or all inverted.
     groups : (n,) int, optional
         Points of the same group, counted from 0, share one sign.
     """
+    # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
     chosen = spread_out(fits.places, SPREAD * fits.reaches) if fits.noisy else np.arange(n)
     if len(chosen) > MOST:
@@ -106,17 +107,18 @@ def outward_signs(
     if groups is not None:
         outside = int(groups.max()) + 1
         nodes = np.unique(np.append(groups[chosen], [outside, outside + 1]), return_inverse=True)[1].ravel()
+    # signs of the chosen points, relative to the outside or to the given signs; others follow their neighbours
     found = signs_of(links.renamed(nodes), int(nodes.max()) + 1)[nodes]
     signs = np.zeros(n)
     signs[chosen] = found[:m] * (found[m] if sided else found[m + 1] if given else 1.0)
     rest = np.flatnonzero(signs == 0)
     if len(rest):
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
-    agreed = links.coherence(found)
+    coherence = links.coherence(found)
     signs = signs if groups is None else _shared(signs, groups)
-    if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - agreed):
+    if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - coherence):
         signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
-    return OutwardSigns(signs, sided, agreed)
+    return OutwardSigns(signs, sided, coherence)
 
 
 def _followed(

@@ -30,11 +30,12 @@ def inner_walls(
     areas: NDArray[np.float64],
     volumes: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """(p,) faces with a closed cell on either side, or the same on both, where some edges have three or more faces.
+    """(p,) which faces have a closed cell on both sides, in complexes where some edges have three or more faces.
 
-    A cell that lacks a wall is part of the outside. A complex whose faces run along each edge as often one way as the
-    other is the boundary of something as it is, and none of its faces is inner. Where the outside of a complex was
-    given facing outwards, cells are cavities that their walls face into.
+    A complex is what is connected by edges; a cell that lacks a wall is part of the outside. In two cases faces with a
+    cell on both sides are not inner: if along each edge of the complex as many faces run one way as the other, since it
+    is then the boundary of a solid as it is; and if the outside of the complex faces outwards and the walls of one of
+    the two cells face into it, since that cell is then a cavity.
 
     Parameters
     ----------
@@ -49,6 +50,7 @@ def inner_walls(
     areas, volumes : (p,) float
         Areas, and signed volumes of cones from the faces to one point.
     """
+    # halfedges in order of angle around their edges, and the next one after each
     n = len(normals)
     used = np.flatnonzero(pairs.edges >= 0)
     forward = tails[used] < heads[used]
@@ -61,17 +63,18 @@ def inner_walls(
     following = np.arange(1, len(edges) + 1)
     following[last] = np.flatnonzero(first)
 
+    # complexes that have inner walls at all
     complexes = connected_components(n, faces, faces[following])
     gaps = np.where(last, 2 * np.pi, 0.0) + angles[following] - angles
     many = pairs.counts[edges] > 2
     unclear = many & ~(gaps > SAME_ANGLE)  # also where an angle is no number
     balance = np.bincount(edges, np.where(forward, 1, -1), len(pairs.counts))
-    qualified = np.zeros((2, n), dtype=bool)
-    qualified[0, complexes[faces[many]]] = qualified[1, complexes[faces[balance[edges] != 0]]] = True
-    qualified[:, complexes[faces[unclear]]] = False
-    chosen = (qualified[0] & qualified[1])[complexes]
+    nonmanifold, unbalanced = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    nonmanifold[complexes[faces[many]]] = unbalanced[complexes[faces[balance[edges] != 0]]] = True
+    nonmanifold[complexes[faces[unclear]]] = False
+    chosen = (nonmanifold & unbalanced)[complexes]
 
-    # sides of faces: 2 f is the one that the normal points to, 2 f + 1 the other
+    # shells: sides of faces that bound the same region. Side 2 f is where the normal points to, 2 f + 1 the other
     ahead, behind = 2 * faces + ~forward, 2 * faces + forward
     shells = connected_components(2 * n, ahead, behind[following]).reshape(n, 2)
     front, back = shells.T

@@ -88,25 +88,25 @@ def orient_parts(parts: Parts, lines: LineCrossings, crossed: NDArray[np.int64])
         Part of each crossing.
     """
     found = votes(lines.starts, crossed, lines.entering, len(parts.areas))
-    own, own_known = _outward(parts, found)
-    bounding = ~parts.fixed & (parts.closed | (own_known & (np.abs(found.own_votes) >= LEAST_CLOSED * found.own)))
+    outward, is_clear = _outward(parts, found)
+    bounding = ~parts.fixed & (parts.closed | (is_clear & (np.abs(found.own_votes) >= LEAST_CLOSED * found.own)))
     if np.count_nonzero(found.crossings) > 1:
-        within = containers(lines.starts, crossed, lines.entering == (own[crossed] > 0), bounding)
+        within = containers(lines.starts, crossed, lines.entering == (outward[crossed] > 0), bounding)
     else:
         within = np.full(len(crossed), -1)
     nested = _nested(parts, found, bounding, crossed, within)
-    cavity = _cavities(parts, own, nested)
+    cavity = _cavities(parts, outward, nested)
     odds, decided = _by_sight(found)
     hint = _hint(parts, found)
     odds = np.where(decided, odds, 0.0) + hint
-    alone = ~parts.fixed & (parts.closed | (nested >= 0) | (~decided & own_known))
-    odds = np.where(alone, CERTAIN * own * np.where(cavity, -1, 1), odds)
+    alone = ~parts.fixed & (parts.closed | (nested >= 0) | (~decided & is_clear))
+    odds = np.where(alone, CERTAIN * outward * np.where(cavity, -1, 1), odds)
     odds[parts.fixed] = 0
     return PartOrientation(odds, (decided | alone) & ~parts.fixed, nested, cavity)
 
 
 def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Signs by which each part faces out of itself, and whether they are known."""
+    """The sign that turns each part out of itself, and whether that is clear."""
     flat = np.abs(parts.volumes) <= 1e-12 * parts.areas**1.5
     by_volume = parts.closed & ~flat
     signs = np.where(by_volume, np.where(parts.volumes < 0, -1, 1), np.where(found.own_votes < 0, -1, 1))
@@ -163,15 +163,15 @@ def _nested(
     return np.where(hidden & bounding & (nested >= 0), nested, -1)
 
 
-def _cavities(parts: Parts, own: NDArray[np.int64], nested: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _cavities(parts: Parts, outward: NDArray[np.int64], nested: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which nested parts are walls of cavities; from the outermost inwards."""
     hinting = parts.agreement >= LEAST_AGREEMENT
-    alike = hinting & hinting[nested] & (own == own[nested])
+    alike = hinting & hinting[nested] & (outward == outward[nested])
     cavity = np.zeros(len(nested), dtype=bool)
-    known = nested < 0
+    decided = nested < 0
     while True:
-        ready = ~known & known[nested]
+        ready = ~decided & decided[nested]
         if not ready.any():
             return cavity
         cavity[ready] = ~alike[ready] & ~cavity[nested[ready]]
-        known |= ready
+        decided |= ready

@@ -168,13 +168,13 @@ def sharpened(
             f"{method!r} is no method of sharpening",
             remedy="pass Geodesic() or Convex()",
         )
-    known = np.isfinite(values)
-    if not known.any():
+    finite = np.isfinite(values)
+    if not finite.any():
         raise OutsideError(
             "the field has no value anywhere",
             remedy="pass one that a source reaches",
         )
-    if not (known | np.isnan(values)).all():
+    if not (finite | np.isnan(values)).all():
         raise GeometryError(
             f"the field is infinite at vertex {np.flatnonzero(np.isinf(values))[0]}",
             remedy="compute it anew",

@@ -57,5 +57,5 @@ def pieces_of(
         _, first = np.unique(parts[largest], return_index=True)
         regions[whole] = whole[largest[first]][parts]
     some, where = np.unique(regions, return_inverse=True)
-    behind, ahead = windings.beside(pieces[some])
+    behind, ahead = windings.sides(pieces[some])
     return Pieces(pieces, origins, behind[where], ahead[where])

@@ -45,7 +45,7 @@ def lids_of(
 
 
 def _openings(rims: list[NDArray[np.int64]], vertices: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Loops around openings: rims but for where others run beside them, each end joined to the nearest start."""
+    """Loops around openings: rims without stretches along which others run, each end joined to the nearest start."""
     if len(rims) < 2:
         return rims
     owners = np.repeat(np.arange(len(rims)), [len(rim) for rim in rims])
@@ -54,9 +54,9 @@ def _openings(rims: list[NDArray[np.int64]], vertices: NDArray[np.float64]) -> l
     apart = owners[one] != owners[other]
     met = np.zeros(len(edges), dtype=bool)
     met[one[apart]] = met[other[apart]] = True
-    beside = np.split(met, np.cumsum([len(rim) for rim in rims])[:-1])
-    whole = [rim for rim, some in zip(rims, beside, strict=True) if not some.any()]
-    partly = [(rim, some) for rim, some in zip(rims, beside, strict=True) if some.any() and not some.all()]
+    shared = np.split(met, np.cumsum([len(rim) for rim in rims])[:-1])
+    whole = [rim for rim, some in zip(rims, shared, strict=True) if not some.any()]
+    partly = [(rim, some) for rim, some in zip(rims, shared, strict=True) if some.any() and not some.all()]
     chains = [chain for rim, some in partly for chain in _chains(rim, some)]
     if not chains:
         return whole
@@ -101,7 +101,7 @@ class _Ends:
         return cls(keys[order], np.repeat(patches, 3)[order], size)
 
     def at(self, loop: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(n,) the patch beside each edge of a loop; where there is no such edge, beside the last before it."""
+        """(n,) the patch at each edge of a loop; where there is no such edge, at the last one before it."""
         keys = loop * self.size + np.roll(loop, -1)
         found = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
         there = self.keys[found] == keys

@@ -177,7 +177,7 @@ def blocks_at(offset: Offset, grid: Grid) -> NDArray[np.int64]:
         places = places[(places * side < n_blocks).all(axis=1)]
 
 
-def crossed_edges(known: BlockValues) -> Crossings:
+def crossed_edges(band: BlockValues) -> Crossings:
     """Edges whose ends lie on both sides of a surface.
 
     Raises
@@ -185,10 +185,10 @@ def crossed_edges(known: BlockValues) -> Crossings:
     OutsideError
         If there are none.
     """
-    blocks, nodes, axes, rising, shares = known.blocks, [], [], [], []
+    blocks, nodes, axes, rising, shares = band.blocks, [], [], [], []
     for window in np.unique(blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * SIDE, WINDOW * SIDE
-        height = blocks.window(known.values, first, (size + 1,) * 3).astype(np.float64)
+        height = blocks.window(band.values, first, (size + 1,) * 3).astype(np.float64)
         below, held = height < 0, ~np.isnan(height)
         for axis in range(3):
             ahead = tuple(slice(1, None) if k == axis else slice(0, size) for k in range(3))

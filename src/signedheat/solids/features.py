@@ -19,7 +19,7 @@ from .offsets import Offset
 
 MANY = 1 << 17
 """Pieces of the level whose vertices are found together."""
-BESIDE = 0.05
+ASIDE = 0.05
 """Cells off a crease at which its ends are looked for."""
 ON = 1e-3
 """Cells off the level from which on a vertex is moved onto it."""
@@ -153,9 +153,9 @@ def _probes(
     """
     around = np.broadcast_to(0.5 * spacing * (2 * np.array(list(np.ndindex(2, 2, 2))) - 1), (len(along), 8, 3))
     length = np.linalg.norm(across, axis=1)[:, None]
-    aside = BESIDE * spacing * across / np.where(length > 0, length, 1.0)
-    beside = [way * share * spacing * along + sign * aside for share in AHEAD for way in (-1, 1) for sign in (-1, 1)]
-    return np.concatenate([around, np.stack(beside, axis=1)], axis=1)
+    aside = ASIDE * spacing * across / np.where(length > 0, length, 1.0)
+    ahead = [way * share * spacing * along + sign * aside for share in AHEAD for way in (-1, 1) for sign in (-1, 1)]
+    return np.concatenate([around, np.stack(ahead, axis=1)], axis=1)
 
 
 def divided_along_creases(

@@ -19,7 +19,7 @@ from ..domains.grid import Grid
 from ..domains.validation import positive_number
 from ..errors import MemoryLimitError, OutsideError, UnsupportedTypeError
 from ..fields.grid_field import GridField
-from ..fields.known_solid import KnownSolid
+from ..fields.solid_queries import SolidQueries
 from ..geometry.face_tree import FaceTree
 from ..lowering.grid.discretization import refuse_beyond_memory
 from ..memory import available_memory, libraries
@@ -45,7 +45,7 @@ COARSE = 65
 Result = TypeVar("Result")
 
 
-class Evaluated(KnownSolid, Protocol):
+class Evaluated(SolidQueries, Protocol):
     """A `Solid`, as far as fields need it."""
 
     @property

@@ -90,7 +90,7 @@ def given_surface(
     """
     triangles, windings = solid.triangles, solid.windings
     size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
-    behind, ahead = windings.beside(triangles)
+    behind, ahead = windings.sides(triangles)
     bounds = behind != ahead
     turned = np.where(ahead[:, None, None], triangles[:, ::-1], triangles)[bounds]
     if not len(turned):

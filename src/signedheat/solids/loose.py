@@ -80,8 +80,8 @@ def clusters_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> li
                 cubes = np.floor(centres[here] / side + np.array(thirds) / 3)
             first = here[same_positions(cubes)]
             join(here, first, np.linalg.norm(centres[here] - centres[first], axis=1))
-    known = connected_components(n, np.concatenate(one), np.concatenate(other))
-    rest = known != np.bincount(known).argmax()
+    clusters = connected_components(n, np.concatenate(one), np.concatenate(other))
+    rest = clusters != np.bincount(clusters).argmax()
     for octave, here, below in groups:  # all pairs but those within the largest cluster
         for some, others in ((here[rest[here]], below), (here[~rest[here]], below[rest[below]])):
             if len(some) and len(others):

@@ -25,8 +25,8 @@ BENT = np.deg2rad(70.0)
 """Root mean square of the angles at the rim from which on a lid does not continue the surface around it: at the end of
 a tube it is 90°."""
 FOLDED = np.deg2rad(135.0)
-"""The same for one triangle, and for holes of few sides beside others: behind the corner of a cube it is 125°, on the
-back of a face 180°."""
+"""The same for one triangle, and for holes of few sides that are not the only hole: behind the corner of a cube it is
+125°, on the back of a face 180°."""
 FEW = 6
 """Most sides of such a hole: one that is alone may be where half a body ends."""
 BACK = -0.5
@@ -86,8 +86,8 @@ def _small_holes(
     following = next_around_gap(vertices, unit(np.stack(sums, axis=1)), tails, heads)
     touching = np.zeros(len(vertices), dtype=bool)
     touching[tails] = True
-    known = table.vertices[touching[table.vertices].all(axis=1)]
-    taken = np.sort(edge_keys(known[:, 0], known[:, 1]))
+    existing = table.vertices[touching[table.vertices].all(axis=1)]
+    taken = np.sort(edge_keys(existing[:, 0], existing[:, 1]))
     found = []
     for loops in _simple_loops(tails.tolist(), following.tolist()):
         for begin in range(0, len(loops), TOGETHER):
@@ -134,15 +134,15 @@ class _Holes:
         Positions.
     loops : (l, n) int
         Vertices around each.
-    beside : (l, n, 3) float
-        Unit normals of the faces along the edges, of which the k-th begins at the k-th vertex.
+    rim_normals : (l, n, 3) float
+        Unit normals of the faces at the edges of the rim, of which the k-th begins at the k-th vertex.
     taken : (e,) int
         Sorted keys of the edges that are there.
     """
 
     vertices: NDArray[np.float64]
     loops: NDArray[np.int64]
-    beside: NDArray[np.float64]
+    rim_normals: NDArray[np.float64]
     taken: NDArray[np.int64]
 
     @property
@@ -176,7 +176,7 @@ def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
     bends, rims = np.zeros((n, n, count)), np.zeros((n, n, count))
     normals, apexes = np.zeros((n, n, count, 3)), np.zeros((n, n, count), dtype=np.int64)
     for i in range(n - 1):
-        normals[i, i + 1] = holes.beside[:, i]
+        normals[i, i + 1] = holes.rim_normals[:, i]
     for span in range(2, n):
         for i in range(n - span):
             j = i + span
@@ -192,14 +192,14 @@ def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
             at_rim[0] += holes.lengths[i, i + 1] * before[0] ** 2
             at_rim[-1] += holes.lengths[j - 1, j] * behind[-1] ** 2
             rims[i, j], normals[i, j], apexes[i, j] = at_rim[best, every], made[best, every], best + i + 1
-    at_rim = rims[0, -1] + holes.lengths[-1, 0] * _angles(normals[0, -1], holes.beside[:, -1]) ** 2
+    at_rim = rims[0, -1] + holes.lengths[-1, 0] * _angles(normals[0, -1], holes.rim_normals[:, -1]) ** 2
     around = holes.lengths[np.arange(n), np.arange(n) - 1].sum(axis=0)
     triangles, of_hole = _triangles(apexes, np.flatnonzero(np.isfinite(bends[0, -1])))
     triangles = np.take_along_axis(holes.loops[of_hole], triangles, axis=1)
     vectors = _area_vectors(holes.vertices[triangles])
     closed = at_rim <= steepest**2 * around
     if n > 3:
-        ahead = unit(holes.beside.sum(axis=1))[of_hole]
+        ahead = unit(holes.rim_normals.sum(axis=1))[of_hole]
         closed[of_hole[np.einsum("ij,ij->i", unit(vectors), ahead) < BACK]] = False
     lid_areas = np.bincount(of_hole, np.linalg.norm(vectors, axis=1), count)
     closed |= lid_areas <= CRACK * around**2

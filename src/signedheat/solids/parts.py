@@ -61,7 +61,7 @@ def bodies(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> tuple[NDAr
 def _joined_along_rims(
     triangles: NDArray[np.float64], ids: NDArray[np.int64], labels: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """The parts that faces are of, where those count as one whose rims run beside each other; single faces do not."""
+    """The part of each face; parts whose rims run along each other are one, unless they are single faces."""
     edges, owners = open_edges(ids, labels)
     counts = np.bincount(labels)
     kept = counts[owners] > 1

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from ..geometry.edges import edge_table
 
 PLACES = 8
-"""Places on an edge from which one that runs beside it is looked for: nearer to each other than `BESIDE`."""
-BESIDE = 0.1
-"""Distance over the length of the longer edge up to which one runs beside another: chords of the same arc are less than
-.05 apart where it has 16 or more."""
+"""Places on an edge from which edges that run along it are searched for: nearer to each other than `ALONG`."""
+ALONG = 0.1
+"""Distance over the length of the longer edge up to which two edges run along each other: chords of the same arc are
+less than .05 apart where it has 16 or more."""
 OPPOSITE = -0.7
 """Cosine of their directions up to which they run in opposite directions."""
 
@@ -52,9 +52,9 @@ def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDAr
 
 
 def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of edges that run beside each other in opposite directions, as where patches meet whose vertices differ.
+    """Pairs of edges that run along each other in opposite directions, as where patches with other vertices meet.
 
-    Edges between the same places are none: of three or more faces there it is not known which belong together.
+    Edges with the same ends are no pairs: if there are three or more faces, it is unclear which belong together.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def meeting_edges(ends: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray
     places = (ends[:, :1] + at[:, None] * along[:, None]).reshape(-1, 3)
     owners = np.repeat(np.arange(len(ends)), PLACES)
     tree = scipy.spatial.cKDTree(places)
-    found = tree.query_ball_point(places, BESIDE * lengths[owners], workers=-1)
+    found = tree.query_ball_point(places, ALONG * lengths[owners], workers=-1)
     one = np.repeat(owners, [len(each) for each in found])
     other = owners[np.concatenate([np.asarray(each, dtype=np.int64) for each in found])] if len(one) else one
     pairs = np.unique(np.sort(np.stack([one, other], axis=1)), axis=0)

@@ -16,7 +16,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import finite_number, flag, positive_number, query_points
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..fields.grid_field import GridField
-from ..fields.known_solid import Closest
+from ..fields.solid_queries import Closest
 from ..frozen import Frozen
 from ..geometry.box_tree import order_in_space
 from ..geometry.face_features import FaceFeatures

@@ -43,8 +43,8 @@ class Thickness:
     @property
     def spacing(self) -> float | None:
         """Spacing of a grid that has two cells across the thinnest wall and the narrowest gap."""
-        known = [width for width in (self.wall, self.gap) if width is not None]
-        return 0.5 * min(known) if known else None
+        widths = [width for width in (self.wall, self.gap) if width is not None]
+        return 0.5 * min(widths) if widths else None
 
 
 def thickness(shape: Mesh) -> Thickness:

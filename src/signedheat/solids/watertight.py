@@ -44,7 +44,7 @@ def closed_surface(
 
     if thickness is not None:
         return contour(0.5 * thickness), f"thickened to {thickness:g}"
-    behind, ahead = solid.windings.beside(solid.triangles)
+    behind, ahead = solid.windings.sides(solid.triangles)
     areas = face_areas(solid.triangles)
     if areas[behind != ahead].sum() < BOUNDS * areas.sum():
         raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
@@ -69,7 +69,7 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
     corners = surface.vertices[surface.faces]
     volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
     parts = element_components(surface.faces)
-    behind, ahead = solid.windings.beside(solid.triangles)
+    behind, ahead = solid.windings.sides(solid.triangles)
     bounds = (behind != ahead) | (level > 0)
     given, made = solid.triangles[bounds & (solid.origins >= 0)], solid.triangles[bounds & (solid.origins < 0)]
     closest = solid.closest(_places(corners))

@@ -15,16 +15,16 @@ from ..geometry.welding import same_positions
 from ..geometry.winding_tree import WindingTree
 
 INSIDE = 0.5
-"""Winding number above which a point is inside; it is near 0 or 1 but beside slits."""
+"""Winding number above which a point is inside; it is near 0 or 1, except close to slits."""
 DEPTH = 1e-6
 """Size of a face by which places in front of it and behind it are off it."""
 TUBES = 1e-4 * 2.0 ** np.arange(11)
-"""Radii of tubes around open edges on which winding numbers are looked at, over the size of all triangles. Where a lid
-has more vertices than the face beside it the first is enough; beside seams of what φ completes, one of .003 to .02."""
+"""Radii of tubes around open edges on which winding numbers are computed, over the size of all triangles. The first
+is enough where a lid has more vertices than the face next to it; seams of what φ completes need one of .003 to .02."""
 SIDED = 0.4
-"""What winding numbers may be off whole ones there: a half, less what the tree is off by at most, twice."""
+"""How far winding numbers there may be from integers: a half, less twice the largest error of the tree."""
 AT_ONCE = 256
-"""Open edges that are looked at together."""
+"""Open edges that are dealt with together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,21 +48,22 @@ class Windings(Frozen):
     def sided_beyond(self) -> float:
         """Distance to all triangles from which on sides change across them only.
 
-        It is 0 where each edge is run along as often in both directions. Elsewhere gaps are left: slits as wide as
-        rounding where a lid has more vertices on an edge than the face beside it, wider ones where φ completes. Since
-        winding numbers are harmonic, they are nowhere farther off whole ones than on tubes around the open edges: the
-        least that are wide enough are the answer; infinity if none is.
+        It is 0 if as many triangles run along each edge in one direction as in the other. Otherwise there are gaps:
+        slits as wide as rounding where a lid has more vertices on an edge than the face next to it, and wider ones
+        where φ completes. Winding numbers are harmonic, so that outside of tubes around the open edges they are nowhere
+        farther from integers than on these tubes. The result is the least radius at which they are near integers there;
+        infinity if there is none.
         """
         if not len(self.triangles):
             return 0.0
         ends = _open_edges(self.triangles)
         size = float(np.ptp(self.triangles.reshape(-1, 3), axis=0).max())
         spots = _spots(ends)
-        known = scipy.spatial.cKDTree(spots.reshape(-1, 3)) if len(ends) else None
+        others = scipy.spatial.cKDTree(spots.reshape(-1, 3)) if len(ends) else None
         rung = 0
         for begin in range(0, len(ends), AT_ONCE):
             here = slice(begin, begin + AT_ONCE)
-            while not self._sided(_around(ends[here], spots[here], size * TUBES[rung]), known, size * TUBES[rung]):
+            while not self._sided(_around(ends[here], spots[here], size * TUBES[rung]), others, size * TUBES[rung]):
                 rung += 1
                 if rung == len(TUBES):
                     return np.inf
@@ -84,8 +85,8 @@ class Windings(Frozen):
         result: NDArray[np.bool_] = self.numbers(points) > INSIDE
         return result
 
-    def beside(self, triangles: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """(n,) whether it is inside just behind the centres of (n, 3, 3) triangles, and just in front of them."""
+    def sides(self, triangles: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(n,) whether places just behind (n, 3, 3) triangles are inside; and the same just in front of them."""
         normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         areas = np.linalg.norm(normals, axis=1)
         step = DEPTH * normals * (np.sqrt(areas) / np.where(areas > 0, areas, 1.0))[:, None]
@@ -94,7 +95,7 @@ class Windings(Frozen):
 
 
 def _open_edges(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 2, 3) ends of the edges that triangles do not run along as often in one direction as in the other."""
+    """(n, 2, 3) ends of edges along which more triangles run in one direction than in the other."""
     corners = triangles.reshape(-1, 3)
     faces = same_positions(corners)[np.arange(len(corners)).reshape(-1, 3)]
     a, b, c = faces.T

@@ -163,11 +163,11 @@ def draw_surface(
     scale = distance_colors(low, high) if colors is None else colors
     shade = scale.to_rgba(np.where(np.isfinite(phi), phi, 0.0))[..., :3]
     shade[~np.isfinite(phi)] = 0.7
-    known = face >= 0
-    image = np.where(known[..., None], shade * camera.shades(mesh.face_area_vectors)[face][..., None], 1.0)
+    covered = face >= 0
+    image = np.where(covered[..., None], shade * camera.shades(mesh.face_area_vectors)[face][..., None], 1.0)
     isolines, step = isolines_between(low, high, n_contours)
     if n_contours > 0 and high > low and colors is None:
-        darken(image, phi, known, step)
+        darken(image, phi, covered, step)
     axes.imshow(image, origin="lower", interpolation="antialiased")
     for item in flat:
         draw_source(axes, item, own, camera, depth)
@@ -186,7 +186,7 @@ def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh,
     return own, surface.triangulation, surface.on_triangulation(painted.values)
 
 
-def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[np.bool_], step: float) -> None:
+def darken(image: NDArray[np.float64], phi: NDArray[np.float64], covered: NDArray[np.bool_], step: float) -> None:
     """Darken the pixels of isolines at multiples of a step, one pixel wide, and of a heavier one at zero."""
     for spacing, width, strength in ((step, 0.6, 0.55), (np.inf, 1.4, 0.9)):
         level = phi / spacing if np.isfinite(spacing) else phi
@@ -194,7 +194,7 @@ def darken(image: NDArray[np.float64], phi: NDArray[np.float64], known: NDArray[
         away = np.abs(level - np.round(level)) if np.isfinite(spacing) else np.abs(level)
         with np.errstate(invalid="ignore", divide="ignore"):
             cover = np.clip(width + 0.5 - away / rise, 0, 1)
-        smooth = known & np.isfinite(cover) & (rise < 0.5 if np.isfinite(spacing) else rise < 2 * step)
+        smooth = covered & np.isfinite(cover) & (rise < 0.5 if np.isfinite(spacing) else rise < 2 * step)
         image[smooth] *= (1 - strength * cover[smooth])[:, None]
 
 

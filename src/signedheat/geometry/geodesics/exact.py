@@ -104,9 +104,9 @@ def cleared(triangles: IntrinsicMesh, values: NDArray[np.float64], least: float)
     sign, the zero set then runs around the source.
     """
     near = np.abs(values) < least
-    known = np.where(near | np.isnan(values), 0.0, np.sign(values))
+    signs = np.where(near | np.isnan(values), 0.0, np.sign(values))
     tail, head = triangles.edges.vertices.T
-    around = np.bincount(tail, known[head], len(values)) + np.bincount(head, known[tail], len(values))
+    around = np.bincount(tail, signs[head], len(values)) + np.bincount(head, signs[tail], len(values))
     return np.where(near, np.where(around > 0, -least, least), values)
 
 
@@ -132,14 +132,14 @@ class PausedSearch:
     ----------
     triangles : IntrinsicMesh
         The surface.
-    known : Search
+    search : Search
         What it has found; going on changes it.
     tolerance : float
         See `distance_to_zero_line`.
     """
 
     triangles: IntrinsicMesh
-    known: Search
+    search: Search
     tolerance: float
 
     @classmethod
@@ -151,41 +151,41 @@ class PausedSearch:
         pseudosources[sources.vertices] = True
         faces, room = Faces.of(triangles), 1024
         while True:
-            known = Search.start(triangles.n_faces, pseudosources, room)
-            start_search(faces, sources, known, ROUND + 2.0 * tolerance)
-            if not known.counts[WANTED]:
-                return cls(triangles, known, tolerance)
+            search = Search.start(triangles.n_faces, pseudosources, room)
+            start_search(faces, sources, search, ROUND + 2.0 * tolerance)
+            if not search.counts[WANTED]:
+                return cls(triangles, search, tolerance)
             room *= 2
 
     @property
     def has_ended(self) -> bool:
         """Whether no window is left that could go on."""
-        return bool(self.known.queue.size[0] == 0)
+        return bool(self.search.queue.size[0] == 0)
 
     @property
     def windows(self) -> int:
         """How many it has made."""
-        return int(self.known.counts[MADE])
+        return int(self.search.counts[MADE])
 
     def until(self, limit: int, report: Report | None) -> PausedSearch:
         """Go on to the end, or until so many windows have been made; returns the same search."""
-        faces, known, slack = Faces.of(self.triangles), self.known, ROUND + 2.0 * self.tolerance
-        while known.queue.size[0] > 0 and known.counts[MADE] < limit:
+        faces, search, slack = Faces.of(self.triangles), self.search, ROUND + 2.0 * self.tolerance
+        while search.queue.size[0] > 0 and search.counts[MADE] < limit:
             if report is not None:
                 report()
-            if known.counts[WANTED]:
-                known.larger().counts[WANTED] = 0
-            continue_search(faces, known, slack, self.tolerance, min(known.counts[MADE] + _CHUNK, limit))
+            if search.counts[WANTED]:
+                search.larger().counts[WANTED] = 0
+            continue_search(faces, search, slack, self.tolerance, min(search.counts[MADE] + _CHUNK, limit))
         return self
 
     def distance(self) -> NDArray[np.float64]:
         """(n,) of every vertex; along edges from what was reached, where it was not."""
-        distance = self.known.distance
+        distance = self.search.distance
         if self.has_ended and np.isfinite(distance).all():
             return distance
-        known = np.flatnonzero(np.isfinite(distance))
+        reached = np.flatnonzero(np.isfinite(distance))
         # merged windows may miss zero by their tolerance, and Dijkstra needs it
-        along = along_edges(self.triangles, known, np.maximum(distance[known], 0.0))
+        along = along_edges(self.triangles, reached, np.maximum(distance[reached], 0.0))
         # where it has ended: on other parts, or past edges so short that windows on them are lost in rounding
         return np.where(np.isinf(distance), along, distance) if self.has_ended else along
 

@@ -108,8 +108,8 @@ def affected_elements(
         m + wanted.elements[wanted.kinds == EDGE],
     ]
     heads = np.concatenate([m + nodes.elements[end[on_edge]], at, *begin])
-    known = np.concatenate([face[on_edge], m + triangles.edges.face_edges[at, side]])
-    tails = np.concatenate([known, np.full(len(heads) - len(known), last)])
+    given = np.concatenate([face[on_edge], m + triangles.edges.face_edges[at, side]])
+    tails = np.concatenate([given, np.full(len(heads) - len(given), last)])
     graph = csr_matrix((np.ones(len(heads)), (tails, heads)), shape=(last + 1, last + 1))
     reached = np.sort(breadth_first_order(graph, last, return_predecessors=False))[:-1]
     return reached[reached < m], reached[reached >= m] - m

@@ -167,10 +167,13 @@ def straight_lines(
     return Lines(*(np.delete(a, first_half + 1, axis=0) for a in (owners, faces, begin, finish, vectors)))
 
 
-def turned_lines(triangles: IntrinsicMesh, lines: Lines, lengths: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Lines that became longer than they were on their way, or lost it: triangles as thin as rounding turned them."""
+def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Ids of lines whose traces are wrong: somewhere not finite, or more than twice as long as they should be.
+
+    Triangles that are as thin as rounding turn lines that are traced through them.
+    """
     along, corners = lines.vectors[:, 0], triangles.corner_positions[lines.faces]
     with np.errstate(all="ignore"):  # they may have overflowed
-        found, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
-    known = np.isfinite(lines.starts).all(axis=1) & np.isfinite(lines.ends).all(axis=1)
-    return np.unique(lines.owners[~(known & (found <= 2 * lengths[lines.owners] + rounding))])
+        traced, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
+    finite = np.isfinite(lines.starts).all(axis=1) & np.isfinite(lines.ends).all(axis=1)
+    return np.unique(lines.owners[~(finite & (traced <= 2 * lengths[lines.owners] + rounding))])

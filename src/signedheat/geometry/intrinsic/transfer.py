@@ -28,7 +28,7 @@ from ..surface_points import (
     unique_points,
 )
 from .conforming_refinement import cut_along
-from .history import History, straight_lines, turned_lines
+from .history import History, misplaced_lines, straight_lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +167,7 @@ def transfer_segments(
     vectors = np.stack([along, growth], axis=1)
     middle = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
     lines = straight_lines(history.gluing_after, *middle)
-    lost = turned_lines(after, lines, np.abs(at_piece))
+    lost = misplaced_lines(after, lines, np.abs(at_piece))
     if len(lost):
         raise SourceError(
             f"segment {lost[0]} of the curves crosses triangles as thin as rounding, which turn it",

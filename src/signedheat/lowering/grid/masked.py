@@ -86,10 +86,10 @@ class MaskedGridDiscretization(DiffusesEach):
         around = np.where(nodes.neighbors >= 0, nodes.neighbors, np.arange(len(nodes.ids))[:, None])
         for values, logarithm in self.solve_heat(source.time, source.vectors):
             missing = np.isnan(values[:, 0])
-            known = ~(missing | missing[around].any(axis=1))
-            vectors[known], slopes[known] = values[known], nodes.gradients(values[:, -1])[known]
+            settled = ~(missing | missing[around].any(axis=1))
+            vectors[settled], slopes[settled] = values[settled], nodes.gradients(values[:, -1])[settled]
             with np.errstate(divide="ignore"):
-                heights[known] = np.log(np.maximum(values[known, -1], 0.0)) + logarithm
+                heights[settled] = np.log(np.maximum(values[settled, -1], 0.0)) + logarithm
         straight = self._straight(source)
         falling = nodes.remove_wall_reflection(-unit(slopes), ~straight)
         return bend_around_corners(vectors[:, :-1], falling, heights, nodes.neighbors, straight)
@@ -112,7 +112,7 @@ class MaskedGridDiscretization(DiffusesEach):
         away = nodes.indices - source.samples.positions[nearest]
         normals = unit(source.samples.vectors * spacing)[nearest]
         along = away - np.einsum("ij,ij->i", away, normals)[:, None] * normals
-        past_end = source.beside_solid[nearest] & (np.linalg.norm(along, axis=1) > FACING)
+        past_end = source.near_wall[nearest] & (np.linalg.norm(along, axis=1) > FACING)
         return nodes.see(source.samples.positions[nearest]) & ~past_end
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -146,8 +146,8 @@ class MaskedIntegration(DirectIntegration):
         mean = np.zeros_like(phi)
         assert self.diffusing is not None
         for values, _ in self.diffusing.solve_heat(source.time, loads):
-            known = values[:, 0] > 0
-            mean[known] = values[known, 1] / values[known, 0]
+            reached = values[:, 0] > 0
+            mean[reached] = values[reached, 1] / values[reached, 0]
         return phi - mean
 
 
@@ -159,12 +159,12 @@ class MaskedSource(GridSource):
     ----------
     rows : (s, n) sparse
         Interpolate at the samples, from the free ones among the nodes around each.
-    beside_solid : (s,) bool
+    near_wall : (s,) bool
         Samples with a solid node within a cell or two: a source that ends there ends at a wall.
     """
 
     rows: sparse.csr_matrix
-    beside_solid: NDArray[np.bool_]
+    near_wall: NDArray[np.bool_]
 
     @classmethod
     def of(cls, whole: GridSource, nodes: FreeNodes) -> MaskedSource:
@@ -191,9 +191,9 @@ class MaskedSource(GridSource):
         row, corner = np.nonzero(weights)
         shape = (len(kept), len(nodes.ids))
         rows = sparse.csr_matrix((weights[row, corner], (row, numbers[row, corner])), shape=shape)
-        near_solid = scipy.ndimage.binary_dilation(nodes.grid.mask).ravel()
-        beside_solid = near_solid[ids[kept]].any(axis=1)
-        return cls(whole.samples.chosen(kept), whole.grid, whole.diffusion, rows, beside_solid)
+        near_walls = scipy.ndimage.binary_dilation(nodes.grid.mask).ravel()
+        near_wall = near_walls[ids[kept]].any(axis=1)
+        return cls(whole.samples.chosen(kept), whole.grid, whole.diffusion, rows, near_wall)
 
     @property
     def interpolation(self) -> sparse.csr_matrix:

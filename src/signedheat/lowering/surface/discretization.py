@@ -176,15 +176,15 @@ class SurfaceDiscretization:
         return divergence(self.triangles, directions)
 
     def reached_by(self, vectors: sparse.csr_array) -> NDArray[np.bool_]:
-        """(n_vertices,) whether a vertex has a face in a component with sources. Vectors diffuse across edges only."""
+        """(n_vertices,) which vertices have a face in a component with a source: vectors diffuse across edges only."""
         parts = self.triangles.face_components
         if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
-        held, lit = np.zeros(self.triangles.n_edges, dtype=bool), np.zeros(self.triangles.n_faces, dtype=bool)
-        held[vectors.indices[vectors.data != 0]] = True
-        lit[parts[held[self.triangles.edges.face_edges].any(axis=1)]] = True
+        is_source = np.zeros(self.triangles.n_edges, dtype=bool)
+        is_source[vectors.indices[vectors.data != 0]] = True
+        with_source = np.unique(parts[is_source[self.triangles.edges.face_edges].any(axis=1)])
         reached = np.zeros(self.triangles.n_vertices, dtype=bool)
-        reached[self.triangles.corner_vertices[lit[parts]]] = True
+        reached[self.triangles.corner_vertices[np.isin(parts, with_source)]] = True
         return reached
 
 

@@ -146,12 +146,12 @@ class TetDiscretization(DiffusesEach):
         means, gradients, factors = None, None, np.full(self.mesh.n_tets, -np.inf)
         for vectors, factor in stages:
             of_faces = vectors[tet_faces]
-            known = ~np.isnan(of_faces[..., 0]).any(axis=1)
+            finite = ~np.isnan(of_faces[..., 0]).any(axis=1)
             if means is None:
                 means, gradients = np.zeros((self.mesh.n_tets, vectors.shape[1])), np.zeros((self.mesh.n_tets, 3))
-            means[known] = of_faces[known].mean(axis=1)
-            slopes = np.einsum("mki,mk->mi", self.mesh.geometry.area_vectors[known], of_faces[known, :, -1])
-            gradients[known], factors[known] = slopes, factor
+            means[finite] = of_faces[finite].mean(axis=1)
+            slopes = np.einsum("mki,mk->mi", self.mesh.geometry.area_vectors[finite], of_faces[finite, :, -1])
+            gradients[finite], factors[finite] = slopes, factor
         return means, gradients, factors
 
     def _straight(self, source: TetSource) -> NDArray[np.bool_]:
@@ -191,9 +191,9 @@ class TetDiscretization(DiffusesEach):
 
     def at_vertices(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n_vertices,) values at the vertices: means over the unknowns of each, NaN where none has a value."""
-        known = np.flatnonzero(~np.isnan(values))
-        vertices, n = self.vertices[known], self.mesh.n_vertices
-        counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[known], n)
+        finite = np.flatnonzero(~np.isnan(values))
+        vertices, n = self.vertices[finite], self.mesh.n_vertices
+        counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[finite], n)
         return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
 

@@ -92,21 +92,21 @@ def window_surfaces(
 
 def _window_surface(height: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.int32]] | None:
     """Vertices in cells and faces, in cells whose nodes all have a value; None if there are none."""
-    known = ~np.isnan(height)
+    finite = ~np.isnan(height)
     whole = np.zeros(height.shape, dtype=bool)  # cells, at their last nodes
     inner = np.ones(tuple(n - 1 for n in height.shape), dtype=bool)
     some, every = np.zeros_like(inner), np.ones_like(inner)
     inside = height < 0
     for corner in np.ndindex(2, 2, 2):
         part = tuple(slice(c, n - 1 + c) for c, n in zip(corner, height.shape, strict=True))
-        inner &= known[part]
+        inner &= finite[part]
         some |= inside[part]
         every &= inside[part]
     inner &= some & ~every
     if not inner.any():
         return None
     whole[1:, 1:, 1:] = inner
-    filled = np.where(known, height, np.float32(1.0))
+    filled = np.where(finite, height, np.float32(1.0))
     vertices, faces, _, _ = measure.marching_cubes(filled, 0.0, gradient_direction="descent", mask=whole)
     return vertices.astype(np.float64), faces
 
@@ -165,8 +165,8 @@ def contour_parts(
         on_edge, keys = edges_of(points)
         shared = np.flatnonzero(on_edge & _on_walls(points, window))
         numbers = np.full(len(points), -1, dtype=np.int64)
-        for known in _seams_around(seams, window):
-            numbers[shared] = np.maximum(numbers[shared], _looked_up(known, keys[shared]))
+        for seam in _seams_around(seams, window):
+            numbers[shared] = np.maximum(numbers[shared], _looked_up(seam, keys[shared]))
         new = numbers < 0
         numbers[new] = count + np.arange(int(new.sum()))
         count += int(new.sum())

@@ -102,23 +102,23 @@ def diffuse_multilevel(
         One for each grid of the hierarchy, finest first.
     """
     levels: list[Level] = []
-    known = None
+    guess = None
     while True:
         factors = coarsening(sources.shape, sources.steps)
         last = not (factors > 1).any()
         if len(levels) >= finest or last:
-            often = ROUNDS_EVERYWHERE if last else rounds if known is None else BEYOND * rounds
-            levels.append(_diffuse_level(sources, known, time, factors, often, last))
+            often = ROUNDS_EVERYWHERE if last else rounds if guess is None else BEYOND * rounds
+            levels.append(_diffuse_level(sources, guess, time, factors, often, last))
         else:
             levels.append(Level(None, None, factors))
         if last:
             return levels
         shape, steps = _coarser(sources.shape, sources.steps)
-        known = None
+        guess = None
         if levels[-1].vectors is not None:
             power = np.sqrt(time(_mean_step(sources.steps)) / time(_mean_step(steps)))
-            known = _carried(levels[-1], shape, power)
-        sources = sources.restricted(factors, shape, steps) if known is None else NodeSources.empty(shape, steps)
+            guess = _carried(levels[-1], shape, power)
+        sources = sources.restricted(factors, shape, steps) if guess is None else NodeSources.empty(shape, steps)
 
 
 def coarsening(shape: tuple[int, ...], steps: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -156,7 +156,7 @@ def skip_finest(
 
 def _diffuse_level(
     sources: NodeSources,
-    known: CoarseGuess | None,
+    guess: CoarseGuess | None,
     time: Callable[[float], float],
     factors: NDArray[np.int64],
     rounds: int,
@@ -165,18 +165,18 @@ def _diffuse_level(
     t = time(_mean_step(sources.steps))
     real = sources.steps > 0
     ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
-    start = sources.places >= 0 if known is None else known.where
+    start = sources.places >= 0 if guess is None else guess.where
     if last:
         active = inside = np.ones_like(start)
     else:
         width = np.ceil(BAND * np.sqrt(ratios)).astype(int)
         active = _dilated(start, width)
         inside = _dilated(start, np.maximum(width - MARGIN, 0))
-    if known is not None:
-        active = active & ~known.where
-    if known is None and not last and active.mean() < SMALL:
+    if guess is not None:
+        active = active & ~guess.where
+    if guess is None and not last and active.mean() < SMALL:
         rounds *= 2
-    given = None if known is None else known.vectors
+    given = None if guess is None else guess.vectors
     vectors = diffuse_by_sweeps(sources, active, ratios, rounds, given)
     return Level(vectors, inside, factors)
 

@@ -1,4 +1,4 @@
-"""What fields know of the solid that they are the distance to."""
+"""Queries of a solid at points: what a field needs of the solid that it is the distance to."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Closest:
 
     @property
     def completed(self) -> NDArray[np.bool_]:
-        """(n,) whether the place lies on surface that was not there."""
+        """(n,) whether the place lies on the completion."""
         result: NDArray[np.bool_] = self.faces < 0
         return result
 
@@ -46,8 +46,8 @@ class Closest:
         return f"Closest({len(self.points)} points, {int(self.completed.sum())} on the completion)"
 
 
-class KnownSolid(Protocol):
-    """A `Solid`: distance anywhere, exactly."""
+class SolidQueries(Protocol):
+    """What can answer queries at points exactly, as a `Solid` does."""
 
     @property
     def triangles(self) -> NDArray[np.float64]:
