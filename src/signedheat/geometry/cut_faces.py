@@ -90,24 +90,24 @@ def overlap(
             return False
     normals = np.zeros((2, 3))
     for a in range(17):
-        # normals of both; products of their sides; sides turned in their planes
+        # normals of both; sides turned in their planes, which part most of those that touch; products of their sides
         if a < 2:
             t = p if a == 0 else q
             ux, uy, uz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
             vx, vy, vz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
-        elif a < 11:
-            i, j = 3 * ((a - 2) // 3), 3 * ((a - 2) % 3)
-            k, m = (i + 3) % 9, (j + 3) % 9
-            ux, uy, uz = p[k] - p[i], p[k + 1] - p[i + 1], p[k + 2] - p[i + 2]
-            vx, vy, vz = q[m] - q[j], q[m + 1] - q[j + 1], q[m + 2] - q[j + 2]
-        else:
-            t = p if a < 14 else q
-            i = 3 * ((a - 11) % 3)
+        elif a < 8:
+            t = p if a < 5 else q
+            i = 3 * ((a - 2) % 3)
             k = (i + 3) % 9
             ux, uy, uz = t[k] - t[i], t[k + 1] - t[i + 1], t[k + 2] - t[i + 2]
             sx, sy, sz = t[3] - t[0], t[4] - t[1], t[5] - t[2]
             rx, ry, rz = t[6] - t[0], t[7] - t[1], t[8] - t[2]
             vx, vy, vz = sy * rz - sz * ry, sz * rx - sx * rz, sx * ry - sy * rx
+        else:
+            i, j = 3 * ((a - 8) // 3), 3 * ((a - 8) % 3)
+            k, m = (i + 3) % 9, (j + 3) % 9
+            ux, uy, uz = p[k] - p[i], p[k + 1] - p[i + 1], p[k + 2] - p[i + 2]
+            vx, vy, vz = q[m] - q[j], q[m + 1] - q[j + 1], q[m + 2] - q[j + 2]
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         length = np.sqrt(x * x + y * y + z * z)
         scale = np.sqrt((ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz))
@@ -116,7 +116,7 @@ def overlap(
         axis[0], axis[1], axis[2] = x / length, y / length, z / length
         if a < 2:
             normals[a, 0], normals[a, 1], normals[a, 2] = axis[0], axis[1], axis[2]
-        elif a < 11:  # along a normal both are flat, and touch
+        elif a >= 8:  # along a normal both are flat, and touch
             upright = False
             for n in range(2):
                 cosine = normals[n, 0] * axis[0] + normals[n, 1] * axis[1] + normals[n, 2] * axis[2]
@@ -205,14 +205,23 @@ def _cut(
     slack: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
     met = np.zeros(len(corners), dtype=np.bool_)
-    axis = np.empty(3)
+    axis, lower, upper = np.empty(3), np.empty(3), np.empty(3)
     pieces, alive = np.empty((MOST_PIECES, 9)), np.zeros(MOST_PIECES, dtype=np.bool_)
     result, origins, total = np.empty((len(corners) + 1024, 9)), np.empty(len(corners) + 1024, dtype=np.int64), 0
     for f in range(len(corners)):
         for c in range(9):
             pieces[0, c] = corners[f, c]
         alive[0], count = True, np.int64(1)
+        for d in range(3):
+            lower[d] = min(corners[f, d], corners[f, 3 + d], corners[f, 6 + d]) - slack
+            upper[d] = max(corners[f, d], corners[f, 3 + d], corners[f, 6 + d]) + slack
         for g in near[starts[f] : starts[f + 1]]:
+            apart = False  # as most are that are in one leaf
+            for d in range(3):
+                apart |= lower[d] > max(knives[g, d], knives[g, 3 + d], knives[g, 6 + d])
+                apart |= upper[d] < min(knives[g, d], knives[g, 3 + d], knives[g, 6 + d])
+            if apart:
+                continue
             shared = 0
             for i in range(3):
                 for j in range(3):

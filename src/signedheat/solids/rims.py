@@ -43,9 +43,13 @@ def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDAr
     [[1, 0], [0, 2], [3, 1], [2, 3]]
     """
     table = edge_table(faces)
-    n = len(table.vertices)
-    sides, which = np.unique(np.repeat(parts, 3) * n + table.face_edges.ravel(), return_inverse=True)
-    excess = np.bincount(which, np.where(table.forward, 1, -1).ravel(), len(sides)).astype(np.int64)
+    n, here, owners = len(table.vertices), table.face_edges.ravel(), np.repeat(parts, 3)
+    lacking, last = table.balance != 0, np.empty(n, dtype=np.int64)
+    last[here] = owners
+    lacking[here[owners != last[here]]] = True  # of several parts; faces of one cancel
+    some = np.flatnonzero(lacking[here])
+    sides, which = np.unique(owners[some] * n + here[some], return_inverse=True)
+    excess = np.bincount(which, np.where(table.forward.ravel()[some], 1, -1), len(sides)).astype(np.int64)
     edges = table.vertices[sides % n]
     missing = np.where(excess[:, None] > 0, edges[:, ::-1], edges)
     return np.repeat(missing, np.abs(excess), axis=0), np.repeat(sides // n, np.abs(excess))
