@@ -32,6 +32,10 @@ SMOOTH = 24
 SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
 
+PLANE = 1e-12
+"""Over its size, how far a rim may be off its plane for its lid to lie in it, unsolved: rounding."""
+AT_ONCE = 1 << 20
+"""Pairs of a point and an edge that are looked at together."""
 MOVED = 1e-9
 """Over the size of a lid, how far points are moved to choose among equal triangles: rounding moves them by 1e-15."""
 
@@ -77,34 +81,44 @@ def film(loop: NDArray[np.float64]) -> Lid:
     """The lid of least area, near enough: a hinged plate, which is a membrane.
 
     It is triangulated in the plane of the loop's area, or, where the loop's shadow there crosses itself, over a disc;
-    its first shape is harmonic there, and the lengths of each shape give the next (Pinkall & Polthier 1993). No weight
-    is negative, so that the lid stays within the hull of its rim.
+    unless the loop lies in that plane, the first shape is harmonic there, and the lengths of each shape give the next
+    (Pinkall & Polthier 1993). No weight is negative, so that the lid stays within the hull of its rim.
     """
     rim = cut_to_pieces(loop)
-    shadow = _shadow(rim)
-    found = None if shadow is None else _in_polygon(rim, shadow)
+    axes = _axes(rim)
+    found = None if axes is None else _in_polygon(rim, (rim - rim[0]) @ axes)
     rim, plane, faces = _in_disc(rim) if found is None else found
     n = len(rim)
+    if found is not None and axes is not None:
+        lifted = rim[0] + plane @ axes.T
+        if n == len(plane) or np.abs(lifted[:n] - rim).max() <= PLANE * np.abs(plane).max():
+            return Lid(np.concatenate([rim, lifted[n:]]), faces, n)
     vertices = np.zeros((len(plane), 3))
     vertices[:n] = rim
-    lid = _membrane(Lid(vertices, faces, n), stiffness(np.c_[plane, np.zeros(len(plane))], faces))
-    if n == len(plane):
-        return lid
-    for _ in range(ROUNDS):
-        lid = _membrane(lid, stiffness(lid.vertices, lid.faces))
-    return lid
+    edges, sides = np.unique(_sides(faces, len(plane)), return_inverse=True)
+    ends = np.stack(np.divmod(edges, len(plane)))
+    shape = np.c_[plane, np.zeros(len(plane))]
+    for _ in range(1 + ROUNDS):
+        weights = np.bincount(sides.ravel(), _cotangents(shape, faces).ravel())
+        vertices = shape = _membrane(vertices, n, ends, np.maximum(weights, 1e-6))
+    return Lid(vertices, faces, n)
 
 
-def _membrane(lid: Lid, matrix: sparse.csr_array) -> Lid:
-    n = lid.n_rim
-    weights = -sparse.triu(matrix, 1).tocoo()
-    weights.data = np.maximum(weights.data, 1e-6)
-    weights = (weights + weights.T).tocsr()
-    inner = sparse.diags_array(weights.sum(axis=1)[n:]) - weights[n:, n:]
-    vertices = lid.vertices.copy()
-    if len(vertices) > n:
-        vertices[n:] = sparse.linalg.splu(inner.tocsc()).solve(weights[n:, :n] @ vertices[:n])
-    return Lid(vertices, lid.faces, n)
+def _membrane(
+    vertices: NDArray[np.float64], n: int, ends: NDArray[np.int64], weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Vertices of which all but the first n are the weighted means of those that edges join them to."""
+    here, there = np.concatenate([ends, ends[::-1]], axis=1)
+    both = np.concatenate([weights, weights])
+    inner, fixed = (here >= n) & (there >= n), (here >= n) & (there < n)
+    size = len(vertices) - n
+    rows = np.concatenate([np.arange(size), here[inner] - n])
+    columns = np.concatenate([np.arange(size), there[inner] - n])
+    entries = np.concatenate([np.bincount(here, both, len(vertices))[n:], -both[inner]])
+    pulled = both[fixed, None] * vertices[there[fixed]]
+    sums = np.stack([np.bincount(here[fixed] - n, column, size) for column in pulled.T], axis=1)
+    matrix = sparse.csc_array((entries, (rows, columns)), shape=(size, size))
+    return np.concatenate([vertices[:n], sparse.linalg.splu(matrix).solve(sums)])
 
 
 def plate(
@@ -200,8 +214,8 @@ def _harmonic(lid: Lid, values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([values, inner])
 
 
-def _shadow(rim: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """(n, 2) a loop in the plane of its area, counterclockwise; None if it has none."""
+def _axes(rim: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """(3, 2) axes of the plane of a loop's area, in which it runs counterclockwise; None if it has none."""
     normal = area_vector(rim)
     length = np.linalg.norm(normal)
     if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
@@ -212,8 +226,7 @@ def _shadow(rim: NDArray[np.float64]) -> NDArray[np.float64] | None:
     reach = np.linalg.norm(around, axis=1)
     first = around[np.argmax(reach > (1 - 1e-9) * reach.max())]  # turns with the rim
     first = first / np.linalg.norm(first)
-    shadow: NDArray[np.float64] = (rim - rim[0]) @ np.stack([first, np.cross(normal, first)], axis=1)
-    return shadow
+    return np.stack([first, np.cross(normal, first)], axis=1)
 
 
 def _in_polygon(
@@ -261,6 +274,12 @@ def _delaunay(points: NDArray[np.float64]) -> NDArray[np.int64]:
     return faces
 
 
+def _sides(faces: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """(m, 3) numbers of the edges across from the corners of triangles."""
+    one, other = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
+    return np.minimum(one, other) * n + np.maximum(one, other)
+
+
 def _directed(faces: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     """Numbers of the directed edges of triangles."""
     return (faces * n + np.roll(faces, -1, axis=1)).ravel()
@@ -298,10 +317,13 @@ def _inside_polygon(points: NDArray[np.float64], polygon: NDArray[np.float64]) -
     """(k,) whether points lie inside a polygon: by the parity of crossings."""
     inside = np.zeros(len(points), dtype=bool)
     x, y = points.T
-    for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        crosses = (ay > y) != (by > y)
-        if crosses.any():
-            inside[crosses] ^= x[crosses] < ax + (y[crosses] - ay) * (bx - ax) / (by - ay)
+    together = max(1, AT_ONCE // max(len(points), 1))
+    for begin in range(0, len(polygon), together):
+        ax, ay = polygon[begin : begin + together].T[..., None]
+        bx, by = np.roll(polygon, -1, axis=0)[begin : begin + together].T[..., None]
+        rise = np.where(by == ay, 1.0, by - ay)  # what is level is not crossed
+        crosses = ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / rise)
+        inside ^= np.logical_xor.reduce(crosses, axis=0)
     return inside
 
 
@@ -331,21 +353,22 @@ def _in_disc(
     return rim, points, faces
 
 
+def _cotangents(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(m, 3) half the cotangents of the corners of triangles, bounded where they are flat."""
+    corners = vertices[faces]
+    u, v = np.roll(corners, -1, axis=1) - corners, np.roll(corners, -2, axis=1) - corners
+    cosine, sine = (u * v).sum(axis=2), np.linalg.norm(np.cross(u, v), axis=2)
+    halves: NDArray[np.float64] = 0.5 * cosine / np.maximum(np.maximum(sine, np.abs(cosine) / 100.0), 1e-300)
+    return halves
+
+
 def stiffness(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> sparse.csr_array:
     """(n, n) the positive semidefinite cotangent Laplacian; corners of flat triangles are bounded."""
-    corners = vertices[faces]
-    rows, columns, values = [], [], []
-    for k in range(3):
-        u, v = corners[:, (k + 1) % 3] - corners[:, k], corners[:, (k + 2) % 3] - corners[:, k]
-        cosine, sine = (u * v).sum(axis=1), np.linalg.norm(np.cross(u, v), axis=1)
-        weight = 0.5 * cosine / np.maximum(np.maximum(sine, np.abs(cosine) / 100.0), 1e-300)
-        i, j = faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
-        rows += [i, j, i, j]
-        columns += [j, i, i, j]
-        values += [-weight, -weight, weight, weight]
-    n = len(vertices)
-    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-    return sparse.coo_array(entries, shape=(n, n)).tocsr()
+    weights = _cotangents(vertices, faces).ravel()
+    i, j, n = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel(), len(vertices)
+    entries = np.concatenate([-weights, -weights, weights, weights])
+    places = np.concatenate([i, j, i, j]), np.concatenate([j, i, i, j])
+    return sparse.coo_array((entries, places), shape=(n, n)).tocsr()
 
 
 def vertex_areas(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
