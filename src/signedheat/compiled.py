@@ -20,7 +20,7 @@ from pathlib import Path
 from pickle import UnpicklingError
 from threading import RLock, local
 from types import CodeType
-from typing import Any, overload
+from typing import Any, Generic, ParamSpec, TypeVar, overload
 
 import numpy as np
 
@@ -41,14 +41,16 @@ PATIENCE = 2.0
 DAMAGE = OSError, EOFError, UnpicklingError
 """What reading or writing the cache raises where files are damaged or cannot be written. Kernels raise none of them."""
 _LOCK = RLock()
-made: list[Kernel] = []
+Parameters = ParamSpec("Parameters")
+Returned = TypeVar("Returned")
+made: list[Kernel[..., Any]] = []
 """The kernels that this process has used."""
 
 
 announce = Announcement("compiling what this needs, once (signedheat warmup compiles all)", "compiling %s")
 
 
-class Kernel:
+class Kernel(Generic[Parameters, Returned]):
     """A function that Numba compiles at its first call, with a cache on disk. Kernels may call kernels.
 
     Examples
@@ -63,14 +65,14 @@ class Kernel:
     is_kept = True
     """Whether what is compiled is kept on disk: no longer once the cache was found damaged, or the disk full."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[Parameters, Returned], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
         self.function = function
         self.options = {**OPTIONS, **options}
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: Parameters.args, **named: Parameters.kwargs) -> Returned:
         try:
-            return self.dispatcher(*arguments)
+            return self.dispatcher(*arguments, **named)
         except Exception as error:
             if not Kernel.is_kept or not any(isinstance(each, DAMAGE) for each in _chain(error)):
                 raise
@@ -79,10 +81,10 @@ class Kernel:
             Kernel.is_kept = False
             while made:
                 vars(made.pop()).pop("dispatcher", None)
-        return self.dispatcher(*arguments)
+        return self.dispatcher(*arguments, **named)
 
     @cached_property
-    def dispatcher(self) -> Callable[..., Any]:
+    def dispatcher(self) -> Callable[Parameters, Returned]:
         """What Numba makes of the function, which is the function itself if ``NUMBA_DISABLE_JIT`` is set."""
         with _LOCK:
             _prepare()
@@ -99,9 +101,9 @@ class Kernel:
 
 
 @overload
-def compiled(function: Callable[..., Any]) -> Kernel: ...
+def compiled(function: Callable[Parameters, Returned]) -> Kernel[Parameters, Returned]: ...
 @overload
-def compiled(**options: Any) -> Callable[[Callable[..., Any]], Kernel]: ...
+def compiled(**options: Any) -> Callable[[Callable[Parameters, Returned]], Kernel[Parameters, Returned]]: ...
 def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """Make a function a kernel: ``@compiled``, or ``@compiled(fastmath=True)`` with options of ``numba.njit``."""
     if function is not None:
@@ -123,7 +125,7 @@ def cache_folder() -> Path:
     return Path(__file__).parent / "__pycache__"
 
 
-def _digest(kernel: Kernel) -> str:
+def _digest(kernel: Kernel[..., Any]) -> str:
     """Of the code, options and constants that a kernel and those that it calls are made of, and of Numba's version."""
     digest, seen, waiting = hashlib.sha256(repr(numba.version_info).encode()), set(), [kernel]
     while waiting:

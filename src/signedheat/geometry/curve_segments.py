@@ -128,7 +128,7 @@ def given_directions(
 
     along = np.flatnonzero(edges >= 0)
     on_edges = LocatedPoints(
-        faces[along], np.zeros((len(along), 3)), np.full(len(along), EDGE), edges[along], edges[along]
+        faces[along], np.zeros((len(along), 3)), np.full(len(along), EDGE), edges[along], np.zeros(len(along))
     )
     if len(along):
         which, around = incident_faces(triangles, on_edges)
@@ -200,7 +200,8 @@ def in_layout(
     second = np.cross(normal, first)
     seen = np.einsum("ij,ij->i", vectors, first) + 1j * np.einsum("ij,ij->i", vectors, second)
     edge = triangles.edge_vectors[faces, 0]
-    return seen * edge / np.abs(edge)
+    result: NDArray[np.complex128] = seen * edge / np.abs(edge)
+    return result
 
 
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:

@@ -164,7 +164,8 @@ def nonoverlapping_triangles(
             angle.append(np.arctan2((step * axes[here, 1]).sum(axis=1), (step * axes[here, 0]).sum(axis=1)))
         turn = np.mod(angle[1] - angle[0] + np.pi, 2 * np.pi) - np.pi
         starts[:, k], widths[:, k] = np.where(turn < 0, angle[1], angle[0]), np.abs(turn)
-    return triangles[accept_apart(triangles, starts, widths, len(points))]
+    result: NDArray[np.int64] = triangles[accept_apart(triangles, starts, widths, len(points))]
+    return result
 
 
 def split_at_points_left(
@@ -221,7 +222,8 @@ def aligned(
         center = sums_of(points, parts, len(size)) / size
         flux = (np.cross(b - a, c - a) * (a - center[parts[faces[:, 0]]])).sum(axis=1)
         preference = np.bincount(parts[faces[:, 0]], flux, int(parts.max()) + 1)
-    return np.where(preference < 0, -1, 1)[parts] * signs
+    result: NDArray[np.int64] = np.where(preference < 0, -1, 1)[parts] * signs
+    return result
 
 
 def facing(points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:

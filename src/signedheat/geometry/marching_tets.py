@@ -100,7 +100,7 @@ def _crossings(
 
 
 def _triangles(
-    elements: NDArray[np.int64], below: NDArray[np.bool_], n: int, table: dict[int, list]
+    elements: NDArray[np.int64], below: NDArray[np.bool_], n: int, table: dict[int, list[list[tuple[int, int]]]]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """(k, 3) triangles whose corners are ``smaller · n + larger`` vertex id of their edge, and (k,) their elements."""
     corners = elements.shape[1]

@@ -145,7 +145,7 @@ def contain(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: Located
 
 def barycentric_in(triangles: IntrinsicMesh, faces: NDArray[np.int64], located: LocatedPoints) -> NDArray[np.float64]:
     """(n, 3) barycentric coordinates of point k in face k, which must contain it."""
-    weights = located.barycentric.copy()
+    weights: NDArray[np.float64] = located.barycentric.copy()
     moved = np.flatnonzero(faces != located.faces)
     kinds, elements, along, other = (a[moved] for a in (located.kinds, located.elements, located.along, faces))
     weights[moved] = 0.0

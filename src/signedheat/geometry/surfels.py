@@ -64,21 +64,21 @@ def boundary_surfels(volume: NDArray[np.bool_]) -> Surfels:
             voxels.append(found)
             axes.append(np.full(len(found), axis))
             signs.append(np.full(len(found), sign))
-    voxel, axis, sign = np.concatenate(voxels), np.concatenate(axes), np.concatenate(signs)
-    order = np.lexsort((sign, axis, *voxel.T[::-1]))
-    voxel, axis, sign = voxel[order], axis[order], sign[order]
+    all_voxels, all_axes, all_signs = np.concatenate(voxels), np.concatenate(axes), np.concatenate(signs)
+    order = np.lexsort((all_signs, all_axes, *all_voxels.T[::-1]))
+    voxel, along, towards = all_voxels[order], all_axes[order], all_signs[order]
 
     unit = np.eye(3, dtype=np.int64)
-    first, second = unit[(axis + 1) % 3], unit[(axis + 2) % 3]
-    forward = (sign > 0)[:, None]
+    first, second = unit[(along + 1) % 3], unit[(along + 2) % 3]
+    forward = (towards > 0)[:, None]
     first, second = np.where(forward, first, second), np.where(forward, second, first)
-    start = voxel + unit[axis] * (sign > 0)[:, None]
+    start = voxel + unit[along] * forward
     corners = np.stack([start, start + first, start + first + second, start + second], axis=1)
     shape = np.array(volume.shape) + 1
     keys = np.ravel_multi_index(tuple(corners.reshape(-1, 3).T), tuple(shape))
     distinct, ids = np.unique(keys, return_inverse=True)
     vertices = np.stack(np.unravel_index(distinct, tuple(shape)), axis=1)
-    return Surfels(ids.reshape(-1, 4), vertices, voxel, axis, sign)
+    return Surfels(ids.reshape(-1, 4), vertices, voxel, along, towards)
 
 
 def count_surfels(volume: NDArray[np.bool_]) -> int:
@@ -134,7 +134,8 @@ def corrected_normals(
     normals = np.divide(-gradient, length, out=own.copy(), where=length > 0)
     steep = _STEEPEST - (normals * own).sum(axis=1)
     normals += np.maximum(steep, 0)[:, None] * own
-    return normals / np.linalg.norm(normals, axis=1)[:, None]
+    result: NDArray[np.float64] = normals / np.linalg.norm(normals, axis=1)[:, None]
+    return result
 
 
 def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:

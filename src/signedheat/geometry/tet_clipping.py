@@ -162,7 +162,9 @@ def barycentric(mesh: TetShapes, tets: NDArray[np.int64], points: NDArray[np.flo
     inward = -np.einsum("pki,pki->pk", mesh.area_vectors[tets], from_corner)
     inward = np.maximum(inward / np.maximum(np.abs(inward).max(axis=1, keepdims=True), np.finfo(float).tiny), 0)
     total = inward.sum(axis=1, keepdims=True)
-    return np.divide(inward, total, out=np.full_like(inward, 0.25), where=total > 0)  # flat tets: their middle
+    middle = np.full_like(inward, 0.25)  # of flat tets
+    result: NDArray[np.float64] = np.divide(inward, total, out=middle, where=total > 0)
+    return result
 
 
 @compiled

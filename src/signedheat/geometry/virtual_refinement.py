@@ -164,4 +164,4 @@ def _solve_symmetric(matrices: NDArray[np.float64], loads: NDArray[np.float64]) 
     """Nearly minimum-norm solutions of semidefinite systems: a flat polygon does not determine x along its normal."""
     size = np.trace(matrices, axis1=1, axis2=2)
     held = matrices + (1e-11 * np.where(size > 0, size, 1))[:, None, None] * np.eye(3)
-    return np.linalg.solve(held, loads[..., None])[..., 0]
+    return np.linalg.solve(held, loads[..., None])[..., 0].astype(np.float64, copy=False)

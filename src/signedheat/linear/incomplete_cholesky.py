@@ -121,7 +121,7 @@ def outward_order(matrix: sparse.csr_matrix, seeds: NDArray[np.int64]) -> NDArra
     links = sparse.csr_matrix((np.ones(len(seeds)), (np.full(len(seeds), n), seeds)), shape=(n + 1, n + 1))
     graph = sparse.csr_matrix((matrix.data != 0, matrix.indices, matrix.indptr), shape=matrix.shape)
     graph.resize(n + 1, n + 1)
-    order = sparse.csgraph.breadth_first_order(links + graph, n, return_predecessors=False)
+    order: NDArray[np.int32] = sparse.csgraph.breadth_first_order(links + graph, n, return_predecessors=False)
     return order[1:].astype(np.int64)
 
 

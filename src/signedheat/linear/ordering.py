@@ -32,7 +32,7 @@ def elimination_order(upper: Any) -> NDArray[np.int64]:
 
 
 @compiled
-def dissect(starts, neighbors, leaf):
+def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) -> NDArray[np.int64]:
     """Elimination order: both sides of a small separator, each ordered in the same way, then the separator.
 
     A separator is the smallest level near the middle of a breadth-first search from the end of a long path, without the

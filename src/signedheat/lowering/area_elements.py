@@ -176,7 +176,8 @@ def point_areas(points: NDArray[np.float64], neighbours: int = NEIGHBOURS) -> ND
         return np.ones(len(points)) / counts[which.ravel()]
     reach = scipy.spatial.cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
     unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
-    return (unit_ball * reach**dimension / k / counts)[which.ravel()]
+    areas: NDArray[np.float64] = unit_ball * reach**dimension / k / counts
+    return areas[which.ravel()]
 
 
 def components_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -51,7 +51,8 @@ class DirectIntegration(Frozen):
     @cached_property
     def components(self) -> NDArray[np.int64]:
         """(n,) connected component of the domain that each unknown lies in."""
-        return sparse.csgraph.connected_components(self.stiffness, directed=False)[1].astype(np.int64)
+        labels: NDArray[np.int32] = sparse.csgraph.connected_components(self.stiffness, directed=False)[1]
+        return labels.astype(np.int64)
 
     @cached_property
     def factor(self) -> Factor:
@@ -175,7 +176,8 @@ class DirectIntegration(Frozen):
 
     def _component_of(self, rows: sparse.csr_matrix) -> NDArray[np.int64]:
         """(s,) connected component of the domain that each sample lies in."""
-        return self.components[rows.indices[rows.indptr[:-1]]]
+        result: NDArray[np.int64] = self.components[rows.indices[rows.indptr[:-1]]]
+        return result
 
     def _reached(self, values: NDArray[np.float64], rows: sparse.csr_matrix) -> NDArray[np.float64]:
         """The values, with NaN on connected components without samples."""
@@ -189,11 +191,13 @@ class DirectIntegration(Frozen):
         mean = np.full(n_parts, np.nan)
         at_samples = source.weights * self._at_samples(values, source)
         np.divide(np.bincount(part, at_samples, n_parts), weight, out=mean, where=weight > 0)
-        return values - mean[self.components]
+        result: NDArray[np.float64] = values - mean[self.components]
+        return result
 
     def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
         """(s,) φ on the source."""
-        return source.interpolation @ values
+        result: NDArray[np.float64] = source.interpolation @ values
+        return result
 
 
 def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.csr_matrix:

@@ -62,7 +62,8 @@ class Camera:
         """(m,) brightness of faces, from 0.45 to 1, the same for both sides of a face."""
         normals = area_vectors @ self.frame.T
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-        return 0.45 + 0.55 * np.abs(normals @ LIGHT)
+        result: NDArray[np.float64] = 0.45 + 0.55 * np.abs(normals @ LIGHT)
+        return result
 
 
 def looking(direction: NDArray[np.float64], up: int = 2) -> NDArray[np.float64]:
@@ -104,7 +105,13 @@ def rasterize(
 
 
 @compiled
-def _fill(corners, values, depth, face, shown):
+def _fill(
+    corners: NDArray[np.float64],
+    values: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    face: NDArray[np.int64],
+    shown: NDArray[np.float64],
+) -> None:
     height, width = depth.shape
     for f in range(len(corners)):
         (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[f]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import scipy
@@ -119,10 +119,11 @@ def rounded(position: float, spacing: float) -> str:
 def draw_plane(field: GridField, axes: Axes, shape: Any = None, levels: Sequence[float] = ()) -> None:
     """Draw a field in the plane into axes, with polylines or points in red."""
     colors, isolines, step = _look(field)
-    _draw_panel(axes, *field.grid.axes, field.values, colors, isolines, levels)
+    u, v = field.grid.axes
+    _draw_panel(axes, u, v, field.values, colors, isolines, levels)
     for line in shape if isinstance(shape, Sequence) else [] if shape is None else [shape]:
         if isinstance(line, PointCloud):
-            axes.scatter(*line.points.T, s=6, c="#d4145a", linewidths=0, zorder=3)
+            axes.scatter(line.points[:, 0], line.points[:, 1], s=6, c="#d4145a", linewidths=0, zorder=3)
         else:
             points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
             axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
@@ -148,7 +149,7 @@ def _draw_panel(
 ) -> None:
     """Draw values on a plane, indexed [u, v], as colours and isolines; dashed levels where confidence is low."""
     shown = np.ma.masked_invalid(values.T)
-    shading = "nearest" if shown.mask.any() else "gouraud"
+    shading: Literal["nearest", "gouraud"] = "nearest" if shown.mask.any() else "gouraud"
     panel.pcolormesh(u, v, shown, cmap=colors.cmap, norm=colors.norm, shading=shading, rasterized=True)
     panel.set_facecolor("#b9b9b9")
     low, high = float(shown.min()), float(shown.max())
@@ -217,7 +218,8 @@ def _draw_section(panel: Axes, given: Any, axis: int, position: float, spacing: 
     shape = None if given is None else outside_of(given)
     if isinstance(shape, PointCloud):
         near = shape.points[np.abs(shape.points[:, axis] - position) < spacing]
-        panel.scatter(*np.delete(near, axis, axis=1).T, s=3, c="#d4145a", linewidths=0, zorder=3)
+        x, y = np.delete(near, axis, axis=1).T
+        panel.scatter(x, y, s=3, c="#d4145a", linewidths=0, zorder=3)
     elif shape is not None:
         segments = cross_section(triangulated(shape), axis, position)
         panel.add_collection(mpl_collections.LineCollection(list(segments), colors="#d4145a", linewidths=1.1, zorder=3))

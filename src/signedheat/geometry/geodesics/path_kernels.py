@@ -6,6 +6,8 @@ through a halfedge, and the next one entered through another halfedge of the sam
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -182,7 +184,7 @@ def other_way(faces, left, entered, portals, bend, point):
 
 
 @compiled
-def is_among(values: NDArray[np.int64], value: int, begin: int, end: int) -> bool:
+def is_among(values: Sequence[np.int64] | NDArray[np.int64], value: int, begin: int, end: int) -> bool:
     """Whether a value is among some of others."""
     for k in range(begin, end):
         if values[k] == value:
@@ -215,12 +217,14 @@ def turned(h: int, at_tail: bool) -> int:
 
 
 @compiled
-def point_in(faces: NDArray[np.int64], points: NDArray[np.complex128], face: int) -> np.complex128:
+def point_in(faces: NDArray[np.int64], points: NDArray[np.complex128], face: int) -> complex:
     """The point listed for a face, in its layout."""
     for s in range(len(faces)):
         if faces[s] == face:
-            return points[s]
-    return points[0]
+            found: complex = points[s]
+            return found
+    first: complex = points[0]
+    return first
 
 
 @compiled

@@ -70,7 +70,7 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> NDAr
 
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
-) -> tuple[LocatedPoints, NDArray]:
+) -> tuple[LocatedPoints, NDArray[np.int64]]:
     """Points at which the shortest paths between starts and ends cross edges or pass vertices.
 
     Paths are locally shortest: none becomes shorter by passing a vertex on its other side. The first guess is the
@@ -110,7 +110,8 @@ def geodesic_paths(
         if counts[k] >= 0:
             parts.append(located[np.arange(begin[k], begin[k] + counts[k])])
             continue
-        parts.append(path_through_vertices(triangles, start[[k]], end[[k]], name))
+        here = np.array([k])
+        parts.append(path_through_vertices(triangles, start[here], end[here], name))
         counts[k] = len(parts[-1])
     return concatenated(parts), counts
 

@@ -6,14 +6,15 @@ Faces are unfolded one after the other, across the edges between them, into the 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .gluing_kernels import apex_position, following, kernel, preceding, tangent_at
+from .gluing_kernels import Gluing, apex_position, following, kernel, preceding, tangent_at
 
 INSIDE, BLOCKED, LOST = 0, 1, 2
 
 
 @kernel
-def unfold(g, h, side, tx, ty, hx, hy):
+def unfold(g: Gluing, h: int, side: int, tx: float, ty: float, hx: float, hy: float) -> tuple[float, float, int]:
     """Unfold the face on the other side of halfedge h, which runs from (tx, ty) to (hx, hy): its apex and its sense.
 
     `side` is 1 where the face of h is laid out counter-clockwise, −1 where clockwise; so is the sense returned.
@@ -30,13 +31,13 @@ def unfold(g, h, side, tx, ty, hx, hy):
 
 
 @kernel
-def cross(ax, ay, bx, by, cx, cy):
+def cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
     """Twice the signed area of abc."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
 @kernel
-def find_circumcenter(g, f):
+def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, float, float]:
     """Walk straight from the barycentre of a face to its circumcentre.
 
     Returns INSIDE with the face that contains it and its position there (first halfedge along x), BLOCKED with a
@@ -85,7 +86,7 @@ def find_circumcenter(g, f):
 
 
 @kernel
-def encroached(g, f, px, py, ends, halfedges):
+def encroached(g: Gluing, f: int, px: float, py: float, ends: NDArray[np.float64], halfedges: NDArray[np.int64]) -> int:
     """A segment that p encroaches upon: visible from p, which lies in its diametral circle. −1 if there is none.
 
     p is given in the frame of face f. `ends` and `halfedges` are work arrays for the search.
@@ -101,7 +102,8 @@ def encroached(g, f, px, py, ends, halfedges):
         count += 1
     while count > 0:
         count -= 1
-        h, (tx, ty, hx, hy, side) = halfedges[count], ends[count]
+        h: int = halfedges[count]
+        tx, ty, hx, hy, side = ends[count]
         dot = (tx - px) * (hx - px) + (ty - py) * (hy - py)
         if g.fixed[g.edge[h]]:
             if dot < 0.0:

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,13 +149,13 @@ class FaceCutter:
         self.chains: dict[int, tuple[list[int], list[float], dict[int, int]]] = {}
         inside = defaultdict(list)
         rows = zip(merged.ends.tolist(), merged.faces.tolist(), merged.edges.tolist(), strict=True)
-        for p, (ends, face, edge) in enumerate(rows):
+        for p, ((tail, head), face, edge) in enumerate(rows):
             if edge in self.on_edge:
                 self.cut_along(p, edge)
             elif edge < 0 and face in self.in_face:
                 inside[face].append(p)
             else:
-                self.pieces.append(NewSegment(*ends, face, edge, merged.vectors[p], merged.owners[p]))
+                self.pieces.append(NewSegment(tail, head, face, edge, merged.vectors[p], merged.owners[p]))
         for face in self.cut_faces:
             self.cut_face(face, inside[face])
 
@@ -270,7 +270,7 @@ class FaceCutter:
             parents, kind="stable"
         )  # the first face of an edge remains, or one of its parts takes its place
 
-        def with_new(old: NDArray, name: str) -> NDArray:
+        def with_new(old: NDArray[Any], name: str) -> NDArray[Any]:
             return np.concatenate([old[kept], [getattr(f, name) for f in self.faces]])[order]
 
         face_edges = with_new(triangles.edges.face_edges, "edges")

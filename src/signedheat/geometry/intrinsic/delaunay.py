@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...frozen import Number
 from ..edges import EdgeTable
 from ..intrinsic_mesh import IntrinsicMesh
 from .gluing_kernels import Gluing, flip_until_delaunay
@@ -84,5 +85,5 @@ def lay_out(gluing: Gluing) -> IntrinsicMesh:
     return replace(mesh, leading_sides=leading[leading >= 0])
 
 
-def doubled(array: NDArray) -> NDArray:
+def doubled(array: NDArray[Number]) -> NDArray[Number]:
     return np.concatenate([array, np.zeros_like(array)])

@@ -71,19 +71,19 @@ class Gluing(NamedTuple):
 
 
 @kernel
-def following(h):
+def following(h: int) -> int:
     """The next halfedge around the face."""
     return h + 1 if h % 3 < 2 else h - 2
 
 
 @kernel
-def preceding(h):
+def preceding(h: int) -> int:
     """The previous halfedge around the face."""
     return h - 1 if h % 3 else h + 2
 
 
 @kernel
-def half_tangent(a, b, c):
+def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
     """Numerator and denominator of tan²(α/2), α the angle opposite to side a, without cancellation (Kahan).
 
     Their product is 16 times the squared area; lengths that violate the triangle inequality count as a flat triangle.
@@ -97,21 +97,22 @@ def half_tangent(a, b, c):
 
 
 @kernel
-def tangent_at(g, h):
+def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
     """`half_tangent` of the corner at the tail of a halfedge."""
     n = following(h)
     return half_tangent(g.length[g.edge[n]], g.length[g.edge[h]], g.length[g.edge[preceding(h)]])
 
 
 @kernel
-def is_interior(g, h):
+def is_interior(g: Gluing, h: int) -> bool:
     """Whether exactly two different faces meet at the halfedge's edge."""
-    other = g.sibling[h]
-    return other != h and g.sibling[other] == h and other // 3 != h // 3
+    other: int = g.sibling[h]
+    back: int = g.sibling[other]
+    return other != h and back == h and other // 3 != h // 3
 
 
 @kernel
-def violates_delaunay(g, h):
+def violates_delaunay(g: Gluing, h: int) -> bool:
     """Whether the two angles opposite to an interior edge sum to more than π (by more than rounding)."""
     n, d = tangent_at(g, preceding(h))
     m, e = tangent_at(g, preceding(g.sibling[h]))
@@ -119,7 +120,7 @@ def violates_delaunay(g, h):
 
 
 @kernel
-def move(g, old, new):
+def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
     """Renumber halfedges old[k] to new[k], a permutation of them, all at once; tails stay where they are."""
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
     for k in range(len(old)):
@@ -145,7 +146,7 @@ def move(g, old, new):
 
 
 @kernel
-def record(g, kind, first, second, vertex, a, b, c, d):
+def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float, b: float, c: float, d: float) -> None:
     """Write one step into the history."""
     n = g.counts[3]
     g.steps[n, 0], g.steps[n, 1], g.steps[n, 2], g.steps[n, 3] = kind, first, second, vertex
@@ -168,7 +169,7 @@ def faces_around(steps: NDArray[np.int64], n: int, around: NDArray[np.int64], st
 
 
 @kernel
-def turn_over(g, face):
+def turn_over(g: Gluing, face: int) -> None:
     """Reverse a face: corners (0, 1, 2) become (0, 2, 1)."""
     h = 3 * face
     move(g, (h, h + 2), (h + 2, h))
@@ -179,7 +180,7 @@ def turn_over(g, face):
 
 
 @kernel
-def diamond(g, h):
+def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     """The two faces at an edge unfolded into one plane: ``h: i → j`` with apex a, its twin with apex b.
 
     Returns the signed areas of jab and iab, the areas of the twin's face and of h's face, and the length of ab. The
@@ -207,7 +208,7 @@ def diamond(g, h):
 
 
 @kernel
-def flip(g, h):
+def flip(g: Gluing, h: int) -> bool:
     """Flip an interior edge, if the two faces form a strictly convex quadrilateral; returns whether it did.
 
     ``h: i → j`` with apex a and its twin ``t: j → i`` with apex b become ``h: b → a`` with apex i, ``t: a → b`` with
@@ -233,7 +234,7 @@ def flip(g, h):
 
 
 @kernel
-def flip_until_delaunay(g, stack, stacked):
+def flip_until_delaunay(g: Gluing, stack: NDArray[np.int64], stacked: NDArray[np.bool_]) -> bool:
     """Flip until every edge that is not fixed is Delaunay; returns False if the history is full before that.
 
     `stack` holds the edges still to be checked, `counts[4]` of them; `stacked` marks them.
@@ -257,7 +258,7 @@ def flip_until_delaunay(g, stack, stacked):
 
 
 @kernel
-def look_at(g, stack, stacked, e):
+def look_at(g: Gluing, stack: NDArray[np.int64], stacked: NDArray[np.bool_], e: int) -> None:
     """Push an edge on the stack of edges to be checked."""
     if not stacked[e]:
         stack[g.counts[4]] = e
@@ -266,16 +267,16 @@ def look_at(g, stack, stacked, e):
 
 
 @kernel
-def new_edge(g, length, fixed):
+def new_edge(g: Gluing, length: float, fixed: bool) -> int:
     """Add an edge."""
-    e = g.counts[1]
+    e: int = g.counts[1]
     g.counts[1] = e + 1
     g.length[e], g.fixed[e], g.flips[e] = length, fixed, 0
     return e
 
 
 @kernel
-def apex_position(g, h):
+def apex_position(g: Gluing, h: int) -> tuple[float, float]:
     """(x, y) of the face's third corner, with the halfedge along the positive x axis from the origin; y ≥ 0."""
     base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
     n, d = half_tangent(right, base, left)
@@ -283,12 +284,14 @@ def apex_position(g, h):
 
 
 @kernel
-def split_face(g, f, u, v, w):
+def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     """Insert a vertex into a face at barycentric coordinates (u, v, w); returns the vertex.
 
     Face (a, b, c) becomes (a, b, x) and two new faces (b, c, x) and (c, a, x).
     """
-    h, x, n = 3 * f, g.counts[2], g.counts[0]
+    h = 3 * f
+    n: int = g.counts[0]
+    x: int = g.counts[2]
     a, b, c = g.tail[h], g.tail[h + 1], g.tail[h + 2]
     base = g.length[g.edge[h]]
     apex_x, apex_y = apex_position(g, h)
@@ -307,7 +310,7 @@ def split_face(g, f, u, v, w):
 
 
 @kernel
-def split_edge(g, h, fraction):
+def split_edge(g: Gluing, h: int, fraction: float) -> int:
     """Insert a vertex on an edge, `fraction` of the way along halfedge h, splitting all its faces; returns the vertex.
 
     Face (tail, head, apex) becomes (tail, x, apex) and a new face (x, head, apex). No face may have the edge twice.
@@ -319,7 +322,8 @@ def split_edge(g, h, fraction):
     for k in range(count):
         around[k] = y
         y = g.sibling[y]
-    e, x = g.edge[h], g.counts[2]
+    e: int = g.edge[h]
+    x: int = g.counts[2]
     g.counts[2] = x + 1
     along = fraction if g.forward[h] else 1.0 - fraction
     whole = g.length[e]
@@ -350,7 +354,7 @@ def split_edge(g, h, fraction):
 
 
 @kernel
-def sibling_count(g, h):
+def sibling_count(g: Gluing, h: int) -> int:
     """Number of halfedges of an edge."""
     count, y = 1, g.sibling[h]
     while y != h:
@@ -360,7 +364,7 @@ def sibling_count(g, h):
 
 
 @kernel
-def pair(g, h, tail, t, head, e):
+def pair(g: Gluing, h: int, tail: int, t: int, head: int, e: int) -> None:
     """Glue two halfedges into a new edge."""
     g.tail[h], g.edge[h], g.forward[h], g.front[h], g.sibling[h] = tail, e, True, True, t
     g.tail[t], g.edge[t], g.forward[t], g.front[t], g.sibling[t] = head, e, False, False, h

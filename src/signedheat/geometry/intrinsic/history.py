@@ -112,7 +112,7 @@ def copied(
     return np.array(faces, dtype=np.int64), np.array(barycentric, dtype=np.float64), vectors
 
 
-def edge_middles(triangles: IntrinsicMesh) -> tuple[NDArray, NDArray, NDArray]:
+def edge_middles(triangles: IntrinsicMesh) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Faces and barycentric coordinates of the edges' middle points, and (e, 1, 3) vectors from tail to head."""
     side = triangles.first_halfedges
     faces, k, rows = side // 3, side % 3, np.arange(len(side))

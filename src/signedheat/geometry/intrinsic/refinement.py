@@ -106,7 +106,8 @@ def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
     group = agenda.group[gluing.tail[: 3 * n_faces]].reshape(-1, 3)
     side = lengths.argmin(axis=1)
     one, other = group[faces, side], group[faces, (side + 1) % 3]
-    return (one >= 0) & (one == other) & (lengths[faces, side] <= agenda.extent[one])
+    result: NDArray[np.bool_] = (one >= 0) & (one == other) & (lengths[faces, side] <= agenda.extent[one])
+    return result
 
 
 def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .circumcenter_kernels import BLOCKED, LOST, cross, encroached, find_circumcenter
 from .coincidence_kernels import NEARNESS
 from .gluing_kernels import (
+    Gluing,
     apex_position,
     faces_around,
     flip_until_delaunay,
@@ -74,16 +75,16 @@ class Goal(NamedTuple):
 
 
 @kernel
-def refine(g, agenda, goal, patience):
+def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
     """Insert vertices until every face meets the goal, where possible; pause after `patience` of them."""
     pause = g.counts[2] + patience
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):
         for n in range(agenda.seen[0], g.counts[3]):
             faces_around(g.steps, n, around, start)
-            for f in around:
-                if f >= 0:
-                    list_face(g, agenda, f, goal)
+            for k in range(3):
+                if around[k] >= 0:
+                    list_face(g, agenda, around[k], goal)
         agenda.seen[0] = g.counts[3]
         f = next_bad(g, agenda, goal)
         if f < 0:
@@ -100,7 +101,7 @@ def refine(g, agenda, goal, patience):
 
 
 @kernel
-def is_bad(g, f, goal):
+def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
     """Whether a face is too thin (its smallest angle is opposite to its shortest side) or too large; and that side."""
     h = 3 * f
     for k in range(1, 3):
@@ -111,7 +112,7 @@ def is_bad(g, f, goal):
 
 
 @kernel
-def list_face(g, agenda, f, goal):
+def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
     """Put a face on the lists, if it is bad."""
     bad, h = is_bad(g, f, goal)
     if agenda.listed[f] or not bad:
@@ -125,18 +126,18 @@ def list_face(g, agenda, f, goal):
 
 
 @kernel
-def list_all(g, agenda, goal):
+def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
     """Put every bad face on the lists."""
     for f in range(g.counts[0]):
         list_face(g, agenda, f, goal)
 
 
 @kernel
-def next_bad(g, agenda, goal):
+def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
     """The bad face of (nearly) the largest circumradius, or −1."""
     for place in range(N_BINS - 1, -1, -1):
         while agenda.bins[place] >= 0:
-            f = agenda.bins[place]
+            f: int = agenda.bins[place]
             agenda.bins[place] = agenda.next_face[f]
             agenda.listed[f] = False
             agenda.seen[1] = place
@@ -146,7 +147,7 @@ def next_bad(g, agenda, goal):
 
 
 @kernel
-def improve(g, agenda, f, goal):
+def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     """Insert one vertex to remove a bad face, where possible; returns False if the arrays have no room for it.
 
     A face at vertices that nearly coincide is left as it is, unless an angle above 150° makes its circumcircle large
@@ -172,7 +173,7 @@ def improve(g, agenda, f, goal):
 
 
 @kernel
-def too_near(g, h, f, px, py):
+def too_near(g: Gluing, h: int, f: int, px: float, py: float) -> bool:
     """Whether p, the circumcentre of the face with shortest side h in the frame of face f, is too near a corner of f.
 
     In a Delaunay triangulation no vertex is nearer than the circumradius. Where rounding has made one so, the face is
@@ -186,14 +187,16 @@ def too_near(g, h, f, px, py):
 
 
 @kernel
-def coincide(g, agenda, h):
+def coincide(g: Gluing, agenda: Agenda, h: int) -> bool:
     """Whether the two ends of a halfedge nearly coincide."""
-    group = agenda.group[g.tail[h]]
-    return group >= 0 and group == agenda.group[g.tail[following(h)]] and g.length[g.edge[h]] <= agenda.extent[group]
+    group: int = agenda.group[g.tail[h]]
+    other: int = agenda.group[g.tail[following(h)]]
+    is_short: bool = g.length[g.edge[h]] <= agenda.extent[group]
+    return group >= 0 and group == other and is_short
 
 
 @kernel
-def is_cap(g, agenda, f):
+def is_cap(g: Gluing, agenda: Agenda, f: int) -> bool:
     """Whether an angle of the face exceeds 150°, opposite to a side whose ends do not nearly coincide."""
     for h in range(3 * f, 3 * f + 3):
         n, d = tangent_at(g, preceding(h))
@@ -203,7 +206,7 @@ def is_cap(g, agenda, f):
 
 
 @kernel
-def is_hopeless(g, agenda, h):
+def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
     """Whether the small angle opposite to h cannot be avoided: it is given by the surface or by its segments."""
     corner = preceding(h)
     if agenda.narrow[g.tail[corner]] and sector(g, corner) < NARROW:
@@ -220,10 +223,10 @@ def is_hopeless(g, agenda, h):
 
 
 @kernel
-def sector(g, corner):
+def sector(g: Gluing, corner: int) -> float:
     """Angle around the tail of a halfedge between two segments, or the total angle; counted up to π."""
     n, d = tangent_at(g, corner)
-    total = 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
+    total: float = 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
     for side in range(2):
         c, h = corner, (corner if side == 0 else preceding(corner))
         while not g.fixed[g.edge[h]] and total < np.pi:
@@ -238,7 +241,7 @@ def sector(g, corner):
 
 
 @kernel
-def narrow_vertices(g):
+def narrow_vertices(g: Gluing) -> NDArray[np.bool_]:
     """(n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
     narrow = np.zeros(g.counts[2], dtype=np.bool_)
     for corner in range(3 * g.counts[0]):
@@ -248,9 +251,12 @@ def narrow_vertices(g):
 
 
 @kernel
-def has_room(g, agenda, ring):
+def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
     """Whether splitting an edge with so many faces fits into the arrays (splitting a face needs less)."""
-    faces, edges, vertices, steps = g.counts[0], g.counts[1], g.counts[2], g.counts[3]
+    faces: int = g.counts[0]
+    edges: int = g.counts[1]
+    vertices: int = g.counts[2]
+    steps: int = g.counts[3]
     return (
         3 * (faces + ring + 2) <= len(g.tail)
         and edges + ring + 4 <= len(g.length)
@@ -260,7 +266,7 @@ def has_room(g, agenda, ring):
 
 
 @kernel
-def look_around(g, agenda, step):
+def look_around(g: Gluing, agenda: Agenda, step: int) -> None:
     """Push the edges of all faces that the steps from `step` on have changed on the stack."""
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     for n in range(step, g.counts[3]):
@@ -271,7 +277,7 @@ def look_around(g, agenda, step):
 
 
 @kernel
-def insert(g, agenda, f, px, py):
+def insert(g: Gluing, agenda: Agenda, f: int, px: float, py: float) -> None:
     """Insert a vertex at p (in the frame of face f), or on the edge of the face that p nearly lies on."""
     step = g.counts[3]
     x, y = np.zeros(3), np.zeros(3)
@@ -304,7 +310,7 @@ def insert(g, agenda, f, px, py):
 
 
 @kernel
-def folded_face(g, h):
+def folded_face(g: Gluing, h: int) -> int:
     """A face that has the edge of h twice, or −1."""
     y = h
     while True:
@@ -316,7 +322,7 @@ def folded_face(g, h):
 
 
 @kernel
-def vertex_beside(g, h):
+def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
     """A vertex opposite to an edge that nearly lies on it, its height and its fraction along h; −1, 0, ½ if none."""
     nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
     while True:
@@ -330,9 +336,10 @@ def vertex_beside(g, h):
 
 
 @kernel
-def room_beside(g, h, fraction):
+def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
     """Distance of the nearest vertex opposite to an edge from the point at `fraction` along h."""
-    nearest, length, y = np.inf, g.length[g.edge[h]], h
+    nearest: float = np.inf
+    length, y = g.length[g.edge[h]], h
     while True:
         along, above = apex_position(g, y)
         here = fraction if g.forward[y] == g.forward[h] else 1.0 - fraction
@@ -343,7 +350,7 @@ def room_beside(g, h, fraction):
 
 
 @kernel
-def split_segment(g, agenda, h, f, goal):
+def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool:
     """Split a segment that keeps face f from being removed; returns False if the arrays have no room for it.
 
     The segment is split in the middle, with two exceptions: next to a vertex that nearly lies on it; and, near an end
@@ -363,12 +370,12 @@ def split_segment(g, agenda, h, f, goal):
         new = split_face(g, folded, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
         agenda.on_segment[new] = agenda.group[new] = -1
     else:
-        nearby, height, fraction = vertex_beside(g, h)
+        nearby, height, fraction = vertex_near_edge(g, h)
         at_tail, at_head = agenda.narrow[g.tail[h]], agenda.narrow[g.tail[following(h)]]
         if nearby < 0 and at_tail != at_head:
             shell = 2.0 ** np.round(np.log2(0.5 * length)) / length
             fraction = shell if at_tail else 1.0 - shell
-        if not room_beside(g, h, fraction) > 1e-13 * length:
+        if not distance_to_opposite(g, h, fraction) > 1e-13 * length:
             return True
         new = split_edge(g, h, fraction)
         agenda.on_segment[new], agenda.group[new] = segment, -1

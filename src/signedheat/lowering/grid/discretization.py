@@ -96,7 +96,7 @@ def fitting_spacing(
     """(d,) about the least spacing, in the proportions of the grid's own, at which its box fits into memory."""
     base = memory_estimate(grid, 0.0, extra)
     whole = memory_estimate(grid, per_node, extra) - base
-    spacing = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
+    spacing: NDArray[np.float64] = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
     per_node = whole / grid.n_nodes
 
     def needed() -> float:
@@ -142,7 +142,7 @@ class GridDiscretization(DiffusesEach):
 
 
 @discretize.register
-def _(domain: Grid) -> GridDiscretization:
+def _(domain: Grid) -> GridDiscretization | MaskedGridDiscretization:
     if domain.dimension > 4:
         raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}", element="domain")
     refuse_beyond_memory(domain)

@@ -113,7 +113,8 @@ class GridIntegration(SolvesEach):
         free = Levels(np.zeros_like(levels.values), levels.groups)
 
         def spread(at_samples: NDArray[np.float64]) -> NDArray[np.float64]:
-            return (rows.T @ (weights * at_samples)).reshape(self.grid.shape)
+            at_nodes: NDArray[np.float64] = rows.T @ (weights * at_samples)
+            return at_nodes.reshape(self.grid.shape)
 
         def apply(phi: NDArray[np.float64]) -> NDArray[np.float64]:
             pull = strength * deviation(rows @ phi, source, free)
@@ -124,7 +125,8 @@ class GridIntegration(SolvesEach):
 
         def precondition(residual: NDArray[np.float64]) -> NDArray[np.float64]:
             inverse = solve_poisson(residual.reshape(self.grid.shape), self.grid.spacing)
-            return (inverse + residual.mean() / constant).ravel()
+            result: NDArray[np.float64] = inverse + residual.mean() / constant
+            return result.ravel()
 
         wanted = strength * deviation(levels.values, source, free) - deviation(multipliers, source, free)
         right_hand_side = (divergence + spread(wanted)).ravel()

@@ -113,7 +113,8 @@ class MaskedGridDiscretization(DiffusesEach):
         normals = unit(source.samples.vectors * spacing)[nearest]
         along = away - np.einsum("ij,ij->i", away, normals)[:, None] * normals
         past_end = source.near_wall[nearest] & (np.linalg.norm(along, axis=1) > FACING)
-        return nodes.see(source.samples.positions[nearest]) & ~past_end
+        straight: NDArray[np.bool_] = nodes.see(source.samples.positions[nearest]) & ~past_end
+        return straight
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """X at the free nodes, which are the cells here: as it is."""
@@ -295,7 +296,7 @@ class FreeNodes:
         Within a few √t (a few nodes) of a wall, heat that the wall reflects cancels the component of the gradient that
         points into the wall.
         """
-        result = directions.copy()
+        result: NDArray[np.float64] = directions.copy()
         for axis in range(self.grid.dimension):
             for wall in (0, 1):
                 inward, sign = self.neighbors[:, 2 * axis + 1 - wall], 2 * wall - 1

@@ -81,4 +81,5 @@ class GridSource:
     def at_samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s,) node values interpolated at the samples."""
         nodes, weights = self.stencil
-        return np.einsum("ij,ij->i", values.ravel()[nodes], weights)
+        result: NDArray[np.float64] = np.einsum("ij,ij->i", values.ravel()[nodes], weights)
+        return result

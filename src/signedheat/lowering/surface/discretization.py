@@ -103,8 +103,8 @@ class SurfaceDiscretization:
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
-        groups = self.segments(sources)
-        triangles, groups = refine_to_conform(self.triangles, groups)
+        segments = self.segments(sources)
+        triangles, groups = refine_to_conform(self.triangles, segments)
         surface = self if triangles is self.triangles else self._cut_into(triangles)
         triangles, groups = nonmanifold_frames(triangles, groups)
         return surface._turned_to(triangles), groups

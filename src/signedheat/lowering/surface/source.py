@@ -263,7 +263,7 @@ def line_elements(part: CurveSegments, spacing: float) -> NDArray[np.float64]:
     """(s,) half the length of the segments that meet at each node; `spacing` at isolated points."""
     if len(part.ends) == 0:
         return np.full(len(part.nodes), spacing)
-    return 0.5 * np.bincount(part.ends.ravel(), np.repeat(part.lengths, 2), len(part.nodes))
+    return np.bincount(part.ends.ravel(), np.repeat(0.5 * part.lengths, 2), len(part.nodes)).astype(np.float64)
 
 
 def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, NDArray[np.int64]]:

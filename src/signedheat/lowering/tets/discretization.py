@@ -158,8 +158,8 @@ class TetDiscretization(DiffusesEach):
         """(m,) tets that the source reaches along a straight line."""
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
-        ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
-        return np.asarray(visible(planes, self.mesh.faces.neighbors, *ends, GRAZING * self.spacing))
+        begins, ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
+        return np.asarray(visible(planes, self.mesh.faces.neighbors, begins, ends, GRAZING * self.spacing))
 
     @cached_property
     def _laplacian(self) -> sparse.csr_matrix:

@@ -116,7 +116,7 @@ def tet_source(
         components.append(elements.components[polygons.parents] + n_components)
         n_components = int(components[-1].max()) + 1
     time = diffusion * spacing**2
-    loads = sum(_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts)
+    loads = np.sum([_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts], axis=0)
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
         raise SourceError(
             "the normals of the source cancel each other everywhere",
@@ -218,7 +218,10 @@ def _patches(
 
 
 def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> NDArray[np.float64]:
-    return np.einsum("pk,pki->pi", polygons.barycentric, mesh.vertices[mesh.tets[polygons.tets]])
+    centers: NDArray[np.float64] = np.einsum(
+        "pk,pki->pi", polygons.barycentric, mesh.vertices[mesh.tets[polygons.tets]]
+    )
+    return centers
 
 
 def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -149,7 +149,7 @@ def seed_edge_ends(
     nearest: NDArray[np.int32],
     squares: NDArray[np.float32],
     edges: NDArray[np.int32],
-    points: NDArray[np.float64],
+    points: NDArray[np.float32],
     steps: NDArray[np.float64],
     first: int,
 ) -> None:
@@ -172,7 +172,7 @@ def seed_edge_ends(
 def nearest_tiles(
     nearest: NDArray[np.int32],
     squares: NDArray[np.float32],
-    points: NDArray[np.float64],
+    points: NDArray[np.float32],
     steps: NDArray[np.float64],
     tiles: NDArray[np.int64],
 ) -> None:

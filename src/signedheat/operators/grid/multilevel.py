@@ -202,7 +202,8 @@ def _coarser(shape: tuple[int, ...], steps: NDArray[np.float64]) -> tuple[tuple[
 
 
 def _carried(level: Level, shape: tuple[int, ...], power: float) -> CoarseGuess | None:
-    """The values of a level, for the next coarser one: in stretches of which all nodes are known."""
+    """The values of a level, for the next coarser one: in stretches of which all nodes have a value."""
+    assert level.vectors is not None and level.inside is not None
     vectors = untouched_zeros((*shape, 4), np.float32)
     counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
     _carry(level.vectors, level.inside, level.factors, np.float32(power), vectors, counts)
