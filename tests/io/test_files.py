@@ -275,6 +275,14 @@ def test_parsers_of_others_are_stopped():
     assert steps == before
 
 
+@pytest.mark.parametrize("name", ["tets.mesh", "lines.svg"])
+def test_a_file_on_which_a_parser_takes_too_long_is_refused(tmp_path, monkeypatch, name):
+    monkeypatch.setattr(files, "run_limited", lambda job, seconds: run_limited(lambda: time.sleep(0.2), 0.01))
+    (tmp_path / name).write_bytes(b"<svg/>")
+    with refused(sh.errors.FileFormatError, file=name):
+        (sh.io.read_polylines if name.endswith(".svg") else sh.read)(tmp_path / name)
+
+
 def test_concurrent_writers_of_one_file(tmp_path):
     path = tmp_path / "ball.ply"
     shapes = [samples.sphere(n) for n in (1, 2)]

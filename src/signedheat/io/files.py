@@ -37,7 +37,7 @@ TAKEN = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
 where files may hold more than positions and faces. Of other formats more is known once they are read in part."""
 NEEDED = {".nrrd": ("nrrd", "NRRD files"), ".vtkhdf": ("h5py", "VTKHDF files")}
 """Packages by which formats are written."""
-READERS = f"{__package__}.", f"{PACKAGE}parallel", f"{PACKAGE}packages"
+READERS = f"{__package__}.", run_limited.__module__, f"{PACKAGE}packages"
 """Modules that read, and those by which they call parsers of other packages."""
 
 
