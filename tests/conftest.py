@@ -29,9 +29,7 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as shells leave it to w
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile all kernels before workers begin, each of which would compile them, if none has been compiled yet."""
-    from signedheat.compiled import cache_folder
-
+    """Compile all kernels before workers begin, each of which would compile them; 3 s where all are compiled."""
     is_worker = hasattr(session.config, "workerinput")
-    if not is_worker and session.config.getoption("numprocesses", None) and not cache_folder().exists():
+    if not is_worker and session.config.getoption("numprocesses", None):
         subprocess.run([sys.executable, "-m", "signedheat", "warmup", "--quiet"], check=False)
