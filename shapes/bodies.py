@@ -1,4 +1,4 @@
-"""Boxes and sheets of few faces, and shapes turned inside out."""
+"""Boxes, distance to them, sheets of few faces, and shapes turned inside out."""
 
 import numpy as np
 
@@ -16,6 +16,13 @@ def box(lower, upper):
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     faces = [[q[0], q[k], q[k + 1]] for q in quads for k in (1, 2)]
     return TriangleMesh(lower + corners * (np.asarray(upper) - lower), faces)
+
+
+def distance_to_box(points, lower, upper):
+    """Signed distance to the box between two corners, in any dimension."""
+    lower, upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    beyond = np.maximum(lower - points, points - upper)
+    return np.linalg.norm(np.maximum(beyond, 0), axis=-1) + np.minimum(beyond.max(axis=-1), 0)
 
 
 def sheet(corners):

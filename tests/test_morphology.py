@@ -8,7 +8,8 @@ import scipy
 
 import signedheat as sh
 from refusals import refused
-from shapes.bodies import box
+from shapes.bodies import box, distance_to_box
+from shapes.grid_cases import assert_closed_manifold, enclosed_volume
 from signedheat import memory, samples
 from signedheat.cli import main
 from signedheat.geometry.self_intersections import self_intersections
@@ -20,23 +21,11 @@ def radii(mesh):
     return np.linalg.norm(mesh.vertices, axis=1)
 
 
-def volume(mesh):
-    corners = mesh.vertices[mesh.faces]
-    return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6)
-
-
-def is_closed_and_manifold(mesh):
-    return mesh.to_trimesh().is_watertight and (mesh.edges.face_counts == 2).all()
-
-
 def box_with_arms():
     grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=96, padding=0.1)
 
-    def box(sides):
-        beyond = np.abs(grid.points) - np.array(sides) / 2
-        return np.linalg.norm(np.maximum(beyond, 0), axis=-1) + np.minimum(beyond.max(axis=-1), 0)
-
-    return sh.GridField(grid, np.minimum(box((1, 1, 1)), box((3, 0.2, 0.2)))).contour(0.0)
+    arms = [distance_to_box(grid.points, -half, half) for half in np.array([[0.5, 0.5, 0.5], [1.5, 0.1, 0.1]])]
+    return sh.GridField(grid, np.minimum(*arms)).contour(0.0)
 
 
 def waved_sheet(n=20):
@@ -53,15 +42,15 @@ def waved_sheet(n=20):
 )
 def test_balls_stay_balls(operation, radius):
     ball = operation(BALL, 0.4, resolution=64)
-    assert is_closed_and_manifold(ball)
+    assert_closed_manifold(ball)
     np.testing.assert_allclose(radii(ball), radius, atol=0.005)
-    assert volume(ball) > 0
+    assert enclosed_volume(ball) > 0
 
 
 def test_a_broken_ball_grows_as_if_it_were_whole():
     broken = samples.with_flipped_faces(samples.without_patches(BALL, 4, 0.35), 0.05)
     grown = sh.morphology.dilate(broken, 0.3, resolution=64)
-    assert is_closed_and_manifold(grown)
+    assert_closed_manifold(grown)
     # Holes of angular radius 0.35 leave 1 − cos 0.35 = 0.06 open to interpretation.
     assert np.quantile(np.abs(radii(grown) - 1.3), 0.99) < 0.06
     np.testing.assert_allclose(radii(grown), 1.3, atol=0.1)
@@ -85,21 +74,21 @@ def test_opening_takes_thin_arms_off():
 def test_a_sheet_gains_twice_its_area_times_the_distance(sides):
     sheet = waved_sheet()
     solid = sh.morphology.thicken(sheet, *sides, resolution=96)
-    assert is_closed_and_manifold(solid)
+    assert_closed_manifold(solid)
     above, below = sides if len(sides) == 2 else 2 * sides
     reach, rim = max(above, below), 8.2
     flat = (above + below) * sheet.face_areas.sum()
     # Rounded ends add at most half a disk along the rim.
-    assert flat * 0.97 < volume(solid) < flat * 1.03 + 0.5 * np.pi * reach**2 * rim
+    assert flat * 0.97 < enclosed_volume(solid) < flat * 1.03 + 0.5 * np.pi * reach**2 * rim
 
 
 def test_a_triangle_is_thickened_to_its_exact_distance():
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     solid = sh.morphology.thicken(sh.TriangleMesh(corners, [[0, 1, 2]]), 0.3, resolution=96)
-    assert is_closed_and_manifold(solid)
+    assert_closed_manifold(solid)
     prism, slant = 2 * 0.3 * 0.5, np.sqrt(2.0)
     rounded = 0.5 * np.pi * 0.3**2 * (2 + slant) + 4 / 3 * np.pi * 0.3**3
-    assert volume(solid) == pytest.approx(prism + rounded, rel=2e-3)
+    assert enclosed_volume(solid) == pytest.approx(prism + rounded, rel=2e-3)
 
 
 def test_thickening_beyond_memory_is_refused(monkeypatch):
@@ -120,8 +109,8 @@ def test_thickening_evenly_does_not_ask_which_side_is_which():
 
 def test_a_shell_lies_between_two_offsets():
     wall = sh.morphology.shell(BALL, 0.0, 0.2, resolution=64)
-    assert is_closed_and_manifold(wall)
-    assert volume(wall) == pytest.approx(4 / 3 * np.pi * (1.2**3 - 1), rel=0.01)
+    assert_closed_manifold(wall)
+    assert enclosed_volume(wall) == pytest.approx(4 / 3 * np.pi * (1.2**3 - 1), rel=0.01)
     assert radii(wall).min() == pytest.approx(1.0, abs=0.005)
     assert radii(wall).max() == pytest.approx(1.2, abs=0.005)
 
@@ -170,7 +159,7 @@ def test_the_command_writes_a_closed_surface(tmp_path, capsys):
     source, target = tmp_path / "ball.stl", tmp_path / "out.stl"
     sh.save(BALL, source)
     assert main(["morph", "shell", str(source), "-0.2", "0.1", "-o", str(target), "--resolution", "40"]) == 0
-    assert is_closed_and_manifold(sh.read(target))
+    assert_closed_manifold(sh.read(target))
     assert main(["morph", "shell", str(source), "0.1", "-o", str(target)]) == 2
     assert main(["morph", "erode", str(source), "3", "-o", str(target), "--resolution", "32"]) == 1
     assert str(source) in capsys.readouterr().err
@@ -199,12 +188,12 @@ def test_mitred_boxes_stay_boxes():
     for corners in ("mitre", "sharp"):
         for distance in (0.1, -0.1):
             made = sh.offset(shape, distance, corners=corners, resolution=48)
-            assert is_closed_and_manifold(made)
+            assert_closed_manifold(made)
             assert not len(self_intersections(made.vertices, made.faces))
-            assert volume(made) == pytest.approx(np.prod(np.array([2.0, 1.3, 0.5]) + 2 * distance), rel=1e-3)
+            assert enclosed_volume(made) == pytest.approx(np.prod(np.array([2.0, 1.3, 0.5]) + 2 * distance), rel=1e-3)
     a, b, c, d = 2.0, 1.3, 0.5, 0.1
     steiner = a * b * c + 2 * d * (a * b + b * c + c * a) + np.pi * d**2 * (a + b + c) + 4 / 3 * np.pi * d**3
-    assert volume(sh.offset(shape, 0.1, resolution=48)) == pytest.approx(steiner, rel=3e-3)
+    assert enclosed_volume(sh.offset(shape, 0.1, resolution=48)) == pytest.approx(steiner, rel=3e-3)
 
 
 @pytest.mark.parametrize(
@@ -227,15 +216,15 @@ def test_reflex_edges_are_mitred_inside():
     )
     turn = scipy.spatial.transform.Rotation.random(random_state=5).as_matrix()
     made = sh.offset(moved(sh.TriangleMesh(points, faces), turn), -0.2, corners="mitre", resolution=64)
-    assert is_closed_and_manifold(made)
-    assert volume(made) == pytest.approx(0.6 * (1.6 * 0.6 + 1.0 * 0.6), rel=2e-3)
+    assert_closed_manifold(made)
+    assert enclosed_volume(made) == pytest.approx(0.6 * (1.6 * 0.6 + 1.0 * 0.6), rel=2e-3)
 
 
 def test_distances_may_vary():
     slope = sh.offset(BALL, lambda places: 0.2 + 0.1 * places[:, 2], resolution=48)
     same = sh.offset(BALL, 0.2 + 0.1 * BALL.vertices[:, 2], resolution=48)
     for made in (slope, same):
-        assert is_closed_and_manifold(made)
+        assert_closed_manifold(made)
         assert not len(self_intersections(made.vertices, made.faces))
         lengths = radii(made)
         np.testing.assert_allclose(lengths, 1.2 + 0.1 * made.vertices[:, 2] / lengths, atol=3e-3)
@@ -248,7 +237,7 @@ def test_offsets_do_not_depend_on_scale():
     volumes = []
     for scale in (1e-6, 1.0, 1e6):
         shape = moved(turned_box(), scale * np.eye(3))
-        volumes.append(volume(sh.offset(shape, 0.1 * scale, corners="mitre", resolution=30)) / scale**3)
+        volumes.append(enclosed_volume(sh.offset(shape, 0.1 * scale, corners="mitre", resolution=30)) / scale**3)
     np.testing.assert_allclose(volumes, 2.2 * 1.5 * 0.7, rtol=3e-3)  # some edges are cut off at so few nodes
     np.testing.assert_allclose(volumes, volumes[1], rtol=4e-4)  # where they are cut off depends on rounding
 
@@ -256,17 +245,17 @@ def test_offsets_do_not_depend_on_scale():
 def test_a_wall_may_keep_the_faces_outside_and_have_a_drain():
     shape = turned_box((-1.0, -0.7, -0.5), (1.0, 0.6, 0.3))
     wall = sh.morphology.shell(shape, -0.1, 0.0, resolution=48, keep_outside=True)
-    assert is_closed_and_manifold(wall)
+    assert_closed_manifold(wall)
     given = {tuple(corner) for corner in shape.vertices}
     assert given <= {tuple(corner) for corner in wall.vertices}
     whole = 2 * 1.3 * 0.8 - 1.8 * 1.1 * 0.6
-    assert volume(wall) == pytest.approx(whole, rel=1e-3)
+    assert enclosed_volume(wall) == pytest.approx(whole, rel=1e-3)
     level = box((-1.0, -0.7, -0.5), (1.0, 0.6, 0.3))
     for keep in (True, False):
         drained = sh.morphology.shell(level, -0.1, 0.0, resolution=64, keep_outside=keep, drain=0.2)
-        assert is_closed_and_manifold(drained)
+        assert_closed_manifold(drained)
         assert drained.to_trimesh().euler_number == 2  # outside and inside are one surface now
-        assert volume(drained) == pytest.approx(whole - np.pi * 0.1**2 * 0.1, rel=1e-4 if keep else 6e-3)
+        assert enclosed_volume(drained) == pytest.approx(whole - np.pi * 0.1**2 * 0.1, rel=1e-4 if keep else 6e-3)
 
 
 @pytest.mark.parametrize("keep", [True, False])

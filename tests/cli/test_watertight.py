@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from shapes.bodies import box, sheet
+from shapes.bodies import box, distance_to_box, sheet
 from shapes.grid_cases import assert_closed_manifold
 from signedheat import samples
 from signedheat.cli import main
@@ -76,8 +76,7 @@ def test_samples_for_trainers(tmp_path, folder, capsys):
             assert ((ahead | behind).sum(axis=1) >= fixed).all()
             np.testing.assert_allclose(normals * length, ahead.astype(float) - behind, atol=1e-6)
         for name in ("vol", "random_near", "sharp_near"):
-            beyond = np.maximum(low - around[f"{name}_points"], around[f"{name}_points"] - high)
-            expected = np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+            expected = distance_to_box(around[f"{name}_points"], low, high)
             np.testing.assert_allclose(around[f"{name}_label"], expected, atol=1e-6)
     figures(tmp_path, capsys, folder / "plank.ply", "--sample", "300", "--normalize")
     with np.load(tmp_path / "out" / "plank_surface.npz") as on:

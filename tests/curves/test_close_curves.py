@@ -7,15 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import signedheat as sh
+from shapes.bodies import box
 from shapes.surface_cases import sphere
 from signedheat.geometry.surface_points import VERTEX
-
-
-def box() -> sh.TriangleMesh:
-    """A box of twelve triangles, as CAD makes it."""
-    vertices = [[x, y, z] for x in (0, 6) for y in (0, 4) for z in (0, 1)]
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return sh.TriangleMesh(vertices, [face for a, b, c, d in quads for face in ([a, b, c], [a, c, d])])
 
 
 def circle(radius: float, begin: float = 0.0, end: float = 2 * np.pi, n: int = 40) -> np.ndarray:
@@ -25,7 +19,7 @@ def circle(radius: float, begin: float = 0.0, end: float = 2 * np.pi, n: int = 4
 
 @pytest.mark.parametrize("radius", [0.3, 1.2])
 def test_closed_curves_smaller_than_the_triangles_come_back(radius):
-    mesh = box()
+    mesh = box((0, 0, 0), (6, 4, 1))
     found = sh.close_curves(mesh, mesh.polyline(circle(radius), closed=True))
     assert len(found) == 1 and found[0].closed
     places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
@@ -33,7 +27,7 @@ def test_closed_curves_smaller_than_the_triangles_come_back(radius):
 
 
 def test_a_gap_is_closed():
-    mesh = box()
+    mesh = box((0, 0, 0), (6, 4, 1))
     found = sh.close_curves(mesh, mesh.polyline(circle(1.2, 0.4, 6.0)))
     assert len(found) == 1 and found[0].closed
     places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
@@ -42,7 +36,7 @@ def test_a_gap_is_closed():
 
 def test_the_finer_solution_is_used():
     """Values at points and contours come from the refined triangles, until the values change."""
-    mesh = box()
+    mesh = box((0, 0, 0), (6, 4, 1))
     phi = sh.SignedHeatSolver(mesh, intrinsic=True).distance(mesh.polyline(circle(0.8), closed=True))
     assert phi.finest.domain.n_vertices > 50
     assert phi([[3.4, 1.9, 1.0]])[0] > 0.3
@@ -55,7 +49,7 @@ def test_the_finer_solution_is_used():
 @pytest.mark.parametrize("seed", [2, 3])
 def test_gaps_of_curves_far_smaller_than_the_triangles_are_closed(radius, seed):
     """Of 28 points on a circle, in uneven steps, pieces of five are left: completed beside the circle."""
-    mesh, center = box(), np.array([3.4, 1.9, 1.0])
+    mesh, center = box((0, 0, 0), (6, 4, 1)), np.array([3.4, 1.9, 1.0])
     angle = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, 28))
     ring = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + center
     found = sh.close_curves(mesh, [mesh.polyline(ring[7 * k : 7 * k + 5]) for k in range(4)])

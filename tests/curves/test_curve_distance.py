@@ -7,6 +7,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import box
 from shapes.domain_cases import ball, error, globe, sphere_points
 from shapes.surface_cases import book
 from shapes.surfaces import disk
@@ -70,9 +71,7 @@ def test_loops_inside_single_faces(as_oriented):
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_pieces_of_curves_smaller_than_the_triangles_are_completed(radius, seed):
     """Five of every seven points on a circle, in uneven steps, on a cube of twelve triangles: as the whole, all but."""
-    corners = np.array([[x, y, z] for x in (-2, 2) for y in (-2, 2) for z in (-2, 2)])
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    cube = sh.TriangleMesh(corners, [face for a, b, c, d in quads for face in ([a, b, c], [a, c, d])])
+    cube = box([-2] * 3, [2] * 3)
     angle = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, 28))
     ring = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + [0.4, -0.1, 2]
     whole = sh.signed_distance(cube.polyline(ring, closed=True), cube).values

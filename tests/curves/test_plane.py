@@ -5,14 +5,10 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import distance_to_box
 from signedheat import samples
 
 SQUARE = np.array([[-1.0, -1], [-1, 1], [1, 1], [1, -1]])
-
-
-def distance_to_square(points):
-    beyond = np.abs(points) - 1
-    return np.linalg.norm(np.maximum(beyond, 0), axis=-1) + np.minimum(beyond.max(axis=-1), 0)
 
 
 def sides(gap):
@@ -25,7 +21,7 @@ def sides(gap):
 def test_a_whole_drawing_is_exact(resolution):
     square = sh.Polyline(SQUARE, closed=True)
     field = sh.signed_distance(square, resolution=resolution)
-    np.testing.assert_allclose(field.values, distance_to_square(field.grid.points), atol=1e-12)
+    np.testing.assert_allclose(field.values, distance_to_box(field.grid.points, (-1, -1), (1, 1)), atol=1e-12)
     back = sh.signed_distance(sh.Polyline(SQUARE[::-1], closed=True), field.grid)
     away = np.abs(field.values) > 1e-9
     np.testing.assert_allclose(back.values[away], -field.values[away], atol=1e-12)
@@ -33,7 +29,7 @@ def test_a_whole_drawing_is_exact(resolution):
 
 def test_a_drawing_with_gaps_is_exact_where_it_is_there():
     field = sh.signed_distance(sides(0.1), resolution=97)
-    exact, points = distance_to_square(field.grid.points), field.grid.points
+    exact, points = distance_to_box(field.grid.points, (-1, -1), (1, 1)), field.grid.points
     beside = (np.abs(points).min(axis=-1) < 0.5) & (np.abs(exact) < 0.4)
     np.testing.assert_allclose(field.values[beside], exact[beside], atol=1e-12)
     assert np.abs(field.values - exact).max() < 0.2  # corners are cut off by less than the gaps

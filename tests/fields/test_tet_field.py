@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import trimesh
 
 import signedheat as sh
 from refusals import refused
+from shapes.grid_cases import assert_closed_manifold, enclosed_volume
 from shapes.tet_cases import boxes, lattice, rectangle, rms, sphere
 
 
@@ -16,27 +16,6 @@ def ball():
     """Exact distance from the unit sphere at the vertices of a lattice."""
     mesh = lattice(10)
     return sh.TetField(mesh, np.linalg.norm(mesh.vertices, axis=1) - 1)
-
-
-def is_closed_manifold(mesh: sh.TriangleMesh) -> bool:
-    """Every edge in two faces that run along it in opposite directions, and one fan of faces at every vertex."""
-    surface = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    corners = mesh.faces.ravel()
-    after, before = np.roll(mesh.faces, -1, axis=1).ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
-    links: dict[int, dict[int, int]] = {}
-    for v, a, b in zip(corners.tolist(), after.tolist(), before.tolist(), strict=True):
-        if a in links.setdefault(v, {}):
-            return False
-        links[v][a] = b
-    for fan in links.values():
-        start = next(iter(fan))
-        seen, at = {start}, fan[start]
-        while at not in seen and at >= 0:
-            seen.add(at)
-            at = fan.get(at, -1)
-        if len(seen) != len(fan):
-            return False
-    return surface.is_watertight and surface.is_winding_consistent
 
 
 def test_interpolation_is_linear_inside_and_straight_outside():
@@ -57,8 +36,8 @@ def test_interpolation_is_linear_inside_and_straight_outside():
 def test_level_sets_are_closed_manifold_and_face_outward(ball):
     for level, radius in ((0.0, 1.0), (-0.4, 0.6), (0.3, 1.3)):
         surface = ball.contour(level)
-        assert is_closed_manifold(surface)
-        assert trimesh.Trimesh(surface.vertices, surface.faces).volume == pytest.approx(4.19 * radius**3, rel=0.1)
+        assert_closed_manifold(surface)
+        assert enclosed_volume(surface) == pytest.approx(4.19 * radius**3, rel=0.1)
     with refused(sh.errors.OutsideError, "level 9"):
         ball.contour(9.0)
     with refused(sh.errors.OutsideError):
@@ -70,14 +49,14 @@ def test_level_sets_of_anything_are_closed_manifold(ball):
     mesh = ball.mesh
     rng = np.random.default_rng(4)
     for values in (rng.normal(size=mesh.n_vertices), rng.integers(-1, 2, mesh.n_vertices) * 1.0, mesh.vertices[:, 0]):
-        assert is_closed_manifold(sh.TetField(mesh, values).contour(0.0))
+        assert_closed_manifold(sh.TetField(mesh, values).contour(0.0))
 
 
 def test_level_sets_at_edges_without_faces_between_are_manifold():
     tets = [[0, 1, 2, 3], [0, 1, 4, 5]]
     mesh = sh.TetMesh([[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], tets)
     surface = sh.TetField(mesh, [-1.0, -1.0, 1.0, 1.0, 1.0, 1.0]).contour()
-    assert is_closed_manifold(surface)
+    assert_closed_manifold(surface)
 
 
 @pytest.mark.parametrize("ending", [".mesh", ".meshb", ".msh", ".vtu", ".vtk", ".ele", ".node"])
@@ -180,7 +159,7 @@ def test_a_broken_shape_is_completed():
     exact = np.linalg.norm(phi.mesh.vertices, axis=1) - 1
     assert rms(phi.values - exact) < 0.02
     surface = phi.contour()
-    assert is_closed_manifold(surface)
+    assert_closed_manifold(surface)
     assert np.abs(np.linalg.norm(surface.vertices, axis=1) - 1).max() < 0.05
 
 
@@ -188,8 +167,8 @@ def test_open_level_sets_end_at_the_boundary():
     mesh = boxes((4, 4, 4), 0.5)
     phi = sh.SignedHeatSolver(mesh).distance(rectangle([0, 0, 0.8], [2, 0, 0], [0, 2, 0]))
     lid = phi.contour()
-    assert is_closed_manifold(lid)
-    assert trimesh.Trimesh(lid.vertices, lid.faces).volume == pytest.approx(4 * 0.8, rel=1e-6)
+    assert_closed_manifold(lid)
+    assert enclosed_volume(lid) == pytest.approx(4 * 0.8, rel=1e-6)
 
 
 def run(*words) -> int:

@@ -5,6 +5,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import box
 from signedheat import samples
 
 
@@ -20,14 +21,6 @@ def inverted(mesh):
 def assert_alike(found, mesh):
     """Faces are the same, and face the same ways."""
     np.testing.assert_allclose(found.face_area_vectors, mesh.face_area_vectors, atol=1e-12)
-
-
-def box(lower, upper):
-    """A box of twelve triangles, facing outwards."""
-    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=float)
-    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
-    faces = [[q[i] for i in (0, j, j + 1)] for q in quads for j in (1, 2)]
-    return sh.TriangleMesh(lower + corners * (np.asarray(upper) - lower), faces)
 
 
 def sheet(n=6, height=0.0):
@@ -383,7 +376,7 @@ def test_faces_on_each_other_make_no_complex():
 
 def test_polygons_stay_polygons():
     corners = box((0, 0, 0), (1, 2, 3)).vertices
-    quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     broken = [q[::-1] if k in (1, 4) else q for k, q in enumerate(quads)]
     found = sh.orientation(sh.PolygonMesh(corners, [*broken, quads[0]]))
     assert isinstance(found.shape, sh.PolygonMesh)

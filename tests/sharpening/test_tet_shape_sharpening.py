@@ -5,6 +5,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import box, distance_to_box
 from shapes.tet_cases import boxes, lattice, rectangle, rms, sphere
 from signedheat import samples
 from signedheat.diagnostics import FacesRestored, SharpenedToShape
@@ -12,14 +13,7 @@ from signedheat.errors import SourceError, UnsupportedTypeError
 
 
 def cube(half: float) -> sh.TriangleMesh:
-    corners = half * np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
-    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return sh.TriangleMesh(corners, [[s[0], s[k], s[k + 1]] for s in squares for k in (1, 2)])
-
-
-def distance_to_cube(points: np.ndarray, half: float) -> np.ndarray:
-    beyond = np.abs(points) - half
-    return np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+    return box([-half] * 3, [half] * 3)
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +23,7 @@ def tets() -> sh.TetMesh:
 
 def test_a_cube_is_exact_at_its_edges_too(tets):
     field = sh.SignedHeatSolver(tets).distance(cube(0.83))
-    exact = distance_to_cube(tets.vertices, 0.83)
+    exact = distance_to_box(tets.vertices, [-0.83] * 3, [0.83] * 3)
     sharp = sh.sharpen(field, cube(0.83))
     assert np.abs(sharp.values - exact).max() < 1e-12
     assert rms(sh.sharpen(field).values - exact) > 1e-3
@@ -42,7 +36,7 @@ def test_solids_on_tets_are_measured_to_the_shape(tets):
     shape = cube(0.83)
     turned = np.where(np.isin(np.arange(12), [2, 5, 6])[:, None], shape.faces[:, ::-1], shape.faces)[1:]
     field = sh.signed_distance(sh.TriangleMesh(shape.vertices, turned), tets)
-    assert np.abs(field.values - distance_to_cube(tets.vertices, 0.83)).max() < 1e-12
+    assert np.abs(field.values - distance_to_box(tets.vertices, [-0.83] * 3, [0.83] * 3)).max() < 1e-12
     assert field.diagnostics.note(FacesRestored).restored_faces == 1
 
 
@@ -72,11 +66,9 @@ def test_lines_bend_round_the_corners_of_the_mesh():
 
 
 def test_a_plate_thinner_than_a_tet_keeps_its_sides(tets):
-    plate = sh.TriangleMesh(cube(1.0).vertices * [1.0, 1.0, 0.01], cube(1.0).faces)
-    field = sh.signed_distance(plate, tets)
-    points = tets.vertices
-    beyond = np.abs(points) - [1.0, 1.0, 0.01]
-    exact = np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
+    corner = np.array([1.0, 1.0, 0.01])
+    field = sh.signed_distance(box(-corner, corner), tets)
+    exact = distance_to_box(tets.vertices, -corner, corner)
     assert np.abs(field.values - exact).max() < 1e-9
 
 

@@ -5,6 +5,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes import bodies
 from signedheat import samples
 from signedheat.solids.sampling import WIDTHS
 
@@ -12,18 +13,15 @@ from signedheat.solids.sampling import WIDTHS
 @pytest.fixture(scope="module")
 def box():
     """A cuboid of 1 × 2 × 3, away from the origin, turned by nothing: its distance has a closed form."""
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    mesh = sh.PolygonMesh(CORNER + corners * SIZE, quads)
+    mesh = bodies.box(CORNER, CORNER + SIZE)
     return sh.signed_distance(mesh, resolution=32)
 
 
 CORNER, SIZE = np.array([5.0, -3.0, 1.0]), np.array([1.0, 2.0, 3.0])
 
 
-def box_distance(points):
-    away = np.abs(points - (CORNER + SIZE / 2)) - SIZE / 2
-    return np.linalg.norm(np.maximum(away, 0), axis=1) + np.minimum(away.max(axis=1), 0)
+def exact_distance(points):
+    return bodies.distance_to_box(points, CORNER, CORNER + SIZE)
 
 
 @pytest.fixture(scope="module")
@@ -33,14 +31,14 @@ def holed():
 
 def test_distances_are_exact_and_gradients_theirs(box):
     taken = sh.sample(box, 20_000, near=0.5, widths=[0.2, 0.01])
-    np.testing.assert_allclose(taken.distances, box_distance(taken.points), atol=1e-12)
+    np.testing.assert_allclose(taken.distances, exact_distance(taken.points), atol=1e-12)
     assert not taken.completed.any()
     np.testing.assert_allclose(np.linalg.norm(taken.gradients, axis=1), 1, atol=1e-12)
     step = 1e-5
-    smooth = np.abs(box_distance(taken.points + step) - box_distance(taken.points)) < np.inf
+    smooth = np.abs(exact_distance(taken.points + step) - exact_distance(taken.points)) < np.inf
     for axis in range(3):
         move = step * np.eye(3)[axis]
-        slope = (box_distance(taken.points + move) - box_distance(taken.points - move)) / (2 * step)
+        slope = (exact_distance(taken.points + move) - exact_distance(taken.points - move)) / (2 * step)
         smooth &= np.abs(slope - taken.gradients[:, axis]) < 1e-4
     assert smooth.mean() > 0.999  # all but what lies within a step of the medial axis
 
@@ -117,7 +115,7 @@ def test_files(tmp_path, box, layout):
     assert len(arrays["pos"]) + len(arrays["neg"]) == 3000
     rows = np.concatenate([arrays["pos"], arrays["neg"]]).astype(float)
     scale = np.linalg.norm(SIZE) / 2
-    exact = box_distance(rows[:, :3] * scale + CORNER + SIZE / 2) / scale
+    exact = exact_distance(rows[:, :3] * scale + CORNER + SIZE / 2) / scale
     np.testing.assert_allclose(rows[:, 3], exact, atol=1e-6)
 
 

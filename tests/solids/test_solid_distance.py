@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from refusals import refused
-from shapes.bodies import box, sheet, turned
+from shapes.bodies import box, distance_to_box, sheet, turned
 from signedheat import (
     Grid,
     PointCloud,
@@ -23,12 +23,7 @@ def only(mesh, chosen):
 
 def distance_to_boxes(points, boxes):
     """Exact distance to the union of boxes, outside it; a lower bound inside."""
-    found = []
-    for lower, upper in boxes:
-        lower, upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
-        away = np.abs(points - (lower + upper) / 2) - (upper - lower) / 2
-        found.append(np.linalg.norm(np.maximum(away, 0), axis=-1) + np.minimum(away.max(axis=-1), 0))
-    return np.min(found, axis=0)
+    return np.min([distance_to_box(points, *corners) for corners in boxes], axis=0)
 
 
 def error(field, truth):

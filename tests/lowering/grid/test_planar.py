@@ -8,6 +8,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import distance_to_box
 from signedheat import view
 
 
@@ -18,11 +19,6 @@ def circle(n=400, radius=1.0, center=(0.0, 0.0), part=1.0):
 
 
 SQUARE = sh.Polyline([[-1, -1], [-1, 1], [1, 1], [1, -1]], closed=True)
-
-
-def distance_to_square(points):
-    beyond = np.abs(points) - 1
-    return np.linalg.norm(np.maximum(beyond, 0), axis=-1) + np.minimum(beyond.max(axis=-1), 0)
 
 
 def away_from(field):
@@ -54,7 +50,7 @@ def test_distance_to_a_circle_converges():
 
 def test_distance_to_a_square():
     phi = sh.sharpen(sh.SignedHeatSolver(sh.Grid.around(SQUARE, 128)).distance(SQUARE))
-    error = phi.values - distance_to_square(phi.grid.points)
+    error = phi.values - distance_to_box(phi.grid.points, (-1, -1), (1, 1))
     assert rms(error) < 0.3 * phi.grid.spacing[0]
     assert np.abs(error).max() < 1.0 * phi.grid.spacing[0]
 
