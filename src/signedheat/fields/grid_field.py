@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Generic, Literal, cast, overload
+from typing import TYPE_CHECKING, Generic, Literal, cast, overload
 
 import numpy as np
 import scipy
@@ -23,7 +23,7 @@ from ..frozen import Frozen
 from ..geometry.edge_flips import flipped_along_creases
 from ..geometry.marching import closed_surface, level_lines
 from ..operators.grid.block_contours import Refine, block_contour, contour_parts
-from ..operators.grid.blocks import SIDE, Blocks
+from ..operators.grid.blocks import SIDE, Blocks, BlockValues
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from .booleans import Combinable, Rule
@@ -263,13 +263,15 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             vertices, faces = closed_surface(self.values, grid.origin, grid.spacing, level, refine)
         else:
             self._refuse_beyond_band(level)
-            vertices, faces = block_contour(self.blocks, self.values, grid.spacing, level, self._placed(refine))
+            vertices, faces = block_contour(
+                BlockValues(self.blocks, self.values), grid.spacing, level, self._placed(refine)
+            )
         return TriangleMesh(vertices, faces if refine is None else flipped_along_creases(vertices, faces))
 
     def _refined(self, level: float) -> Refine | None:
         """What moves points of a level onto it, where that is known."""
         solid = self.solid
-        values = self.values if self.blocks is None else _NodeValues(self.blocks, self.values)
+        values = self.values if self.blocks is None else BlockValues(self.blocks, self.values)
         if solid is not None:
             return lambda points: on_level(solid, points, values, self.grid, level)
         return None
@@ -330,7 +332,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         else:
             self._refuse_beyond_band(level)
             placed = self._placed(self._refined(level))
-            parts = contour_parts(self.blocks, self.values, self.grid.spacing, level, placed)
+            parts = contour_parts(BlockValues(self.blocks, self.values), self.grid.spacing, level, placed)
         counts: tuple[int, int] = ply.write_parts(parts, path)
         return counts
 
@@ -447,7 +449,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         if self.blocks is None:
             found = scipy.ndimage.map_coordinates(self.confidence, index.T, np.float32, order=1, mode="nearest")
         else:
-            found = self.blocks.interpolated(self.confidence.astype(np.float32), index)
+            found = BlockValues(self.blocks, self.confidence.astype(np.float32)).interpolated(index)
             beyond = np.isnan(found)
             found[beyond] = self.whole.confidence_at(inside[beyond])
         clipped: NDArray[np.float32] = np.clip(found, 0, 1).astype(np.float32)
@@ -494,7 +496,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def _interpolate(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         index = ((points - self.grid.origin) / self.grid.spacing).T
         if self.blocks is not None:
-            values = self.blocks.interpolated(self.values, index.T)
+            values = BlockValues(self.blocks, self.values).interpolated(index.T)
             beyond = np.isnan(values)
             values[beyond] = self.whole.interpolate(points[beyond])
             return values
@@ -528,18 +530,3 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             return f"GridField({self.grid!r}, {len(self.blocks)} blocks, {self.width:g} on either side)"
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"GridField({self.grid!r}, values from {low:.4g} to {high:.4g})"
-
-
-@dataclass(frozen=True, eq=False)
-class _NodeValues:
-    """The values of blocks, indexed by nodes as those of a grid are."""
-
-    blocks: Blocks
-    values: NDArray[np.floating[Any]]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return self.blocks.shape
-
-    def __getitem__(self, nodes: tuple[NDArray[np.int64], ...]) -> NDArray[np.float64]:
-        return self.blocks.values_at(self.values, np.stack(nodes, axis=1))

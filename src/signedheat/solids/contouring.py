@@ -18,7 +18,7 @@ from ..errors import OutsideError
 from ..fields.levels import on_level
 from ..geometry.dual_cells import DualCells, cells_around, dual_cells, open_cells, separate_triangles
 from ..geometry.marching import CLEARANCE
-from ..operators.grid.blocks import SIDE, Blocks
+from ..operators.grid.blocks import SIDE, Blocks, BlockValues
 from ..progress import Progress
 from .features import divided_along_creases, placed
 from .fields import in_threads, prepared, tiles_of
@@ -55,42 +55,26 @@ class Crossings:
     shares: NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class BlockValues:
-    """Heights at the nodes of blocks, indexed by nodes."""
+def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
+    """Heights above a surface at the nodes of blocks, which are found together if it is a level of distance."""
+    tree, windings = prepared(offset.solid)
+    values = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
+    level = offset.level
 
-    blocks: Blocks
-    values: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
-        """Heights above a surface, at nodes which neighbours find together if it is a level of distance."""
-        tree, windings = prepared(offset.solid)
-        values = np.empty((len(blocks), SIDE, SIDE, SIDE), dtype=np.float32)
-        level = offset.level
-
-        def solve(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-            places = blocks.places[rows].astype(np.int64)
-            if level is not None:
-                values[rows] = solved(tree, windings, grid, places)[0].astype(np.float64) - level
-                return rows
-            nodes = (SIDE * places[:, None] + IN_BLOCK).reshape(-1, 3)
-            heights = offset.distance(grid.origin + nodes * grid.spacing)
-            heights[(nodes >= grid.shape).any(axis=1)] = np.nan
-            values[rows] = heights.reshape(-1, SIDE, SIDE, SIDE)
+    def solve(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        places = blocks.places[rows].astype(np.int64)
+        if level is not None:
+            values[rows] = solved(tree, windings, grid, places)[0].astype(np.float64) - level
             return rows
+        nodes = (SIDE * places[:, None] + IN_BLOCK).reshape(-1, 3)
+        heights = offset.distance(grid.origin + nodes * grid.spacing)
+        heights[(nodes >= grid.shape).any(axis=1)] = np.nan
+        values[rows] = heights.reshape(-1, SIDE, SIDE, SIDE)
+        return rows
 
-        for _ in in_threads(solve, tiles_of(blocks)):
-            pass
-        return cls(blocks, values)
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Nodes of the grid."""
-        return self.blocks.shape
-
-    def __getitem__(self, nodes: tuple[NDArray[np.int64], ...]) -> NDArray[np.float64]:
-        return self.blocks.values_at(self.values, np.stack(nodes, axis=1))
+    for _ in in_threads(solve, tiles_of(blocks)):
+        pass
+    return BlockValues(blocks, values)
 
 
 def sharp_surface(offset: Offset, grid: Grid, progress: Progress | None = None) -> TriangleMesh:
@@ -127,7 +111,7 @@ def _crossed(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, DualCe
     places = blocks_at(offset, grid)
     done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, SIDE, SIDE, SIDE), dtype=np.float32))
     while True:
-        new = BlockValues.of(offset, grid, Blocks.of(places, grid.shape))
+        new = block_heights(offset, grid, Blocks.of(places, grid.shape))
         both = Blocks.of(np.concatenate([done.blocks.places, new.blocks.places]), grid.shape)
         merged = np.empty((len(both), SIDE, SIDE, SIDE), dtype=np.float32)
         for part in (done, new):
@@ -185,10 +169,10 @@ def crossed_edges(band: BlockValues) -> Crossings:
     OutsideError
         If there are none.
     """
-    blocks, nodes, axes, rising, shares = band.blocks, [], [], [], []
-    for window in np.unique(blocks.places // WINDOW, axis=0).astype(np.int64):
+    nodes, axes, rising, shares = [], [], [], []
+    for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * SIDE, WINDOW * SIDE
-        height = blocks.window(band.values, first, (size + 1,) * 3).astype(np.float64)
+        height = band.window(first, (size + 1,) * 3).astype(np.float64)
         below, held = height < 0, ~np.isnan(height)
         for axis in range(3):
             ahead = tuple(slice(1, None) if k == axis else slice(0, size) for k in range(3))

@@ -5,7 +5,7 @@ from signedheat.geometry.face_features import FaceFeatures
 from signedheat.geometry.face_tree import FaceTree
 from signedheat.geometry.marching import closed_surface
 from signedheat.operators.grid.block_contours import block_contour
-from signedheat.operators.grid.blocks import SIDE, Blocks, block_points
+from signedheat.operators.grid.blocks import SIDE, Blocks, BlockValues, block_points
 
 
 def scattered(shape, share, seed=0):
@@ -29,11 +29,11 @@ def test_blocks_find_their_nodes_on_any_grid():
         expected = np.full(len(nodes), np.nan)
         inside = ((nodes >= 0) & (nodes < shape)).all(axis=1)
         expected[inside] = dense[tuple(nodes[inside].T)]
-        found = blocks.values_at(values, nodes)
+        found = BlockValues(blocks, values)[tuple(nodes.T)]
         on_grid = inside | np.isnan(found)  # the last blocks reach beyond the grid
         np.testing.assert_array_equal(found[on_grid], expected[on_grid])
         first, size = np.array([-3, 5, 100]), np.array([50, 60, 70])
-        window = blocks.window(values, first, (50, 60, 70))
+        window = BlockValues(blocks, values).window(first, (50, 60, 70))
         low, high = np.maximum(first, 0), np.minimum(first + size, shape)
         padded = np.full((50, 60, 70), np.nan, dtype=np.float32)
         padded[tuple(slice(a, b) for a, b in zip(low - first, high - first, strict=True))] = dense[
@@ -57,7 +57,7 @@ def test_interpolation_needs_the_nodes_around_and_no_others():
                 if weight > 0:
                     total += weight * float(dense[tuple(base + corner)])
             expected[row] = total
-    np.testing.assert_allclose(blocks.interpolated(values, points), expected, atol=1e-6)
+    np.testing.assert_allclose(BlockValues(blocks, values).interpolated(points), expected, atol=1e-6)
 
 
 def test_contour_is_that_of_the_whole_grid():
@@ -69,7 +69,7 @@ def test_contour_is_that_of_the_whole_grid():
     for row, place in enumerate(blocks.places * SIDE):
         part = dense[tuple(slice(p, p + SIDE) for p in place)]
         values[row][tuple(slice(0, n) for n in part.shape)] = part
-    vertices, faces = block_contour(blocks, values, spacing, 0.3)
+    vertices, faces = block_contour(BlockValues(blocks, values), spacing, 0.3)
     whole, others = closed_surface(dense.astype(np.float64), np.zeros(3), spacing, 0.3)
     assert faces.shape == others.shape
     one, two = (np.sort(v.round(4).view([("", v.dtype)] * 3).ravel()) for v in (vertices * spacing, whole))

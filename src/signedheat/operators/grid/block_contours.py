@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from ...errors import OutsideError
 from ...geometry.marching import CAP, CLEARANCE
 from ...packages import lazy_module
-from .blocks import SIDE, Blocks
+from .blocks import SIDE, BlockValues
 
 measure = lazy_module("skimage.measure", "contours")
 
@@ -24,8 +23,7 @@ Refine = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def block_contour(
-    blocks: Blocks,
-    values: NDArray[np.floating[Any]],
+    values: BlockValues,
     spacing: NDArray[np.float64],
     level: float,
     refine: Refine | None = None,
@@ -37,10 +35,8 @@ def block_contour(
 
     Parameters
     ----------
-    blocks : Blocks
-        Which nodes are there.
-    values : (n, 8, 8, 8) float32
-        Their values, NaN where they have none.
+    values : BlockValues
+        Values at the nodes of a sparse grid.
     spacing : (3,) float
         Distance between nodes.
     level : float
@@ -60,29 +56,29 @@ def block_contour(
     OutsideError
         If the values do not take the level.
     """
-    vertices, faces = zip(*contour_parts(blocks, values, spacing, level, refine), strict=True)
+    vertices, faces = zip(*contour_parts(values, spacing, level, refine), strict=True)
     return np.concatenate(vertices), np.concatenate(faces)
 
 
 def window_surfaces(
-    blocks: Blocks, values: NDArray[np.floating[Any]], spacing: NDArray[np.float64], level: float
+    values: BlockValues, spacing: NDArray[np.float64], level: float
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]]:
     """The place of each window of `WINDOW` blocks through which the level set goes, in order, with that part of it.
 
     Vertices are in cells from the first node of the grid, and those on walls between windows are in each of these.
     """
     least = CLEARANCE * float(spacing.min())
-    capped = _reaches_walls(blocks, values, level)
-    for window in np.unique(blocks.places // WINDOW, axis=0).astype(np.int64):
+    capped = _reaches_walls(values, level)
+    for window in np.unique(values.blocks.places // WINDOW, axis=0).astype(np.int64):
         first = window * WINDOW * SIDE
         shape = np.full(3, WINDOW * SIDE + 1)
         if capped:  # a layer of nodes outside the walls
             beyond = (first == 0).astype(np.int64)
             first, shape = first - beyond, shape + beyond
         size = (int(shape[0]), int(shape[1]), int(shape[2]))
-        height = blocks.window(values, first, size) - np.float32(level)
+        height = values.window(first, size) - np.float32(level)
         if capped:
-            _close_at_walls(height, first, np.array(blocks.shape))
+            _close_at_walls(height, first, np.array(values.shape))
         height[(height >= 0) & (height < least)] = least
         height[(height < 0) & (height > -least)] = -least
         found = _window_surface(height)
@@ -120,13 +116,13 @@ def edges_of(vertices: NDArray[np.float64]) -> tuple[NDArray[np.bool_], NDArray[
     return on_edge, ((a << BITS | b) << BITS | c) * 4 + np.where(on_edge, crossed.argmax(axis=1), 3)
 
 
-def _reaches_walls(blocks: Blocks, values: NDArray[np.floating[Any]], level: float) -> bool:
+def _reaches_walls(values: BlockValues, level: float) -> bool:
     """Whether the level set leaves the grid: nodes on its walls lie on both sides."""
     signs: set[bool] = set()
-    for axis, n in enumerate(blocks.shape):
+    for axis, n in enumerate(values.shape):
         for node in (0, n - 1):
-            rows = np.flatnonzero(blocks.places[:, axis] == node // SIDE)
-            wall: NDArray[np.float32] = np.moveaxis(values[rows], axis + 1, 0)[node % SIDE]
+            rows = np.flatnonzero(values.blocks.places[:, axis] == node // SIDE)
+            wall: NDArray[np.float32] = np.moveaxis(values.values[rows], axis + 1, 0)[node % SIDE]
             signs |= {bool(sign) for sign in np.unique(wall[~np.isnan(wall)] < level)}
     return len(signs) == 2
 
@@ -149,11 +145,7 @@ _Seam = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 def contour_parts(
-    blocks: Blocks,
-    values: NDArray[np.floating[Any]],
-    spacing: NDArray[np.float64],
-    level: float,
-    refine: Refine | None = None,
+    values: BlockValues, spacing: NDArray[np.float64], level: float, refine: Refine | None = None
 ) -> Iterator[Part]:
     """The vertices and faces of `block_contour`, window by window: new vertices, and faces that use these and older.
 
@@ -161,7 +153,7 @@ def contour_parts(
     """
     seams: dict[tuple[int, ...], _Seam] = {}
     count = 0
-    for window, points, triangles in window_surfaces(blocks, values, spacing, level):
+    for window, points, triangles in window_surfaces(values, spacing, level):
         on_edge, keys = edges_of(points)
         shared = np.flatnonzero(on_edge & _on_walls(points, window))
         numbers = np.full(len(points), -1, dtype=np.int64)

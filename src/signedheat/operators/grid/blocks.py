@@ -86,28 +86,55 @@ class Blocks:
         result[inside[held]] = rows[number[held], a, b, c]
         return result
 
-    def values_at(self, values: NDArray[np.floating[Any]], nodes: NDArray[np.integer]) -> NDArray[np.float64]:
-        """(k,) values at (k, 3) nodes; NaN where there is no block."""
-        row = self.rows(nodes // SIDE)
+
+@dataclass(frozen=True, eq=False)
+class BlockValues:
+    """Values at the nodes of blocks, indexed by nodes as an array of the whole grid is.
+
+    Attributes
+    ----------
+    blocks : Blocks
+        Which nodes have a value.
+    values : (n, 8, 8, 8) float
+        Their values; NaN where they have none.
+
+    Examples
+    --------
+    >>> blocks = Blocks.of(np.zeros((1, 3), dtype=int), (16, 16, 16))
+    >>> heights = BlockValues(blocks, np.full((1, 8, 8, 8), 0.5, dtype=np.float32))
+    >>> heights[np.array([3, 9]), np.array([0, 0]), np.array([7, 7])].tolist()
+    [0.5, nan]
+    """
+
+    blocks: Blocks
+    values: NDArray[np.floating[Any]]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Nodes of the grid."""
+        return self.blocks.shape
+
+    def __getitem__(self, nodes: tuple[NDArray[np.integer], ...]) -> NDArray[np.float64]:
+        """(k,) values at nodes, given by their three indices; NaN where there is no block."""
+        at = np.stack(nodes, axis=1)
+        row = self.blocks.rows(at // SIDE)
         result = np.full(len(row), np.nan)
         held = row >= 0
-        a, b, c = (nodes[held] % SIDE).T
-        result[held] = values[row[held], a, b, c]
+        a, b, c = (at[held] % SIDE).T
+        result[held] = self.values[row[held], a, b, c]
         return result
 
-    def interpolated(self, values: NDArray[np.floating[Any]], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def interpolated(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(k,) linear interpolation at (k, 3) points in cells; NaN where one of the nodes around has no value."""
         result = np.empty(len(points))
         limit = np.array(self.shape, dtype=np.float64) - 1
-        _interpolate(*self.tables, values, np.ascontiguousarray(points, dtype=np.float64), limit, result)
+        _interpolate(*self.blocks.tables, self.values, np.ascontiguousarray(points, dtype=np.float64), limit, result)
         return result
 
-    def window(
-        self, values: NDArray[np.floating[Any]], first: NDArray[np.integer], shape: tuple[int, int, int]
-    ) -> NDArray[np.float32]:
+    def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
         """(*shape) values in a box of nodes from `first` on; NaN where there are none."""
         result = np.full(shape, np.nan, dtype=np.float32)
-        _gather(*self.tables, values, np.asarray(first, dtype=np.int64), np.array(self.shape), result)
+        _gather(*self.blocks.tables, self.values, np.asarray(first, dtype=np.int64), np.array(self.shape), result)
         return result
 
 

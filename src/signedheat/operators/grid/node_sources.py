@@ -1,4 +1,7 @@
-"""Source vectors at the nodes of a grid, stored sparsely, in the stretches of grid lines in which they are not zero."""
+"""Source vectors at the nodes of a grid, stored sparsely, in the stretches of grid lines in which they are not zero.
+
+Sweeps run along lines, on grids of one to four dimensions; `Blocks` are for nodes near surfaces in three.
+"""
 
 from __future__ import annotations
 
