@@ -126,7 +126,7 @@ def cache_folder() -> Path:
 
 
 def _digest(kernel: Kernel[..., Any]) -> str:
-    """Of the code, options and constants that a kernel and those that it calls are made of, and of Numba's version."""
+    """A digest of Numba's version and of the code, options and constants of a kernel and of those that it calls."""
     digest, seen, waiting = hashlib.sha256(repr(numba.version_info).encode()), set(), [kernel]
     while waiting:
         one = waiting.pop()
@@ -148,7 +148,7 @@ def _digest(kernel: Kernel[..., Any]) -> str:
 
 
 def _spelled(value: Any) -> Any:
-    """Code and constants as what is written the same in every process: sets have no order of their own."""
+    """Code and constants as values whose text is the same in every process: sets have no order of their own."""
     if isinstance(value, CodeType):
         return value.co_code, value.co_names, [_spelled(constant) for constant in value.co_consts]
     return sorted(map(repr, value)) if isinstance(value, frozenset) else value

@@ -243,7 +243,7 @@ class CompletedArea(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BoundsNothing(Note):
-    """Fraction of the area that has the same side on both sides: distance to it is positive all around."""
+    """Fraction of the area that bounds nothing: both of its sides are outside, and distance to it is positive."""
 
     open_area: float
 

@@ -56,7 +56,7 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path) -> list[Inpu
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
-    """A path that is named: an empty name, as of a variable that is not set, does not mean the current folder.
+    """The path with a name. An empty name is refused: it may be a variable that is not set, and not the current folder.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def _fail(error: OSError) -> None:
 
 
 def _is_hidden(path: Path, pattern: tuple[str, ...]) -> bool:
-    """Whether a name begins with a dot, and none of the pattern does; as in shells."""
+    """Whether a name is hidden: some part begins with a dot, but none of the pattern does, as in shells."""
     return any(name.startswith(".") and name != ".." for name in path.parts) and not any(
         part.startswith(".") and part != ".." for part in pattern
     )

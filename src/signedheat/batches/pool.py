@@ -170,7 +170,7 @@ def run(
 
 
 def _described(job: Function) -> str:
-    """What a job is, and the version that does it: shapes that were done by another are done again."""
+    """A text that identifies a job and the version of the package: shapes that have another one are done again."""
     text = repr(job) if is_dataclass(job) else f"{getattr(job, '__module__', '')}.{getattr(job, '__qualname__', job)}"
     package = __name__.partition(".")[0]
     return f"{text} by {package} {import_module(package).__version__}"
@@ -224,7 +224,7 @@ def _locked(folder: Path) -> Iterator[Path]:
 def _in_processes(
     tasks: list[Task], number: int, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
-    """Outcomes as they come; of those that were short of memory once more, alone, at the end."""
+    """Outcomes as they come; shapes that ran out of memory are tried once more at the end, alone."""
     starved = []
     workers = [Worker(threads) for _ in range(max(1, min(number, len(tasks))))]
     idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()

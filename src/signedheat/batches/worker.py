@@ -215,7 +215,7 @@ def main() -> None:
 
 
 def _receive(tasks: queue.Queue[Task | str]) -> None:
-    """Hand on tasks; at their end, or that of the process they come from, end at once."""
+    """Hand tasks on; exit at once if there are no more, or if the process that sends them has ended."""
     while True:
         try:
             tasks.put(pickle.load(sys.stdin.buffer))

@@ -70,7 +70,7 @@ RUNNING = group(
 
 
 def check_batch(arguments: Namespace) -> None:
-    """Reject what asks for nothing, and options that contradict each other."""
+    """Reject a batch that makes nothing, and options that contradict each other."""
     check_grid(arguments)
     try:
         job_of(arguments)

@@ -86,7 +86,7 @@ def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: NDArray[np.fl
 
 
 def without_twigs(edges: NDArray[np.int64], high: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of some edges are left when lines between ends and forks are taken away that are high nowhere.
+    """Which edges are left when lines between ends and forks are taken away, if they are high nowhere.
 
     What is left is joined to longer lines, among which there may be such lines again.
 

@@ -51,7 +51,7 @@ OTHERWISE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Oriented curves on a surface, of which those may be turned that have ends in it.
+    """Oriented curves on a surface; those that end inside the surface may be turned.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ def is_piece(triangles: IntrinsicMesh, curve: Curve, part: CurveSegments) -> boo
 
 
 def decide(pieces: Pieces) -> Decision:
-    """Find the directions of strokes, of which some may be turned, for which the cost of the inside is least.
+    """The directions of strokes for which the inside costs least; only some strokes may be turned.
 
     A cut gives the sides for directions, and sides give directions: from several starts both are improved in turn, then
     by turning strokes one by one. Where more of the curves is gone than there is, only ends that are near each other
@@ -256,7 +256,7 @@ def loose(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> list[
 
 
 def groups_among(strokes: Strokes, rows: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Some of the strokes in groups that depend most on each other, the longest ones; not all of them together."""
+    """Groups of some strokes that depend most on each other, the longest groups; none has all of the strokes."""
     if len(rows) < 2:
         return []
     tails, heads = np.triu_indices(len(rows), 1)
@@ -267,7 +267,7 @@ def groups_among(strokes: Strokes, rows: NDArray[np.int64]) -> list[NDArray[np.i
 
 
 def turnable(strokes: Strokes, inside: Inside, movable: NDArray[np.bool_]) -> list[list[int]]:
-    """What may bound more the other way: strokes that bound nothing, and others, which may be why they do not."""
+    """Strokes that could bound more if turned: those that bound nothing, and others that may be the reason for it."""
     found = loose(strokes, inside, movable)
     if not found:
         return []
@@ -283,7 +283,7 @@ def settled_from(strokes: Strokes, starts: list[NDArray[np.float64]], movable: N
 
 
 def settled(strokes: Strokes, signs: NDArray[np.float64], movable: NDArray[np.bool_], reward: float = REWARD) -> Inside:
-    """The sides for these directions, the directions for these sides, and so on."""
+    """Sides and directions that fit each other, improved in turn until nothing changes."""
     best = inside = strokes.inside(signs, reward)
     for _ in range(ROUNDS):
         turn = movable & (inside.explained < -UNDECIDED)

@@ -79,7 +79,7 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
 
 
 def snapped(values: NDArray[np.float64], ends: NDArray[np.int64], level: float) -> NDArray[np.float64]:
-    """Values of which those that differ from a level by rounding are that level.
+    """Values; those that differ from a level by rounding only are set to that level.
 
     Examples
     --------

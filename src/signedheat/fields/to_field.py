@@ -161,7 +161,7 @@ def small_loops(source: SurfaceSource) -> int:
 
 
 def spread(points: NDArray[np.float64], values: NDArray[np.float64], used: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """(n,) signed distances that go on from point to neighbouring point where they are NaN.
+    """(n,) signed distances, continued from point to neighbouring point where they are NaN.
 
     The shortest way to a point with a value adds to its absolute value; the sign stays. Points that are not used, and
     those that no way leads to, stay NaN.

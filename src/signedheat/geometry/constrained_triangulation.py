@@ -29,14 +29,14 @@ def edges_of(triangle: Sequence[int]) -> tuple[Edge, Edge, Edge]:
 
 @dataclass(frozen=True)
 class _Line:
-    """A segment, and the share of the way from its start to its end that is done."""
+    """A segment, and the fraction of it that is done, from its start."""
 
     start: Point
     end: Point
     done: float = 0.0
 
     def share(self, x: Point) -> float:
-        """How much of the way the point of the line that is nearest to a point is."""
+        """The fraction of the line at which its nearest point to a given point is."""
         (px, py), (qx, qy) = self.start, self.end
         return ((x[0] - px) * (qx - px) + (x[1] - py) * (qy - py)) / ((qx - px) ** 2 + (qy - py) ** 2)
 

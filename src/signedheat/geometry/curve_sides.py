@@ -65,7 +65,7 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
 
 
 def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> NDArray[np.int64]:
-    """Nodes at which as many segments of oriented curves begin as end, do not: the boundary of the chain of segments.
+    """Nodes at which more segments of oriented curves begin than end, or fewer: the boundary of the chain of segments.
 
     Ends at the boundary of the surface do not count.
     """

@@ -56,9 +56,9 @@ def cut_faces(
 
 
 def _outlines(triangles: NDArray[np.float64], ids: NDArray[np.int64], slack: float) -> NDArray[np.bool_]:
-    """(m, 3) edges from corner k to k + 1 that bound flat parts: across all others one triangle goes on in the plane.
+    """(m, 3) edges, from corner k to k + 1, on the outline of a flat part: not those between triangles in one plane.
 
-    What lies in a flat part has the same on both of its sides wherever within its outline it is.
+    A face that lies in a flat part, wherever within the outline, has the same on both of its sides.
     """
     table = edge_table(ids)
     mates = np.where((table.balance == 0)[table.face_edges].ravel(), table.mates, -1)

@@ -207,8 +207,8 @@ def dual_triangles(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Triangles between the vertices of pieces, counter-clockwise as seen from outside.
 
-    Of two diagonals that may be taken it is the one that passes nearer to the place where the edge is crossed; where
-    both do, the shorter one.
+    The four vertices around an edge make two triangles. Of the two diagonals between them, if both are possible, the
+    one is taken that passes nearer to the crossing of the edge; if they are equally near, the shorter one.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def separate_triangles(
     shares: NDArray[np.float64],
     choices: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Vertices and triangles as of `dual_triangles`, none of which pass through each other if that can be had.
+    """Vertices and triangles as of `dual_triangles`; wherever possible none of them pass through each other.
 
     Edges are flipped to run along creases. Vertices of triangles that pass through each other go from one choice to the
     next, and edges around them are flipped no more.

@@ -96,7 +96,7 @@ class FaceTree:
         return distances
 
     def _brought_near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The points; those beyond `FAR` sizes of the surface on the same ray from its middle, at that distance."""
+        """The points; those farther than `FAR` sizes of the surface are moved towards its middle, to that distance."""
         lower, upper = self.tree.bounds[1, :3], self.tree.bounds[1, 3:]
         middle, limit = 0.5 * (lower + upper), FAR * float(np.linalg.norm(upper - lower))
         away = points - middle
@@ -121,7 +121,7 @@ def _on_threads(part: Callable[[int], None], starts: range) -> None:
 
 @compiled
 def _discs(corners: NDArray[np.float64], bounds: NDArray[np.float64], items: NDArray[np.int64]) -> NDArray[np.float64]:
-    """See `FaceTree.discs`; corners of faces stand for them, which is enough, since discs are convex."""
+    """See `FaceTree.discs`. Discs are convex, so that it is enough to put the corners of the faces into them."""
     leaves = len(bounds) // 2
     discs = np.full((2 * leaves, 8), -1.0)
     first = max(1, leaves >> (DISC_LEVELS - 1))
@@ -219,9 +219,9 @@ def nearest_of_candidates(
     out_features: NDArray[np.int8],
     out_places: NDArray[np.float64],
 ) -> None:
-    """From the nearest of some faces, and the foot of each point on it, to faces that are nearer, across their rims.
+    """From the nearest of some faces, and the nearest place on it, to faces that are nearer, across their rims.
 
-    Over an edge lies what is nearer, if anything does, on the side of the point: the foot is the nearest place of the
+    Over an edge lies what is nearer, if anything does, on the side of the point: the place is the nearest of the
     edge, so the point must be in front of the plane that the edge divides from the other face's apex. Around a vertex
     the side along which distance shrinks fastest leads on; where it grows along all of them no place is nearer.
 
@@ -285,7 +285,7 @@ def facing(
     out_cosines: NDArray[np.float32],
     out_regular: NDArray[np.bool_],
 ) -> None:
-    """Cosine between the way from each foot to its point and the normal there; and whether that decides the side."""
+    """Cosine between normal and direction to the point, at each nearest place; and whether that decides the side."""
     faces, edges, face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular = normals
     for p in range(len(points)):
         face, code = np.int64(which[p]), np.int64(codes[p])

@@ -51,7 +51,7 @@ def closed_surface(
         )
     if np.isinf(values).any():
         raise GeometryError("infinite values have no contour", element="values")
-    height = closed_at_unknown(heights_above(values, spacing, level))
+    height = closed_without_values(heights_above(values, spacing, level))
     largest = float(np.abs(height).max())
     if not 1e-30 < largest < 1e30 and largest > 0:  # what follows computes with single precision
         height = height / largest
@@ -104,8 +104,8 @@ def heights_above(values: NDArray[np.float64], spacing: NDArray[np.float64], lev
     return height
 
 
-def closed_at_unknown(height: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Nodes without a value made positive, so that crossings lie about `CAP` cells away from their known neighbours."""
+def closed_without_values(height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Nodes without a value made positive, so that crossings lie about `CAP` cells from neighbours that have one."""
     unknown = np.isnan(height)
     if not unknown.any():
         return height

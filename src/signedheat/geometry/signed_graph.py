@@ -137,7 +137,7 @@ def best_signs(weights: NDArray[np.float64], first: NDArray[np.float64]) -> NDAr
 def _turned_in_groups(
     weights: NDArray[np.float64], groups: list[NDArray[np.int64]], found: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Signs, with groups turned, one after the other, that agree more with the others then, until none does."""
+    """Signs, with groups turned one after the other as long as that makes them agree more with the others."""
     agreement, least = weights @ found, 1e-12 * float(np.abs(weights).sum())
     for _ in range(_ROUNDS):
         turned = False
@@ -210,7 +210,7 @@ def turn_where_better(
     signs: NDArray[np.float64],
     rounds: int,
 ) -> None:
-    """Turn signs, one after the other, that disagree with what their neighbours say, until none does."""
+    """Turn signs that disagree with their neighbours, one after the other, until none does."""
     for _ in range(rounds):
         turned = False
         for node in range(len(signs)):

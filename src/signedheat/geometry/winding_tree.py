@@ -27,7 +27,7 @@ OPENING = 1.25
 
 @dataclass(frozen=True, eq=False)
 class WindingTree:
-    """Triangles, and what is known of those far away below each node of a tree.
+    """Triangles in a tree, of which each node can replace its triangles for points far away.
 
     Attributes
     ----------
@@ -85,6 +85,11 @@ class WindingTree:
 def _winding(
     corners: NDArray[np.float64], items: NDArray[np.int64], moments: NDArray[np.float64], points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
+    """(n,) winding numbers around points, down the tree (Barill et al. 2018).
+
+    Far from a node, the first three terms of the expansion about its centre replace its triangles: area vector, first
+    and second moments (see `moments_of` for the columns of `moments`). In leaves, solid angles are summed.
+    """
     leaves = len(moments) // 2
     stack = np.empty(64, dtype=np.int64)
     result = np.zeros(len(points))

@@ -89,7 +89,7 @@ def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileForm
 
 @contextmanager
 def reading(path: PathLike) -> Iterator[None]:
-    """Whatever goes wrong within, however a parser puts it, becomes an error that names the file.
+    """A context in which every exception of a parser becomes an error that names the file.
 
     Raises
     ------
@@ -342,7 +342,7 @@ def moved(source: Path, path: PathLike) -> None:
 
 
 def replaceable(path: PathLike) -> os.stat_result | None:
-    """What is known of the file that would be replaced; None if there is none.
+    """Status of the file that would be replaced; None if there is none.
 
     Raises
     ------
@@ -379,7 +379,7 @@ def _permit(new: Path, status: os.stat_result) -> None:
 
 @contextmanager
 def writing(path: PathLike) -> Iterator[None]:
-    """What the system refuses within becomes an error that names the file: full disks, permissions, names too long."""
+    """A context in which refusals of the system become errors that name the file: full disks, permissions, names."""
     try:
         yield
     except OSError as error:

@@ -204,7 +204,7 @@ def orientation(shape: Mesh | ForeignShape) -> Orientation:
 
 
 def _without_inner_walls(faces: MeshFaces) -> MeshFaces:
-    """Faces of which those are left out that have a closed cell on either side."""
+    """The faces without those that have a closed cell on both sides."""
     surface = faces.surface
     normals = faces.normals(np.zeros(surface.n_faces, dtype=bool))
     inner = inner_walls(
@@ -214,7 +214,7 @@ def _without_inner_walls(faces: MeshFaces) -> MeshFaces:
 
 
 def _bodies_apart(faces: MeshFaces, lines: LineCrossings, crossed: NDArray[np.int64]) -> MeshFaces:
-    """Faces of which those stand apart that bound something as they were given, where one such body must turn.
+    """Faces in parts. Where a body that bounds something as given would have to turn, such bodies are parts.
 
     Two that touch along an edge, where each lacks a side, look like neighbours that disagree; if they are made to
     agree, what one of them bounds the other undoes.
@@ -276,7 +276,7 @@ def _middles_of_largest(faces: MeshFaces, parts: NDArray[np.int64]) -> NDArray[n
 
 
 def _doubled_walls(surface: SurfaceParts, lines: LineCrossings, crossed: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(n_parts,) parts there twice, once facing each way, that do not all but close."""
+    """(n_parts,) parts that are there twice, once facing each way, and are far from closed."""
     alike, opposite = surface.copies
     doubled = (alike > 0) & (opposite > 0)
     if not doubled.any():
@@ -337,7 +337,7 @@ def _turned_together(
     lines: LineCrossings,
     crossed: NDArray[np.int64],
 ) -> NDArray[np.bool_] | None:
-    """Turn loose parts all together, by points on them; None if lines find no fewer contradictions then."""
+    """Turn loose parts all together, by points on them; None if lines then find no fewer contradictions."""
     surface, agreeing = faces.surface, faces.surface.orientation.turned
 
     def unevenness(turned: NDArray[np.bool_]) -> float:
@@ -373,7 +373,7 @@ def _oriented(
     undecided: NDArray[np.bool_],
     n_nonmanifold: int,
 ) -> Orientation:
-    """Of the copies of each face, keep one, or one facing each way in doubled walls; and count."""
+    """Keep one of the copies of each face, in doubled walls one facing each way; and count what was done."""
     first = np.where(surface.first >= 0, surface.first, np.arange(surface.n_faces))
     inner = np.zeros(surface.n_faces, dtype=bool) if surface.inner is None else surface.inner[first]
     parts = np.where((surface.first >= 0) & ~inner, surface.orientation.parts[first], -1)

@@ -23,7 +23,7 @@ CERTAIN = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What is known of the parts of a surface before lines are laid through them, (n_parts,) each.
+    """Properties of the parts of a surface that do not need lines through them, (n_parts,) each.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ def _outward(parts: Parts, found: Votes) -> tuple[NDArray[np.int64], NDArray[np.
 
 
 def clear(balance: NDArray[np.int64], cast: NDArray[np.int64], share: float) -> NDArray[np.bool_]:
-    """Whether a vote is no accident of few lines: beyond the share and two standard deviations of a coin's."""
+    """Whether a vote is clear: beyond the share, and beyond two standard deviations of votes at random."""
     return np.abs(balance) > share * cast + 2.0 * np.sqrt(cast)
 
 

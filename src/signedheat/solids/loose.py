@@ -136,7 +136,7 @@ def _closed_by(
 
 
 def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64], loose: NDArray[np.bool_]) -> bool:
-    """Whether loose pieces are fragments of a body: the winding number of all at their faces is no matter of chance.
+    """Whether loose pieces are fragments of a body: the winding number of all at their faces is beyond chance.
 
     That of n pieces anywhere is random, and falls as 1 / √n; n counts pieces of equal area.
     """

@@ -343,8 +343,8 @@ def _can_be_nearest(
     nx, ny, nz = discs[node, 3], discs[node, 4], discs[node, 5]
     along = x * nx + y * ny + z * nz
     x, y, z = x - along * nx, y - along * ny, z - along * nz
-    beside = np.sqrt(x * x + y * y + z * z)
-    out = max(1.0 - discs[node, 6] / beside, 0.0) if beside > 0.0 else 0.0
+    from_axis = np.sqrt(x * x + y * y + z * z)
+    out = max(1.0 - discs[node, 6] / from_axis, 0.0) if from_axis > 0.0 else 0.0
     up = along - min(max(along, -thick), thick)
     x, y, z = out * x + up * nx, out * y + up * ny, out * z + up * nz  # from the nearest place of the disc
     low = x * x + y * y + z * z - scale * (1.0 + SLACK)

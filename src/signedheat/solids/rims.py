@@ -20,8 +20,8 @@ OPPOSITE = -0.7
 def open_edges(faces: NDArray[np.int64], parts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Edges that the faces of each part lack, directed as the missing faces would run along them.
 
-    Faces that run along an edge in opposite directions cancel; what is left over occurs as often as it is left over. As
-    many edges leave each vertex as arrive there, whatever the faces are: a boundary has no boundary.
+    Two faces that run along an edge in opposite directions cancel. If k more faces run along it in one direction than
+    in the other, the edge is listed k times. As many of these edges begin at each vertex as end there.
 
     Parameters
     ----------

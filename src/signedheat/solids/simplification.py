@@ -65,7 +65,7 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
 
 
 def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
-    """Whether no point of a surface is farther than a distance from another one; not where it is barely so.
+    """Whether all of a surface lies within a distance of another one; False if it is too close to call.
 
     Distance to one triangle is convex, so that no point of a piece is farther from it than a corner. Pieces not all of
     which is near the triangle nearest to their middle are cut by planes upright on its sides: what lies over it is near

@@ -182,7 +182,7 @@ def _on_pool(folder: str, key: str, missing: list[int], pool: Executor) -> Itera
 
 
 def _on_cluster(folder: str, key: str, missing: list[int], client: ClusterClient) -> Iterator[int]:
-    """Tiles that have the same input are different work: `pure` would let the cluster think that they are done."""
+    """Tiles as a cluster finishes them. They are not `pure`: their input is the same, but not what they write."""
     jobs = [client.submit(solve_into, folder, key, number, pure=False, retries=RETRIES) for number in missing]
     try:
         for job in distributed.as_completed(jobs):

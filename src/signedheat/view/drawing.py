@@ -26,7 +26,7 @@ from ..fields.vertex_field import VertexField, on_simple_surface
 from ..io.files import PathLike
 from ..packages import lazy_module
 from .figures import new_figure, picture
-from .slices import draw_plane, draw_slices, telling_layer
+from .slices import clearest_layer, draw_plane, draw_slices
 from .surfaces import draw_shape, draw_surface
 
 pillow = lazy_module("PIL.Image", "pictures")
@@ -162,5 +162,5 @@ def _best_axis(field: GridField) -> int:
     """The axis across which a slice shows most of the inside; of equal ones y, then z."""
     field = field.whole
     inside = field.values < 0
-    counts = [int(inside.take(telling_layer(field, axis), axis).sum()) for axis in range(3)]
+    counts = [int(inside.take(clearest_layer(field, axis), axis).sum()) for axis in range(3)]
     return max((1, 2, 0), key=lambda axis: counts[axis])

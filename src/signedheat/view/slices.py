@@ -78,7 +78,7 @@ def draw_slices(
     colors, isolines, step = _look(field)
     for panel, normal in zip(axes, across, strict=True):
         horizontal, vertical = (axis for axis in range(3) if axis != normal)
-        layer = telling_layer(field, normal)
+        layer = clearest_layer(field, normal)
         position = float(field.grid.axes[normal][layer])
         u, v = field.grid.axes[horizontal], field.grid.axes[vertical]
         at = (slice(None),) * normal + (layer,)
@@ -90,7 +90,7 @@ def draw_slices(
     add_color_bar(axes[0].figure, axes, colors, isolines, step)
 
 
-def telling_layer(field: GridField, axis: int) -> int:
+def clearest_layer(field: GridField, axis: int) -> int:
     """The layer of nodes across an axis with most inside nodes; if there are none, with most nodes near the zero set.
 
     Among equal layers, the one closest to the middle.
