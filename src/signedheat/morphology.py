@@ -329,6 +329,13 @@ def shell(
         If faces are to be kept and do not join with their completion all around.
     UnsupportedTypeError
         If the domain is not a grid.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> wall = shell(samples.sphere(3), -0.3, 0.0, resolution=32)
+    >>> wall.bounds.round(1).tolist()
+    [[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]
     """
     inner, outer = finite_number(inner, "the inner distance"), finite_number(outer, "the outer distance")
     if not inner < outer:
@@ -348,7 +355,9 @@ def shell(
         solid = field.solid if isinstance(field, GridField) else None
     if keep_outside:
         if not isinstance(solid, Solid):
-            raise SourceError("what was measured knows no faces", remedy="leave out measure or keep_outside")
+            raise SourceError(
+                "`measure` returned no distance to a solid with faces", remedy="leave out measure or keep_outside"
+            )
         outside = solid.surface(keep_faces=True, spacing=grid.spacing)
         inside = solid.surface(inner, spacing=grid.spacing)
         faces = np.concatenate([outside.faces, inside.faces[:, ::-1] + outside.n_vertices])
@@ -392,6 +401,12 @@ def thicken(
         If a thickness is negative or not finite, both are zero, or the solid is thinner than a grid cell.
     UnsupportedTypeError
         If the domain is not a grid.
+
+    Examples
+    --------
+    >>> sheet = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> thicken(sheet, 0.1, 0.0, resolution=40).bounds[:, 2].round(1).tolist()
+    [0.0, 0.1]
     """
     above = finite_number(above, "the reach above", least=0)
     below = above if below is None else finite_number(below, "the reach below", least=0)

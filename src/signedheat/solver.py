@@ -61,6 +61,17 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     ------
     ValueError
         If `diffusion` is not positive and finite.
+
+    Examples
+    --------
+    A quarter of a circle from the equator of a ball to its pole:
+
+    >>> from signedheat import SignedHeatSolver, samples
+    >>> ball = samples.sphere(3)
+    >>> solver = SignedHeatSolver(ball)
+    >>> phi = solver.distance(ball.level_set(ball.vertices[:, 2], 0.01))
+    >>> bool(abs(phi.values.max() - 1.57) < 0.05)
+    True
     """
 
     domain: AnyDomain

@@ -66,6 +66,15 @@ class Solid(Frozen, ShortRepr):
         Triangles of the shape that was given, which barycentric coordinates refer to.
     diagnostics : Diagnostics
         Notes on what was turned, left out and completed.
+
+    Examples
+    --------
+    >>> from signedheat import complete, samples
+    >>> solid = complete(samples.without_faces(samples.sphere(3), 0.2))
+    >>> solid.distance([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]).round(1).tolist()
+    [-1.0, 2.0]
+    >>> solid.inside([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0]]).tolist()
+    [True, False]
     """
 
     triangles: NDArray[np.float64]

@@ -10,7 +10,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..domains.kinds import SpaceSources
 from ..domains.point_cloud import PointCloud
+from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError
 from ..fields.grid_field import GridField
@@ -29,7 +31,9 @@ mpl_collections = lazy_module("matplotlib.collections", "pictures")
 AXES = "xyz"
 
 
-def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Sequence[float] = ()) -> None:
+def save_slices(
+    field: GridField, path: PathLike, shape: SpaceSources | None = None, levels: Sequence[float] = ()
+) -> None:
     """Write three orthogonal slices through a field, each where it cuts most of the inside, with the shape.
 
     Blue is inside, orange outside; the black line is φ = 0, dashed where surface was completed; the shape is red; solid
@@ -69,7 +73,7 @@ def save_slices(field: GridField, path: PathLike, shape: Any = None, levels: Seq
 def draw_slices(
     field: GridField,
     axes: Sequence[Axes],
-    shape: Any = None,
+    shape: SpaceSources | None = None,
     levels: Sequence[float] = (),
     across: Sequence[int] = (2, 1, 0),
 ) -> None:
@@ -116,15 +120,15 @@ def rounded(position: float, spacing: float) -> str:
     return f"{round(position, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{position:.0f}"
 
 
-def draw_plane(field: GridField, axes: Axes, shape: Any = None, levels: Sequence[float] = ()) -> None:
+def draw_plane(field: GridField, axes: Axes, shape: SpaceSources | None = None, levels: Sequence[float] = ()) -> None:
     """Draw a field in the plane into axes, with polylines or points in red."""
     colors, isolines, step = _look(field)
     u, v = field.grid.axes
     _draw_panel(axes, u, v, field.values, colors, isolines, levels)
-    for line in shape if isinstance(shape, Sequence) else [] if shape is None else [shape]:
+    for line in shape if isinstance(shape, Sequence) else [shape]:
         if isinstance(line, PointCloud):
             axes.scatter(line.points[:, 0], line.points[:, 1], s=6, c="#d4145a", linewidths=0, zorder=3)
-        else:
+        elif isinstance(line, Polyline):
             points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
             axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
     axes.set(xlabel=AXES[0], ylabel=AXES[1])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..domains.curves import Curve
+from ..domains.curves import Curve, CurveOrPoints
 from ..domains.digital_surface import DigitalSurface
 from ..domains.foreign import ForeignShape, as_shape
 from ..domains.intrinsic_triangulation import IntrinsicTriangulation
@@ -101,7 +101,11 @@ def triangulated(mesh: Any) -> TriangleMesh:
 
 
 def save_surface(
-    field: VertexField | PiecewiseField, path: PathLike, sources: Sequence[Any] = (), n_contours: int = 20, up: int = 2
+    field: VertexField | PiecewiseField,
+    path: PathLike,
+    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
+    n_contours: int = 20,
+    up: int = 2,
 ) -> None:
     """Write a picture of a surface coloured by φ, with isolines, from a direction from which the sources are visible.
 
@@ -142,7 +146,7 @@ def add_legend(axes: Axes, with_sources: bool) -> None:
 def draw_surface(
     field: VertexField | PiecewiseField,
     axes: Axes,
-    sources: Sequence[Any] = (),
+    sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
     n_contours: int = 20,
     view: NDArray[np.float64] | None = None,
     up: int = 2,
