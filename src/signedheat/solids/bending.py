@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..geometry.components import connected_components
 from ..geometry.edges import edge_table
-from .lids import Lid, cut_to_pieces, lid_area, rim_normals, running_mean, smoothed
+from .lids import Lid, lid_area, running_mean, vertex_normals
 
 REACH = 0.25
 """Share of an opening's width in which the surface behind its rim is looked at."""
@@ -47,10 +47,9 @@ class Samples:
 
 
 def width_of(lid: Lid) -> float:
-    """Four areas over the length of the rim, the diameter of a circle; zigzags of the rim do not count."""
-    smooth = smoothed(cut_to_pieces(lid.vertices[: lid.n_rim]))
-    length = np.linalg.norm(np.roll(smooth, -1, axis=0) - smooth, axis=1).sum()
-    return 4.0 * lid_area(lid) / float(length)
+    """Four areas over the length of the rim, the diameter of a circle."""
+    rim = lid.vertices[: lid.n_rim]
+    return 4.0 * lid_area(lid) / float(np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1).sum())
 
 
 def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -162,7 +161,7 @@ def continuation(
     slopes = np.linalg.solve(spread, sums(weights, at[:, :, None], (normals - middle[rows])[:, None, :]))
     at_rim = _units(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
     outwards = _units(np.cross(at_rim, along))
-    bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * rim_normals(lid)).sum(axis=1)
+    bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
     curvatures = np.where(enough, (slopes * frame).sum(axis=(1, 2)), 0.0)
     held = np.where(enough, _agreement(bends, must), 0.0)
     return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)

@@ -117,19 +117,18 @@ def _lid(
 ) -> lids.Lid:
     if len(corners) == 3:
         return lids.Lid(corners, np.array([[0, 1, 2]]), 3)
-    flat = lids.film(corners)
-    rim = flat.vertices[: flat.n_rim]
-    width = bending.width_of(flat)
-    if width <= SLIT * np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1).sum():
-        return flat
-    near = bending.samples_near(own, patches, scipy.spatial.cKDTree(rim), bending.REACH * width)
-    normals, curvatures, held = bending.continuation(flat, near, ends[_edges_at(rim, corners)], width)
-    bent = lids.plate(flat, normals, curvatures, held, width) if held.max() > bending.FREE else None
-    return bent or creases.creased(rim, normals) or flat
-
-
-def _edges_at(rim: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(n,) number of the corner of a loop after which each point of the cut loop comes."""
-    begins = np.zeros(len(rim), dtype=np.int64)
-    begins[scipy.spatial.cKDTree(rim).query(corners)[1]] = 1
-    return np.cumsum(begins) - 1
+    rim = lids.SmoothRim.of(corners)
+    spanned = lids.film(rim.points)
+    width = bending.width_of(spanned)
+    if width <= SLIT * np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).sum():
+        return lids.film(lids.cut_to_pieces(corners))
+    points = spanned.vertices[: spanned.n_rim]
+    near = bending.samples_near(own, patches, scipy.spatial.cKDTree(corners), bending.REACH * width)
+    edges = rim.edges_at(rim.places_of(points))
+    normals, curvatures, held = bending.continuation(spanned, near, ends[edges], width)
+    if held.max() > bending.FREE:
+        bent = lids.plate(spanned, normals, curvatures, held, width)
+        if bent is not None:
+            return rim.joined(bent)
+    beside = scipy.spatial.cKDTree(points).query(0.5 * (corners + np.roll(corners, -1, axis=0)))[1]
+    return creases.creased(corners, normals[beside]) or lids.film(lids.cut_to_pieces(corners))

@@ -11,8 +11,10 @@ from scipy import sparse
 
 from ..compiled import compiled
 
-PIECES = 64
-"""Pieces into which a rim is cut at least. Half or twice as many change the volume under a lid by less than .3 %."""
+PIECES = 96
+"""Points of the loop that a lid spans."""
+SMOOTH = 1 / 24
+"""Part of a rim over which its zigzags are averaged."""
 GROWTH = 0.35
 """How fast triangles grow with their distance from the rim, over that distance."""
 ROUNDS = 3
@@ -27,8 +29,6 @@ of whole shapes .5 at most (half a roll); on rims in tatters, where nothing is s
 AT_REST, SHORTER = 1e-3, 0.9
 """Share of the diagonal of its rim by which a plate moves when it has come to rest, and share of its last move that it
 moves at most in each round: without that, plates over zigzags may jump forever."""
-SMOOTH = 24
-"""Part of a rim over which its zigzags are averaged."""
 SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
 
@@ -59,6 +59,80 @@ class Lid:
     n_rim: int
 
 
+@dataclass(frozen=True, eq=False)
+class SmoothRim:
+    """A loop that lids close, and the loop without its zigzags that they span.
+
+    Attributes
+    ----------
+    corners : (n, 3) float
+        The loop.
+    starts : (n + 1,) float
+        Share of its length at which each corner comes; the last is 1.
+    points : (k, 3) float
+        Means over parts of the loop of `SMOOTH` of its length.
+    places : (k,) float
+        Share of its length at which the middle of each part comes, beginning farthest from the loop's centre.
+    """
+
+    corners: NDArray[np.float64]
+    starts: NDArray[np.float64]
+    points: NDArray[np.float64]
+    places: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, corners: NDArray[np.float64]) -> SmoothRim:
+        """That of a loop; it depends on the loop's shape, and not on how many corners there are on it."""
+        sides = np.roll(corners, -1, axis=0) - corners
+        lengths = np.linalg.norm(sides, axis=1)
+        starts = np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])
+        starts[-1] = 1.0
+        steps = np.diff(starts)[:, None]
+        sums = np.concatenate([np.zeros((1, 3)), np.cumsum(steps * (corners + 0.5 * sides), axis=0)])
+
+        def integral(at: NDArray[np.float64]) -> NDArray[np.float64]:
+            """That of positions along the loop, from its first corner."""
+            turns, rest = np.divmod(at, 1.0)
+            k = np.minimum(np.searchsorted(starts, rest, side="right") - 1, len(corners) - 1)
+            ahead = (rest - starts[k])[:, None]
+            onward = ahead * (corners[k] + 0.5 * ahead * sides[k] / np.maximum(steps[k], 1e-300))
+            return np.asarray(turns[:, None] * sums[-1] + sums[k] + onward)
+
+        away = np.linalg.norm(corners - sums[-1], axis=1)
+        first = starts[np.argmax(away > (1 - 1e-9) * away.max())]
+        places = first + np.arange(PIECES) / PIECES
+        points = (integral(places + 0.5 * SMOOTH) - integral(places - 0.5 * SMOOTH)) / SMOOTH
+        return cls(corners, starts, points, places)
+
+    def edges_at(self, shares: NDArray[np.float64]) -> NDArray[np.int64]:
+        """(m,) number of the corner that comes last up to shares of the length."""
+        return np.minimum(np.searchsorted(self.starts, shares % 1.0, side="right") - 1, len(self.corners) - 1)
+
+    def places_of(self, rim: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m,) places of the points of the smooth loop and of others that were put on its edges."""
+        places = np.append(self.places, self.places[0] + 1.0)
+        return np.asarray(np.interp(_shares(rim)[:-1], _shares(self.points), places))
+
+    def joined(self, lid: Lid) -> Lid:
+        """A lid that spans the smooth loop, with triangles from there to the corners."""
+        n, m = len(self.corners), lid.n_rim
+        inner = self.places_of(lid.vertices[:m])
+        outer = self.starts[:-1] + np.ceil(self.places[0] - self.starts[:-1])
+        corner, point = np.argsort(outer, kind="stable"), n + np.arange(m)
+        order = np.argsort(np.concatenate([outer[corner], inner - MOVED]), kind="stable")
+        on = order < n
+        i, j = np.cumsum(on), np.cumsum(~on)  # how many have come of both
+        last_corner, last_point = corner[(i - on - 1) % n], point[(j - ~on - 1) % m]
+        faces = np.stack([last_corner, np.where(on, corner[i - 1], point[j - 1]), last_point], axis=1)
+        return Lid(np.concatenate([self.corners, lid.vertices]), np.concatenate([faces, n + lid.faces]), n)
+
+
+def _shares(loop: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n + 1,) share of the length of a closed loop at which its corners come, and 1."""
+    lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    return np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])
+
+
 def cut_to_pieces(loop: NDArray[np.float64], pieces: int = PIECES) -> NDArray[np.float64]:
     """(k, 3) the points of a closed loop, and more on its edges: none is longer than the whole over `pieces`."""
     ways = np.roll(loop, -1, axis=0) - loop
@@ -77,14 +151,13 @@ def area_vector(loop: NDArray[np.float64]) -> NDArray[np.float64]:
     return vector
 
 
-def film(loop: NDArray[np.float64]) -> Lid:
+def film(rim: NDArray[np.float64]) -> Lid:
     """The lid of least area, near enough: a hinged plate, which is a membrane.
 
     It is triangulated in the plane of the loop's area, or, where the loop's shadow there crosses itself, over a disc;
     unless the loop lies in that plane, the first shape is harmonic there, and the lengths of each shape give the next
     (Pinkall & Polthier 1993). No weight is negative, so that the lid stays within the hull of its rim.
     """
-    rim = cut_to_pieces(loop)
     axes = _axes(rim)
     found = None if axes is None else _in_polygon(rim, (rim - rim[0]) @ axes)
     rim, plane, faces = _in_disc(rim) if found is None else found
@@ -157,7 +230,7 @@ def plate(
     if n == len(lid.vertices):
         return lid
     rim = lid.vertices[:n]
-    flat = rim_normals(lid)
+    flat = vertex_normals(lid)[:n]
     rest = _harmonic(lid, held * curvatures)
     size = float(np.linalg.norm(np.ptp(rim, axis=0)))
     angles = np.arccos(np.clip((flat * normals).sum(axis=1), -1.0, 1.0))
@@ -169,7 +242,7 @@ def plate(
             matrix = stiffness(lid.vertices, lid.faces)
             areas = vertex_areas(lid.vertices, lid.faces)
             weights = 1.0 / np.maximum(areas, 1e-3 * np.median(areas[n:]))
-            weights[:n] = held / np.maximum(areas[:n], smoothed(areas[:n, None])[:, 0])  # tips of zigzags weigh no more
+            weights[:n] *= held
             given = matrix[:, :n] @ rim - (turned * areas * rest)[:, None] * up
             given[:n] += load
             inner = matrix[:, n:]
@@ -385,18 +458,6 @@ def vertex_normals(lid: Lid) -> NDArray[np.float64]:
     sums = np.stack([np.bincount(lid.faces.ravel(), np.repeat(areas[:, k], 3), n) for k in range(3)], axis=1)
     normals: NDArray[np.float64] = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
     return normals
-
-
-def rim_normals(lid: Lid) -> NDArray[np.float64]:
-    """(n, 3) unit normals at the rim, without its zigzags."""
-    normals = smoothed(vertex_normals(lid)[: lid.n_rim])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
-    return normals
-
-
-def smoothed(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, k) values along a loop, each the mean over a part of 1 / `SMOOTH` of it."""
-    return np.stack([running_mean(column, len(values) // (2 * SMOOTH)) for column in values.T], axis=1)
 
 
 def running_mean(values: NDArray[np.float64], reach: int) -> NDArray[np.float64]:
