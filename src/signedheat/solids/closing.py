@@ -117,18 +117,16 @@ def _lid(
 ) -> lids.Lid:
     if len(corners) == 3:
         return lids.Lid(corners, np.array([[0, 1, 2]]), 3)
-    rim = lids.SmoothRim.of(corners)
-    spanned = lids.film(rim.points)
-    width = bending.width_of(spanned)
-    if width <= SLIT * np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).sum():
-        return lids.film(lids.cut_to_pieces(corners))
-    points = spanned.vertices[: spanned.n_rim]
-    near = bending.samples_near(own, patches, scipy.spatial.cKDTree(corners), bending.REACH * width)
-    edges = rim.edges_at(rim.places_of(points))
-    normals, curvatures, held = bending.continuation(spanned, near, ends[edges], width)
-    if held.max() > bending.FREE:
-        bent = lids.plate(spanned, normals, curvatures, held, width)
-        if bent is not None:
-            return rim.joined(bent)
-    beside = scipy.spatial.cKDTree(points).query(0.5 * (corners + np.roll(corners, -1, axis=0)))[1]
-    return creases.creased(corners, normals[beside]) or lids.film(lids.cut_to_pieces(corners))
+    rim, cut = lids.SmoothRim.of(corners), lids.cut_to_pieces(corners)
+    smooth = lids.film(rim.points)
+    width, points = bending.width_of(smooth), smooth.vertices[: smooth.n_rim]
+    if width <= SLIT * rim.length:
+        return lids.film(cut)
+    near = bending.samples_near(own, patches, scipy.spatial.cKDTree(cut), bending.REACH * width)
+    normals, curvatures, held = bending.continuation(smooth, near, ends[rim.edges_at(points)], width)
+    bent = lids.plate(smooth, normals, curvatures, held) if held.max() > bending.FREE else None
+    if bent is not None:
+        return rim.joined(bent)
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    nearest = scipy.spatial.cKDTree(points).query(middles)[1]
+    return creases.creased(corners, normals[nearest]) or lids.film(cut)
