@@ -96,7 +96,7 @@ def connected(address: str) -> Any:
 
 
 def _hear_greeting(host: str, port: int) -> None:
-    """Make sure that who listens speaks first, and of few bytes: Dask waits for ever, or makes room for any number."""
+    """Refuse a listener that does not greet as a scheduler does: Dask would wait, or allocate what it announces."""
     with socket.create_connection((host, port), PATIENCE) as connection:
         try:
             heard = connection.recv(8, socket.MSG_WAITALL)

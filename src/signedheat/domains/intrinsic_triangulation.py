@@ -342,7 +342,7 @@ def intrinsic_delaunay(
 
 
 def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
-    """Refuse what lengths of edges do not determine: triangles thinner than about the square root of rounding."""
+    """Refuse faces whose edge lengths do not determine the area: thinner than about the square root of rounding."""
     before, after = float(mesh.face_areas.sum()), float(triangles.face_areas.sum())
     longest, most = float(triangles.lengths_of_edges.max(initial=0.0)), float(mesh.edge_lengths.sum())
     lost = "" if abs(after - before) <= AREA_ERROR * before else f"area would be {after:.6g}, and it is {before:.6g}"

@@ -66,10 +66,10 @@ def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any]
 
 
 def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Stage, size: float = 1.0) -> list[Stage]:
-    """The same from a first stage on, whose loads are given as they were scaled for it.
+    """All stages of a solution, from the first one on; `loads` are scaled as they were for the first.
 
-    On the faint rows x satisfies the same equation with a right-hand side along their border, where x is still known
-    well. Scaled up, that is the next right-hand side for the same solver, so the result is exact.
+    On the faint rows x satisfies the same equation with a right-hand side along their border, where x is still
+    accurate. Scaled up, that is the next right-hand side for the same solver, so the result is exact.
     """
     stages, unknown = [first], np.ones(len(loads), dtype=bool)
     while True:

@@ -237,7 +237,7 @@ def _nearest(
     best: NDArray[np.float64],
     which: NDArray[np.int64],
 ) -> None:
-    """Of some faces the way from each to each of some places, the least squares, and whose these are."""
+    """The nearest of some faces to each place: writes the ways to all faces, the least squares, and their faces."""
     for e in range(len(best)):
         best[e], which[e] = np.inf, 0
     for c in range(count):
@@ -259,7 +259,7 @@ def _divide(
     out: NDArray[np.int32],
     counts: NDArray[np.int64],
 ) -> None:
-    """Of some faces those that can be nearest to a node of each of eight boxes, the ways to whose centres are given.
+    """The faces that can be nearest to a node of each of eight boxes, from the ways of all faces to their centres.
 
     Squared distance is convex, so that a plane through its value at the centre is below it. Its slope there is twice
     the way from the foot. So it is known how far below the square of the distance to the foot that is nearest to the
@@ -293,7 +293,7 @@ def _leaves_of_tree(
     stack: NDArray[np.int64],
     out: NDArray[np.int64],
 ) -> int:
-    """How many leaves, which are written, can be nearest to a node of a box; one more than there is room for, if so."""
+    """Write the leaves that can be nearest to a node of a box; returns how many, or one more than there is room for."""
     leaves = len(bounds) // 2
     kept, depth = 0, 1
     stack[0] = 1
