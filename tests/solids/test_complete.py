@@ -7,7 +7,7 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.diagnostics import LeftOut
+from signedheat.diagnostics import BoundsNothing, LeftOut
 from signedheat.solids.loose import fragments
 
 
@@ -416,3 +416,20 @@ def test_closest_names_faces_of_the_shape_and_places_in_them():
     assert (found.confidence[given] == 1).all() and (found.confidence[~given] < 1).all()
     step = 1e-6 * found.gradients
     np.testing.assert_allclose(solid.distance(points + step), found.distances + 1e-6, atol=1e-8)
+
+
+def test_the_corner_of_a_cube_comes_back():
+    corners = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
+    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([[s[0], s[k], s[k + 1]] for s in squares for k in (1, 2)])
+    around = np.flatnonzero((faces == 0).any(axis=1))
+    assert abs(volume(sh.complete((corners, np.delete(faces, around[:3], axis=0))))) == pytest.approx(1.0)
+
+
+def test_a_crack_is_sewn_up():
+    """One side of the seam has a vertex in the middle, which the other side does not know."""
+    vertices = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1e-9, 0], [1, 1, 0], [1, -1, 0.3]])
+    faces = np.array([[0, 2, 3], [2, 1, 3], [1, 0, 4], [3, 4, 0], [1, 4, 3]])
+    solid = sh.complete((vertices, faces))
+    assert not any(isinstance(note, BoundsNothing) for note in solid.diagnostics.notes)
+    assert volume(solid) == pytest.approx(0.1, rel=1e-6)

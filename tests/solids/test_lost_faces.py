@@ -5,7 +5,7 @@ import pytest
 
 from signedheat import samples
 from signedheat.geometry.edges import edge_table
-from signedheat.solids.lost_faces import FEW, MOST_SIDES, lost_faces
+from signedheat.solids.lost_faces import MOST_SIDES, lost_faces
 
 
 def unordered(faces):
@@ -52,26 +52,13 @@ def test_holes_that_touch_at_a_vertex_are_two():
     assert unordered(found) == unordered(sphere.faces[lost])
 
 
-def test_the_corner_of_a_cube_comes_back():
-    """Three triangles on three sides: the lid that bends least is that of the cube, though its edges bend by 90°."""
-    corners = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
-    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = np.array([[s[0], s[k], s[k + 1]] for s in squares for k in (1, 2)])
-    around = np.flatnonzero((faces == 0).any(axis=1))
-    found = lost_faces(corners, np.delete(faces, around[:3], axis=0))
-    whole = np.concatenate([np.delete(faces, around[:3], axis=0), found])
-    volume = np.einsum("ij,ij->", corners[whole[:, 0]], np.cross(corners[whole[:, 1]], corners[whole[:, 2]])) / 6
-    assert abs(volume) == pytest.approx(1.0)
-
-
 @pytest.mark.parametrize("height", [0.1, 3.0])
-def test_a_lid_on_a_steep_ring_is_put_on_a_small_one_beside_another_hole_only(height):
+def test_a_small_hole_is_closed_where_the_surface_goes_on_across_it(height):
     """Around 90° the lid does not go on as the sides do: they may be the end of something longer."""
-    for n in (FEW, FEW + 2, MOST_SIDES + 1):
+    for n in (6, 8, MOST_SIDES + 1):
         vertices, faces = ring_with_lid_missing(n, height)
         goes_on = height < 1 and n <= MOST_SIDES
         assert len(lost_faces(vertices, faces)) == (n - 2 if goes_on else 0)
-        assert len(lost_faces(vertices, faces[:-1])) == 1 + (n - 2 if goes_on or n <= FEW else 0)
 
 
 def test_faces_and_strips_that_hang_on_nothing_get_no_back():
@@ -79,21 +66,3 @@ def test_faces_and_strips_that_hang_on_nothing_get_no_back():
     faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4], [5, 6, 7]])
     assert not len(lost_faces(vertices, faces))
     assert not len(lost_faces(vertices, faces[:0]))
-
-
-def test_a_crack_is_sewn_up():
-    """One side of the seam has a vertex in the middle, which the other side does not know."""
-    vertices = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1e-9, 0], [1, 1, 0], [1, -1, 0.3]])
-    faces = np.array([[0, 2, 3], [2, 1, 3], [1, 0, 4], [3, 4, 0], [1, 4, 3]])
-    assert unordered(lost_faces(vertices, faces)) == {(0, 1, 2)}
-
-
-def test_windows_in_sheets_stay():
-    grid = np.array([[x, y, 0.0] for y in range(4) for x in range(4)])
-    squares = [(4 * y + x, 4 * y + x + 1, 4 * y + x + 5, 4 * y + x + 4) for y in range(3) for x in range(3)]
-    faces = np.array([[s[0], s[k], s[k + 1]] for s in squares for k in (1, 2)])
-    window = np.delete(faces, [8, 9], axis=0)
-    assert len(lost_faces(grid, window)) == 2
-    assert not len(lost_faces(grid, window, np.ones(len(window), dtype=bool)))
-    torn = np.delete(faces, 8, axis=0)
-    assert unordered(lost_faces(grid, torn, np.ones(len(torn), dtype=bool))) == unordered(faces[[8]])

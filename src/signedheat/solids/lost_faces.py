@@ -24,22 +24,11 @@ MOST_SIDES = 16
 BENT = np.deg2rad(70.0)
 """Root mean square of the angles at the rim from which on a lid does not continue the surface around it: at the end of
 a tube it is 90°."""
-FOLDED = np.deg2rad(135.0)
-"""The same for one triangle, and for holes of few sides that are not the only hole: behind the corner of a cube it is
-125°, on the back of a face 180°."""
-FEW = 6
-"""Most sides of such a hole: one that is alone may be where half a body ends."""
-BACK = -0.5
-"""Cosine with the mean normal at the rim from which on down a triangle looks back, and is folded over what is there."""
-CRACK = 5e-5
-"""Area of a lid over its squared rim up to which it only sews up a crack, however it bends."""
 TOGETHER = 4096
 """Holes that are triangulated at once."""
 
 
-def lost_faces(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], sheets: NDArray[np.bool_] | None = None
-) -> NDArray[np.int64]:
+def lost_faces(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """(k, 3) triangles that close the small holes of a surface whose faces agree with their neighbours.
 
     Parameters
@@ -48,15 +37,12 @@ def lost_faces(
         Positions, each there once.
     faces : (m, 3) int
         Triangles on three vertices each.
-    sheets : (m,) bool, optional
-        Those that bound nothing. Larger holes in them may be meant: only such of three sides are closed.
 
     Returns
     -------
     (k, 3) int
         Triangles between the same vertices, oriented as the others. They close holes of at most `MOST_SIDES` sides
-        across which the surface goes on, and holes of three sides unless the face would be folded over another; where
-        there are such, also holes of up to `FEW` sides across which it bends, as where a box lost a side.
+        across which the surface goes on.
 
     Examples
     --------
@@ -64,17 +50,11 @@ def lost_faces(
     >>> lost_faces(corners, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2]])).tolist()
     [[2, 3, 1]]
     """
-    holes = _small_holes(vertices, faces, sheets)
-    lids = [_lids(some, FOLDED if some.sides == 3 else BENT) for some in holes]
-    if any(map(len, lids)):
-        lids = [_lids(some, FOLDED) if 3 < some.sides <= FEW else lid for some, lid in zip(holes, lids, strict=True)]
-    return np.concatenate([np.empty((0, 3), dtype=np.int64), *lids])
+    return np.concatenate([np.empty((0, 3), dtype=np.int64), *map(_lids, _small_holes(vertices, faces))])
 
 
-def _small_holes(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], sheets: NDArray[np.bool_] | None
-) -> list[_Holes]:
-    """Holes of at most `MOST_SIDES` sides, by how many; in sheets only those of three."""
+def _small_holes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> list[_Holes]:
+    """Holes of at most `MOST_SIDES` sides, by how many."""
     table = edge_table(faces)
     alone = (np.bincount(faces.ravel(), minlength=len(vertices)) == 1)[faces].all(axis=1)
     owners, sides = np.nonzero((table.face_counts[table.face_edges] == 1) & ~alone[:, None])
@@ -92,8 +72,6 @@ def _small_holes(
     for loops in _simple_loops(tails.tolist(), following.tolist()):
         for begin in range(0, len(loops), TOGETHER):
             edges = loops[begin : begin + TOGETHER, ::-1]  # around the hole, against the faces
-            if sheets is not None and loops.shape[1] > 3:
-                edges = edges[sheets[owners[edges]].mean(axis=1) <= 0.5]
             found.append(_Holes(vertices, heads[edges], face_normals[owners[edges]], taken))
     return found
 
@@ -165,8 +143,8 @@ class _Holes:
         return found
 
 
-def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
-    """(k, 3) triangles that close holes across which the surface bends by an angle of at most `steepest`.
+def _lids(holes: _Holes) -> NDArray[np.int64]:
+    """(k, 3) triangles that close holes across which the surface bends by an angle of at most `BENT`.
 
     ``bends[i, j]`` is that of the best lid between the i-th and the j-th vertex, but for the edge that joins the two,
     ``rims[i, j]`` the sum of lengths times squared angles at the rim, and ``normals[i, j]`` that of its triangle there.
@@ -195,15 +173,8 @@ def _lids(holes: _Holes, steepest: float) -> NDArray[np.int64]:
     at_rim = rims[0, -1] + holes.lengths[-1, 0] * _angles(normals[0, -1], holes.rim_normals[:, -1]) ** 2
     around = holes.lengths[np.arange(n), np.arange(n) - 1].sum(axis=0)
     triangles, of_hole = _triangles(apexes, np.flatnonzero(np.isfinite(bends[0, -1])))
-    triangles = np.take_along_axis(holes.loops[of_hole], triangles, axis=1)
-    vectors = _area_vectors(holes.vertices[triangles])
-    closed = at_rim <= steepest**2 * around
-    if n > 3:
-        ahead = unit(holes.rim_normals.sum(axis=1))[of_hole]
-        closed[of_hole[np.einsum("ij,ij->i", unit(vectors), ahead) < BACK]] = False
-    lid_areas = np.bincount(of_hole, np.linalg.norm(vectors, axis=1), count)
-    closed |= lid_areas <= CRACK * around**2
-    result: NDArray[np.int64] = triangles[closed[of_hole]]
+    closed = at_rim <= BENT**2 * around
+    result: NDArray[np.int64] = np.take_along_axis(holes.loops[of_hole], triangles, axis=1)[closed[of_hole]]
     return result
 
 
