@@ -10,6 +10,8 @@ from shapes import domain_cases as cases
 from signedheat.diagnostics import PointsLeftOut
 from signedheat.geometry.hole_filling import hole_fillings
 from signedheat.geometry.local_triangulations import local_triangulations
+from signedheat.geometry.outward_signs import spread_out
+from signedheat.orientation.points import orient_points
 from signedheat.samples import sphere
 
 
@@ -60,7 +62,7 @@ def along_the_circle(cloud, ids, normals):
 
 def test_in_the_plane_the_local_triangulations_are_the_delaunay_triangulation():
     points = np.random.default_rng(0).random((400, 2))
-    found = local_triangulations(np.column_stack([points, np.zeros(400)])).faces
+    found = local_triangulations(np.column_stack([points, np.zeros(400)]), np.tile([0.0, 0, 1], (400, 1))).faces
     inner = (np.abs(points - 0.5) < 0.35).all(axis=1)
 
     def well_inside(faces):
@@ -245,3 +247,68 @@ def test_every_point_of_a_connected_surface_gets_a_value(seed):
     points = (points + random.normal(scale=0.01, size=points.shape))[random.random(len(points)) < 0.8]
     cloud = sh.PointCloud(points)
     assert np.isfinite(sh.SignedHeatSolver(cloud).distance(cloud.points_at(0)).values).all()
+
+
+PLATE = np.array([1.0, 0.8, 0.05])
+
+
+def points_on_a_plate(n=12000, seed=0):
+    """Points on a plate hardly thicker than they are apart; unit normals; a loop around it, its left towards +x."""
+    random = np.random.default_rng(seed)
+    areas = PLATE.prod() / PLATE
+    axis = random.choice(3, n, p=areas / areas.sum())
+    end = random.choice([-1.0, 1.0], n)
+    points = random.uniform(-0.5, 0.5, (n, 3))
+    points[np.arange(n), axis] = end / 2
+    normals = np.eye(3)[axis] * end[:, None]
+    y, z = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]).T / 2
+    corners = np.stack([0 * y, y, z], axis=1) * PLATE
+    share = np.linspace(0, 1, 20, endpoint=False)[:, None]
+    loop = np.concatenate([a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+    kept = spread_out(points * PLATE, np.full(n, 0.024))
+    return points[kept] * PLATE, normals[kept], loop
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_left_on_a_thin_plate_is_that_of_its_normals_wherever_curves_start_and_in_any_order(seed):
+    points, normals, loop = points_on_a_plate(seed=seed)
+    random = np.random.default_rng(seed)
+    order = random.permutation(len(points))
+    far = np.abs(points[:, 0]) > 0.1
+    ways = {
+        "given": (points, normals, loop, 1),
+        "inverted": (points, -normals, loop, -1),
+        "not given": (points, None, loop, 1),
+        "from elsewhere": (points, None, np.roll(loop, 31, axis=0), 1),
+        "in another order": (points[order], None, loop, 1),
+    }
+    for name, (positions, directions, line, sign) in ways.items():
+        cloud = sh.PointCloud(positions, directions)
+        values = sh.signed_distance(cloud.polyline(line, closed=True), cloud).values
+        assert np.isfinite(values).all(), name
+        values = values[np.argsort(order)] if positions is not points else values
+        assert (np.sign(values) == sign * np.sign(points[:, 0]))[far].all(), name
+
+
+def test_without_normals_a_cloud_has_the_sides_that_orienting_it_gives():
+    points, _, _ = points_on_a_plate(seed=5)
+    cloud = sh.PointCloud(points)
+    given = orient_points(cloud)
+    normals = sh.PointCloud(points, given.cloud.normals).surface_normals
+    assert ((cloud.surface_normals * given.cloud.normals).sum(axis=1) > 0).mean() > 0.98
+    assert ((cloud.surface_normals * normals).sum(axis=1) > 0).mean() > 0.98
+
+
+def test_of_points_in_a_plane_the_upper_side_is_out_in_any_order():
+    random = np.random.default_rng(2)
+    points = np.column_stack([random.random((400, 2)), np.zeros(400)])
+    for _ in range(4):
+        cloud = sh.PointCloud(random.permutation(points))
+        assert cloud.surface_normals[:, 2] == pytest.approx(1.0)
+
+
+def test_outliers_do_not_turn_normals():
+    points = cases.sphere_points(1500)
+    far = np.array([[3.0, 0, 0], [0, 2.5, 0], [0.1, 0, 0.1]])
+    normals = orient_points(sh.PointCloud(np.concatenate([points, far]))).cloud.normals[:1500]
+    assert ((normals * points).sum(axis=1) > 0).all()

@@ -6,9 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 
+from signedheat.geometry.outward_signs import spread_out
+from signedheat.geometry.plane_fits import CLEAN_NEIGHBORS, fit_planes, least_eigenvector, noise_scale
 from signedheat.geometry.signed_graph import Links, best_signs, signs_of
-from signedheat.orientation.axes import spread_out
-from signedheat.orientation.plane_fits import CLEAN_NEIGHBORS, fit_planes, least_eigenvector, noise_scale
 
 
 def random_pairs(rng, n, m):

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError
 from ..geometry.local_triangulations import LocalTriangulations, local_triangulations
+from ..geometry.outward_signs import outward_normals
 from ..geometry.welding import same_rows
 from .exchange import Elements, Exchangeable
 from .surface import Surface
@@ -45,10 +46,10 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     Notes
     -----
-    As a domain, a cloud needs no normals, and its normals need not be consistent: triangles on the points are oriented
-    consistently, each connected component to the side to which most of its normals point, or outward if there are none.
-    The left of a curve is as seen from that side, unless the curve has normals of its own. Points that coincide count
-    once; points without a triangle, such as outliers, get NaN.
+    As a domain, a cloud needs no normals, and its normals need not be consistent: they are oriented together, and
+    triangles on the points with them, each connected component to the side to which most of the normals given point;
+    without any outward, and upward for points in a plane. The left of a curve is as seen from that side, unless the
+    curve has normals of its own. Points that coincide count once; points without a triangle, such as outliers, get NaN.
 
     Examples
     --------
@@ -135,12 +136,12 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
                 element="points",
             )
         ids = np.unique(self.representatives)
-        points, normals = self.points[ids], None if self.normals is None else self.normals[ids]
+        points, given = self.points[ids], None if self.normals is None else self.normals[ids]
         if len(ids) < 3:
             raise GeometryError(
                 f"the point cloud has {len(ids)} distinct points, and a surface needs at least 3", element="points"
             )
-        found = local_triangulations(points, normals, self.n_neighbors)
+        found = local_triangulations(points, outward_normals(points, given)[0], self.n_neighbors, given)
         if len(found.faces) == 0:
             raise GeometryError(
                 "no triangles could be made of the point cloud: its points lie along a line or too far apart",

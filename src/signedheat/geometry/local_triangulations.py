@@ -4,6 +4,10 @@ Every point triangulates its neighbours in its own tangent plane (as for the Lap
 proposes the triangles around itself. A triangle has one vote for each of its corners that proposes it. Triangles are
 accepted in order of votes, then of roundness, unless they overlap an accepted one around one of their corners. The
 result is a mesh with at most two faces at every edge.
+
+The two sides of a thin plate lie in the same tangent planes, and only normals keep them apart. So points first
+triangulate the neighbours on their own side; what they propose among all of them comes last, and joins the sides where
+they end.
 """
 
 from __future__ import annotations
@@ -16,13 +20,19 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..parallel import in_chunks
-from .components import connected_components, sums_of
+from .components import connected_components
 from .edges import edge_table
 from .hole_filling import hole_fillings
 from .nearest import TriangleTree
 from .signed_graph import Links, signs_of
 from .welding import distinct_rows
 
+OPPOSITE = -0.5
+"""Cosine between the normals of two points below which they lie on different sides of a plate, if one is over the
+other."""
+OVER = 0.05
+"""Height over a point's tangent plane, relative to the reach of its neighbours, about three times their spacing, from
+which another one is over it: those in the plane lie on the same side, whatever their normals."""
 GIVEN = 1.0
 """Weight of a given normal, relative to that of a neighbour in the same plane, of which there are six."""
 _CHUNK = 65536
@@ -45,7 +55,10 @@ class LocalTriangulations:
 
 
 def local_triangulations(
-    points: NDArray[np.float64], normals: NDArray[np.float64] | None = None, n_neighbors: int = 30
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    n_neighbors: int = 30,
+    given: NDArray[np.float64] | None = None,
 ) -> LocalTriangulations:
     """Triangulate points sampled from an unknown surface, in O(n log n) time.
 
@@ -53,11 +66,12 @@ def local_triangulations(
     ----------
     points : (n, 3) float
         Distinct points.
-    normals : (n, 3) float, optional
-        Unit normals, used for the orientation only. Faces are first oriented consistently; each connected component is
-        then turned to the side to which most of its normals point, or outward if there are none.
+    normals : (n, 3) float
+        Unit normals, consistent with each other but for single ones.
     n_neighbors : int
         Size of the neighbourhoods. No triangle has a circumradius beyond the distance to the last neighbour.
+    given : (n, 3) float, optional
+        Unit normals to whose side each connected component is turned as a whole; `normals` by default.
 
     Notes
     -----
@@ -67,43 +81,66 @@ def local_triangulations(
     Examples
     --------
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    >>> local_triangulations(square, n_neighbors=3).faces.tolist()
+    >>> local_triangulations(square, np.tile([0.0, 0, 1], (4, 1)), n_neighbors=3).faces.tolist()
     [[0, 1, 2], [0, 2, 3]]
     """
-    axes, neighbors, reach = tangent_planes(points, n_neighbors)
-    candidates, votes = proposed_triangles(points, axes, neighbors, reach)
-    candidates, votes, circumradii = well_shaped_triangles(points, candidates, votes, reach)
+    axes, neighbors, reach = tangent_planes(points, normals, n_neighbors)
+    beside = on_one_side(points[neighbors] - points[:, None], normals[neighbors], normals, reach)
+    opposed = np.flatnonzero(~beside.all(axis=1))
+    first = proposed_triangles(points, axes, neighbors, reach, np.arange(len(points)), beside)
+    last = proposed_triangles(points, axes, neighbors, reach, opposed, np.ones_like(beside))
+    both = np.concatenate([first[0], last[0]])
+    once = np.sort(distinct_rows(both)[1])
+    candidates, votes, joins = both[once], np.concatenate([first[1], last[1]])[once], once >= len(first[0])
+    keep, circumradii = well_shaped_triangles(points, candidates, reach)
+    candidates, votes, joins = candidates[keep], votes[keep], joins[keep]
     axis = axes[:, 2]
     if len(candidates) == 0:
         return LocalTriangulations(candidates, axis)
-    faces = nonoverlapping_triangles(points, axes, candidates[np.lexsort((circumradii, -votes))])
+    faces = nonoverlapping_triangles(points, axes, candidates[np.lexsort((circumradii, -votes, joins))])
     faces = split_at_points_left(points, faces, candidates)
-    oriented = axis * aligned(points, axis, faces, normals)[:, None]
+    oriented = axis * aligned(axis, faces, normals, normals if given is None else given)[:, None]
     faces = facing(points, oriented, faces)
     return LocalTriangulations(np.concatenate([faces, hole_fillings(points, oriented, faces)]), oriented)
 
 
 def tangent_planes(
-    points: NDArray[np.float64], n_neighbors: int
+    points: NDArray[np.float64], normals: NDArray[np.float64], n_neighbors: int
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
     """Axes (n, 3, 3) of each point's tangent plane, the normal last; neighbours (n, k); distance (n,) to the last.
 
-    Planes are fitted to the neighbours: normals that come with scans often belong to another mesh, and fit worse.
+    Planes are fitted to the neighbours on the same side: normals that come with scans often belong to another mesh, and
+    fit worse.
     """
     k = min(n_neighbors, len(points) - 1)
     tree = scipy.spatial.cKDTree(points)
 
-    def fitted(some: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    def fitted(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+        some, sides = rows[:, :3], rows[:, 3:]
         distances, near = tree.query(some, k=k + 1)
-        return principal_axes(points[near] - some[:, None], distances), near[:, 1:], distances[:, -1]
+        offsets, reach = points[near] - some[:, None], distances[:, -1]
+        weights = np.exp(-((2 * distances / reach[:, None]) ** 2)) * on_one_side(offsets, normals[near], sides, reach)
+        return principal_axes(offsets, weights), near[:, 1:], reach
 
-    axes, neighbors, reach = in_chunks(fitted, points)
+    axes, neighbors, reach = in_chunks(fitted, np.column_stack([points, normals]))
     return axes, neighbors, reach
 
 
-def principal_axes(offsets: NDArray[np.float64], distances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3, 3) principal axes of each row of offsets, longest first; near points have more weight."""
-    weights = np.exp(-((2 * distances / distances[:, -1:]) ** 2))[..., None]
+def on_one_side(
+    offsets: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    reach: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """(n, k) whether points at offsets (n, k, 3) from one with a normal (n, 3) lie on its side of a plate."""
+    alike = np.einsum("nkd,nd->nk", normals, normal) > OPPOSITE
+    result: NDArray[np.bool_] = alike | (np.abs(np.einsum("nkd,nd->nk", offsets, normal)) < OVER * reach[:, None])
+    return result
+
+
+def principal_axes(offsets: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3, 3) principal axes of each row of (n, k, 3) offsets with (n, k) weights, longest first."""
+    weights = weights[..., None]
     offsets = offsets - (weights * offsets).sum(axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
     covariance = (weights * offsets).transpose(0, 2, 1) @ offsets
     first, second = np.moveaxis(np.linalg.eigh(covariance)[1][:, :, :0:-1], 2, 0)
@@ -111,13 +148,21 @@ def principal_axes(offsets: NDArray[np.float64], distances: NDArray[np.float64])
 
 
 def proposed_triangles(
-    points: NDArray[np.float64], axes: NDArray[np.float64], neighbors: NDArray[np.int64], reach: NDArray[np.float64]
+    points: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    neighbors: NDArray[np.int64],
+    reach: NDArray[np.float64],
+    centers: NDArray[np.int64],
+    used: NDArray[np.bool_],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(m, 3) triangles of all local triangulations, each once, corners in increasing order; (m,) votes for each."""
-    triangles = []
-    for begin in range(0, len(points), _CHUNK):
-        chunk = slice(begin, begin + _CHUNK)
-        offsets = points[neighbors[chunk]] - points[chunk, None]
+    """(m, 3) triangles that some points propose among their neighbours (n, k) that are used, and (m,) votes for each.
+
+    Each triangle is there once, its corners in increasing order.
+    """
+    triangles = [np.empty((0, 3), dtype=np.int64)]
+    for begin in range(0, len(centers), _CHUNK):
+        chunk = centers[begin : begin + _CHUNK]
+        offsets = (points[neighbors[chunk]] - points[chunk, None]) * used[chunk, :, None]
         x, y = (np.einsum("nki,ni->nk", offsets, axes[chunk, a]) for a in range(2))
         order = np.argsort(x * x + y * y, axis=1)
         x, y = np.take_along_axis(x, order, axis=1), np.take_along_axis(y, order, axis=1)
@@ -126,7 +171,7 @@ def proposed_triangles(
         following = np.where(column + 1 < counts[:, None], np.roll(sides, -1, axis=1), sides[:, :1])
         row, at = np.nonzero((column < counts[:, None]) & (sides >= 0) & (following >= 0))
         near = np.take_along_axis(neighbors[chunk], order, axis=1)
-        triangles.append(np.stack([row + begin, near[row, sides[row, at]], near[row, following[row, at]]], axis=1))
+        triangles.append(np.stack([chunk[row], near[row, sides[row, at]], near[row, following[row, at]]], axis=1))
     sorted_corners = np.sort(np.concatenate(triangles), axis=1)
     number, first = distinct_rows(sorted_corners)
     found = sorted_corners[first]
@@ -135,17 +180,16 @@ def proposed_triangles(
 
 
 def well_shaped_triangles(
-    points: NDArray[np.float64], triangles: NDArray[np.int64], votes: NDArray[np.int64], reach: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Triangles with area whose circumradius is within the reach of all their corners; their votes, and the radii."""
+    points: NDArray[np.float64], triangles: NDArray[np.int64], reach: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Ids of triangles with area whose circumradius is within the reach of all their corners, and the radii."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     u, v, w = b - a, c - b, a - c
     twice_area = np.linalg.norm(np.cross(u, w), axis=1)
     product = np.prod([np.linalg.norm(side, axis=1) for side in (u, v, w)], axis=0)
     limit = reach[triangles].min(axis=1)
-    keep = product <= 2 * limit * twice_area
-    keep &= twice_area > 0
-    return triangles[keep], votes[keep], product[keep] / (2 * twice_area[keep])
+    keep = np.flatnonzero((product <= 2 * limit * twice_area) & (twice_area > 0))
+    return keep, product[keep] / (2 * twice_area[keep])
 
 
 def nonoverlapping_triangles(
@@ -192,36 +236,24 @@ def split_at_points_left(
 
 
 def aligned(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
+    axes: NDArray[np.float64],
     faces: NDArray[np.int64],
-    given: NDArray[np.float64] | None,
+    normals: NDArray[np.float64],
+    given: NDArray[np.float64],
 ) -> NDArray[np.int64]:
-    """(n,) signs that make normals agree with those of their neighbours, and with given ones.
+    """(n,) signs that make axes agree with those of their neighbours and with normals.
 
-    Where none are given, each connected component is turned outward: so that its volume, computed from its centroid, is
-    positive.
+    Each connected component is then turned to the side to which most of the given normals point.
     """
-    n = len(points)
+    n = len(axes)
     tail, head = edge_table(faces).vertices.T
     parts = connected_components(n, tail, head)
-    across = (normals[tail] * normals[head]).sum(axis=1)
+    across = (axes[tail] * axes[head]).sum(axis=1)
     links = Links(tail, head, across * np.abs(across))  # planes at a crease say little
-    if given is not None:
-        own = GIVEN * (normals * given).sum(axis=1)
-        links = Links.joined(links, Links(np.arange(n), np.full(n, n), own))
-    found = signs_of(links, n + 1)
+    own = GIVEN * (axes * normals).sum(axis=1)
+    found = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), own)), n + 1)
     signs = (found[:n] * found[n]).astype(np.int64)
-    if given is not None:
-        preference = np.bincount(parts, signs * (normals * given).sum(axis=1))
-    else:
-        normals = normals * signs[:, None]
-        faces = facing(points, normals, faces)
-        a, b, c = points[faces].transpose(1, 0, 2)
-        size = np.bincount(parts)[:, None]
-        center = sums_of(points, parts, len(size)) / size
-        flux = (np.cross(b - a, c - a) * (a - center[parts[faces[:, 0]]])).sum(axis=1)
-        preference = np.bincount(parts[faces[:, 0]], flux, int(parts.max()) + 1)
+    preference = np.bincount(parts, signs * (axes * given).sum(axis=1))
     result: NDArray[np.int64] = np.where(preference < 0, -1, 1)[parts] * signs
     return result
 

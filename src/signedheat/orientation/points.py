@@ -8,9 +8,8 @@ import numpy as np
 
 from ..domains.point_cloud import PointCloud
 from ..errors import GeometryError
+from ..geometry.outward_signs import outward_normals
 from ..reprs import ShortRepr
-from .axes import fitted_outward, outward_signs
-from .plane_fits import fit_planes, noise_scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,13 +85,12 @@ def orient_points(cloud: PointCloud) -> PointOrientation:
             remedy="add some",
             element="points",
         )
+    given = None if cloud.normals is None else cloud.normals[ids]
+    outward, fits, found = outward_normals(cloud.points[ids], given)
     if cloud.normals is None:
-        fits, found = fitted_outward(cloud.points[ids])
-        normals = (fits.axes * found.signs[:, None])[which.ravel()]
+        normals = outward[which.ravel()]
         fitted, turned = cloud.n_points, 0
     else:
-        fits = fit_planes(cloud.points[ids], noise_scale(cloud.points[ids]))
-        found = outward_signs(fits, cloud.normals[ids], given=True)
         every = found.signs[which.ravel()]
         normals = cloud.normals * every[:, None]
         fitted, turned = 0, int((every < 0).sum())

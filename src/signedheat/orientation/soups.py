@@ -6,8 +6,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from .axes import outward_signs
-from .plane_fits import fit_planes, noise_scale
+from ..geometry.outward_signs import outward_signs
+from ..geometry.plane_fits import fit_planes, noise_scale
 
 N_NEIGHBORS = 12
 """Neighbours that a piece is compared with."""

@@ -15,8 +15,8 @@ import scipy
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..geometry.signed_graph import Links, signs_of
-from .plane_fits import PlaneFits, fit_planes, noisy_sizes
+from .plane_fits import PlaneFits, fit_planes, noise_scale, noisy_sizes
+from .signed_graph import Links, signs_of
 
 SPREAD = 0.35
 """Distance between the noisy points that are kept, in reaches: larger than the noise that planes leave."""
@@ -32,10 +32,15 @@ JOGGLE = 1e-4
 """Part of the distance to neighbours by which points are moved: flat faces and lattices are slow to triangulate."""
 STEEPEST = 0.5
 """Cosine between a normal and the direction to a ball's centre below which a ball links no signs."""
+LONE = 4.0
+"""Distance from a point to its neighbours, over that of these to theirs, above which it is an outlier: without evidence
+of its own. On surfaces where the density of points halves within ten points it is below 2."""
 NEARBY = 8
 """Neighbours that a point is compared with directly."""
 DIRECT_WEIGHT = 0.1
 """Weight of a link between neighbours, over that of a ball's; with noisy points they weigh the same."""
+UPWARD = np.array([0.01, 0.1, 1.0])
+"""Where out is if nothing decides it, as for points in a plane: up; on vertical planes along the second axis."""
 _CHUNK = 4096
 
 
@@ -56,6 +61,18 @@ class OutwardSigns:
     signs: NDArray[np.float64]
     sided: bool
     coherence: float
+
+
+def outward_normals(
+    points: NDArray[np.float64], given: NDArray[np.float64] | None = None
+) -> tuple[NDArray[np.float64], PlaneFits, OutwardSigns]:
+    """Normals at (n, 3) distinct points, outwards together: the given ones, some of them turned, or fitted ones."""
+    if given is None:
+        fits, found = fitted_outward(points)
+        return fits.axes * found.signs[:, None], fits, found
+    fits = fit_planes(points, noise_scale(points))
+    found = outward_signs(fits, given, given=True)
+    return given * found.signs[:, None], fits, found
 
 
 def fitted_outward(points: NDArray[np.float64]) -> tuple[PlaneFits, OutwardSigns]:
@@ -94,15 +111,16 @@ def outward_signs(
     # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
     chosen = spread_out(fits.places, SPREAD * fits.reaches) if fits.noisy else np.arange(n)
+    chosen = chosen[~_lone(fits.places[chosen], fits.reaches[chosen])]
     if len(chosen) > MOST:
         chosen = np.sort(np.random.default_rng(0).choice(chosen, MOST, replace=False))
     places = fits.places[chosen]
     links, sided = sign_links(places, axes[chosen], fits.reaches[chosen], fits.noisy)
     m = len(chosen)
-    if given:
+    if given or not sided:
         typical = 0.5 * float(np.median(links.strength(m + 1)[:m]))
-        as_given = Links(np.arange(m), np.full(m, m + 1), np.full(m, GIVEN_WEIGHT * typical))
-        links = Links.joined(links, as_given)
+        own = np.ones(m) if given else axes[chosen] @ UPWARD
+        links = Links.joined(links, Links(np.arange(m), np.full(m, m + 1), GIVEN_WEIGHT * typical * own))
     nodes = np.arange(m + 2)
     if groups is not None:
         outside = int(groups.max()) + 1
@@ -110,7 +128,7 @@ def outward_signs(
     # signs of the chosen points, relative to the outside or to the given signs; others follow their neighbours
     found = signs_of(links.renamed(nodes), int(nodes.max()) + 1)[nodes]
     signs = np.zeros(n)
-    signs[chosen] = found[:m] * (found[m] if sided else found[m + 1] if given else 1.0)
+    signs[chosen] = found[:m] * found[m if sided else m + 1]
     rest = np.flatnonzero(signs == 0)
     if len(rest):
         signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
@@ -119,6 +137,13 @@ def outward_signs(
     if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - coherence):
         signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
     return OutwardSigns(signs, sided, coherence)
+
+
+def _lone(places: NDArray[np.float64], reaches: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) points that are far from those next to them, compared with these: outliers."""
+    near = scipy.spatial.cKDTree(places).query(places, k=min(NEARBY + 1, len(places)), workers=-1)[1]
+    result: NDArray[np.bool_] = reaches > LONE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
+    return result
 
 
 def _followed(
