@@ -13,8 +13,10 @@ from shapes.surface_cases import band, book, flipped, sphere, square
 from signedheat.diagnostics import IntrinsicTriangles
 from signedheat.discretization import discretize
 from signedheat.domains.common_subdivision import cut
+from signedheat.domains.segments import segments_of
 from signedheat.geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from signedheat.geometry.intrinsic_mesh import IntrinsicMesh
+from signedheat.geometry.surface_points import barycentric_in
 from signedheat.lowering.surface import intrinsic as lowering
 
 
@@ -494,3 +496,48 @@ def test_frames_of_edges_stay_where_flat_triangles_are_thickened(monkeypatch):
     assert not np.allclose(lowered.edge_lengths, made.triangles.edge_lengths)
     assert (lowered.first_halfedges == made.triangles.first_halfedges).all()
     assert not lowered.reflected.any()
+
+
+def with_more_points(mesh, curve, random):
+    """The same line, with up to three more points on each of its segments."""
+    part = segments_of(curve, mesh.intrinsic)
+    faces, places = [], []
+    for face, segment in zip(part.faces, part.ends, strict=True):
+        a, b = (barycentric_in(mesh.intrinsic, np.array([face]), part.nodes[segment[k : k + 1]])[0] for k in (0, 1))
+        for share in [0.0, *np.sort(random.random(random.integers(4)))]:
+            faces.append(face)
+            places.append((1 - share) * a + share * b)
+    faces.append(part.faces[-1])
+    places.append(b)
+    return sh.Curve(faces, places)
+
+
+def test_points_on_straight_lines_make_no_triangles():
+    random = np.random.default_rng(3)
+    mesh = sphere(3)
+    whole = mesh.level_set(mesh.vertices @ [0.3, 0.4, 0.7] + 0.1)[0]
+    half = sh.Curve(whole.faces[:40], whole.barycentric[:40])
+    along = mesh.path([0, 60, 80])
+    for curves in ([half, along], [half, half, half.reversed()]):
+        made = sh.intrinsic_delaunay(mesh, curves, refine=True)
+        again = sh.intrinsic_delaunay(mesh, [with_more_points(mesh, c, random) for c in curves], refine=True)
+        assert again.n_vertices == made.n_vertices
+        assert np.linalg.norm(again.vertices - made.vertices, axis=1).max() < 1e-7
+        values = [sh.SignedHeatSolver(t).distance(half).restrict().values for t in (made, again)]
+        assert values[1] == pytest.approx(values[0], abs=1e-8)
+
+
+def test_points_at_which_lines_bend_meet_or_end_become_vertices():
+    """Tiny bends, as of fine arcs within a face, are none at any single point, but are all together."""
+    mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    angle = np.linspace(0, 4e-4, 500)
+    arc = 0.4 * np.column_stack([np.cos(angle), np.sin(angle)])
+    across = sh.Curve([0, 0, 0], [[0.3, 0.3, 0.4], [0.4, 0.4, 0.2], [0.45, 0.45, 0.1]])
+    from_its_middle = sh.Curve([0, 0], [[0.4, 0.4, 0.2], [0.8, 0.1, 0.1]])
+    for curves, n in (
+        ([sh.Curve(np.zeros(len(arc), int), np.column_stack([1 - arc.sum(axis=1), arc]))], len(arc)),
+        ([across], 2),
+        ([across, from_its_middle], 4),
+        ([across, sh.SurfacePoints([0], [[0.4, 0.4, 0.2]])], 3),
+    ):
+        assert sh.intrinsic_delaunay(mesh, curves).n_vertices == 3 + n

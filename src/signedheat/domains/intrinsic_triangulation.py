@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import GeometryError, SourceError
 from ..frozen import Frozen
-from ..geometry.curve_segments import CurveSegments
+from ..geometry.curve_segments import CurveSegments, without_straight_nodes
 from ..geometry.intrinsic.delaunay import flip_all, glue, lay_out
 from ..geometry.intrinsic.history import History
 from ..geometry.intrinsic.refinement import refine_all
@@ -267,7 +267,8 @@ def intrinsic_delaunay(
     mesh : TriangleMesh
         The surface.
     keep : Curve, SurfacePoints or a sequence of them
-        Curves that are to run along edges, and points that are to be vertices. Other sources can be used as well.
+        Curves that are to run along edges, and points that are to be vertices; of the points of curves those are where
+        lines turn, end or meet. Other sources can be used as well.
     refine : bool
         Insert vertices until no angle is smaller than `angle`. Smaller ones remain where boundaries or kept curves meet
         at less than 60°, at vertices with a total angle of less than 60°, and at groups of vertices that nearly
@@ -322,6 +323,7 @@ def intrinsic_delaunay(
         refuse_other_area(mesh, base)
         listed = list(keep) if isinstance(keep, Sequence) else [keep]
         parts = list(chain.from_iterable(segments_of_each(listed, base, mesh.vertices)))
+        parts = without_straight_nodes(base, parts) if parts else []
         refinement = ConformingRefinement.of(base, parts, (mesh.vertices - mesh.bounds[0]) @ UPWARD)
         marked, complete = refinement.marked, True
     with stopwatch("flip"):

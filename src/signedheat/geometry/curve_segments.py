@@ -12,11 +12,25 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from ..errors import SourceError
+from .components import connected_components
 from .directions import unit
 from .face_pairs import face_pairs
 from .intrinsic_mesh import IntrinsicMesh
 from .signed_graph import Links, signs_of
-from .surface_points import EDGE, VERTEX, LocatedPoints, concatenated, incident_faces, unique_points
+from .surface_points import (
+    EDGE,
+    SNAP,
+    VERTEX,
+    LocatedPoints,
+    barycentric_in,
+    concatenated,
+    incident_faces,
+    unique_points,
+)
+
+STRAIGHT = 1e-6
+"""Change of the unit normal from one segment to the next, up to which a line may go straight on: ends of short ones are
+rounded. How far all of them are off the line between the outer ones decides then (`SNAP`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +118,71 @@ class MergedSources:
         distinct, first = np.unique(nodes, return_index=True)
         ends = first[np.searchsorted(distinct, self.ends[mine])]
         return CurveSegments(self.nodes[nodes], ends, self.faces[mine], self.edges[mine], self.vectors[mine], oriented)
+
+
+def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> list[CurveSegments]:
+    """The same lines with as few points as they need: those where a line goes straight on within a face are left out.
+
+    Points at which another line ends or bends stay, and those where the normals of a line change.
+    """
+    merged = MergedSources.of(parts)
+    faces, vectors = merged.faces, merged.vectors
+    node, before, after = _nodes_between(merged)
+    run, first, last = _runs(len(faces), before, after)
+    places = np.stack([barycentric_in(triangles, faces, merged.nodes[end]) for end in merged.ends.T], axis=1)
+    places = (places * triangles.corner_positions[faces, None]).sum(axis=2)
+    begin, end = places[first[run[before]], 0], places[last[run[before]], 1]
+    off = np.abs((np.conj(end - begin) * (places[before, 1] - begin)).imag)
+    bent = off > SNAP * triangles.edge_lengths[faces[before]].max(axis=1) * np.abs(end - begin)
+    bent &= merged.edges[before] < 0
+    straight = np.bincount(run[before], bent, len(first))[run[before]] == 0
+    ends_at = np.bincount(np.concatenate([merged.ends.ravel(), *merged.samples]), minlength=len(merged.nodes))
+    passes = np.bincount(node[straight], minlength=len(merged.nodes))  # of each, two segments and one sample
+    straight &= (3 * passes == ends_at)[node]
+    node, before, after = node[straight], before[straight], after[straight]
+
+    run, first, last = _runs(len(faces), before, after)
+    sums = np.bincount(run, vectors.real, len(first)) + 1j * np.bincount(run, vectors.imag, len(first))
+    ends = np.stack([merged.ends[first, 0], merged.ends[last, 1]], axis=1)
+    samples = [sample[~np.isin(sample, node)] for sample in merged.samples]
+    fewer = MergedSources(merged.nodes, ends, faces[first], merged.edges[first], sums, merged.owners[first], samples)
+    return fewer.parts([part.oriented for part in parts])
+
+
+def _nodes_between(merged: MergedSources) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Where one segment goes on in another, in a face or along an edge in the same direction: the node, and these two.
+
+    A node is there once for each source that goes on there.
+    """
+    k = len(merged.ends)
+    of_source = merged.owners[:, None] * len(merged.nodes) + merged.ends
+    places, index = np.unique(of_source, return_inverse=True)
+    tails, heads = index.reshape(-1, 2).T
+    into, out = np.full(len(places), -1), np.full(len(places), -1)
+    into[heads], out[tails] = np.arange(k), np.arange(k)
+    at = np.flatnonzero((np.bincount(index.ravel()) == 2) & (into >= 0) & (out >= 0))
+    before, after = into[at], out[at]
+    normals = merged.vectors / np.abs(merged.vectors)
+    alike = np.abs(normals[before] - normals[after]) <= STRAIGHT
+    for each in (merged.edges, np.where(merged.edges < 0, merged.faces, -1)):
+        alike &= each[before] == each[after]
+    return (places[at] % max(len(merged.nodes), 1))[alike], before[alike], after[alike]
+
+
+def _runs(
+    k: int, before: NDArray[np.int64], after: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """The run of each of k segments, in order of their first ones; the first and the last segment of each run."""
+    is_first, is_last = np.ones(k, dtype=bool), np.ones(k, dtype=bool)
+    is_first[after] = False
+    is_last[before] = False
+    run = connected_components(k, before, after)
+    first = np.flatnonzero(is_first)
+    order = np.empty(len(first), dtype=np.int64)
+    order[run[first]] = np.arange(len(first))
+    last = np.empty(len(first), dtype=np.int64)
+    last[order[run[is_last]]] = np.flatnonzero(is_last)
+    return order[run], first, last
 
 
 def given_directions(
