@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..geometry.box_tree import BoxTree
 from ..geometry.components import connected_components
 from ..geometry.edges import edge_table
 from .lids import Lid, lid_area, running_mean, vertex_normals
@@ -67,16 +68,16 @@ def smooth_patches(triangles: NDArray[np.float64], ids: NDArray[np.int64]) -> ND
 
 
 def samples_near(
-    triangles: NDArray[np.float64], patches: NDArray[np.int64], rim: scipy.spatial.cKDTree, reach: float
+    triangles: NDArray[np.float64],
+    tree: BoxTree,
+    patches: NDArray[np.int64],
+    rim: scipy.spatial.cKDTree,
+    reach: float,
 ) -> Samples:
-    """Samples of triangles that are within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
+    """Samples of triangles in a tree within reach of a rim, at most reach / `SAMPLES` apart, unless too many are."""
     size = reach / SAMPLES
-    a, b, c = triangles.transpose(1, 0, 2)
-    in_box = (np.maximum(np.maximum(a, b), c) > rim.mins - reach) & (
-        np.minimum(np.minimum(a, b), c) < rim.maxes + reach
-    )
-    in_box = in_box.all(axis=1)
-    triangles, patches = triangles[in_box], patches[in_box]
+    some = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
+    triangles, patches = triangles[some], patches[some]
     near, labels, divided = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
     while len(triangles):
         centres = triangles.mean(axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..geometry.box_tree import BoxTree
 from ..geometry.components import connected_components
 from . import bending, creases, lids
 from .rims import loops, meeting_edges, open_edges
@@ -35,11 +36,11 @@ def lids_of(
     for part in np.unique(owners):
         here = order[starts[part] : starts[part + 1]]
         own = triangles[here]
-        patches = bending.smooth_patches(own, ids[here])
+        patches, tree = bending.smooth_patches(own, ids[here]), BoxTree.of(own.min(axis=1), own.max(axis=1))
         ends = _Ends.of(ids[here], patches, len(vertices))
         rims = loops(edges[np.searchsorted(owners, part) : np.searchsorted(owners, part, side="right")])
         for loop in _openings(rims, vertices):
-            lid = _lid(vertices[loop], own, patches, ends.at(loop))
+            lid = _lid(vertices[loop], own, tree, patches, ends.at(loop))
             made.append(lid.vertices[lid.faces])
     return made
 
@@ -112,6 +113,7 @@ class _Ends:
 def _lid(
     corners: NDArray[np.float64],
     own: NDArray[np.float64],
+    tree: BoxTree,
     patches: NDArray[np.int64],
     ends: NDArray[np.int64],
 ) -> lids.Lid:
@@ -122,7 +124,7 @@ def _lid(
     width, points = bending.width_of(smooth), smooth.vertices[: smooth.n_rim]
     if width <= SLIT * rim.length:
         return lids.film(cut)
-    near = bending.samples_near(own, patches, scipy.spatial.cKDTree(cut), bending.REACH * width)
+    near = bending.samples_near(own, tree, patches, scipy.spatial.cKDTree(cut), bending.REACH * width)
     normals, curvatures, held = bending.continuation(smooth, near, ends[rim.edges_at(points)], width)
     bent = lids.plate(smooth, normals, curvatures, held) if held.max() > bending.FREE else None
     if bent is not None:

@@ -143,7 +143,7 @@ def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64], lo
     areas = face_areas(triangles[loose])
     if not areas.any():
         return False
-    pieces = np.bincount(labels[loose], areas)
+    pieces = np.bincount(np.unique(labels[loose], return_inverse=True)[1], areas)
     n = pieces.sum() ** 2 / (pieces**2).sum()
     joint = level(triangles, np.flatnonzero(loose))
     return joint >= FRAGMENTS and joint * float(np.sqrt(n)) >= CHANCE

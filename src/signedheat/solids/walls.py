@@ -109,9 +109,11 @@ def facing(rims: list[_Rim], areas: NDArray[np.float64]) -> list[tuple[int, int]
                 if area + again <= 2 * lids * (NARROW + (1 - NARROW) * (onward + back) / max(area + again, 1e-300)):
                     widths.append(((area + again) / lids, i, j))
     best: list[tuple[int, int]] = []
+    taken: set[int] = set()
     for _, i, j in sorted(widths):
-        if not {i, j} & set(np.ravel(best)):
+        if not {i, j} & taken:
             best.append((i, j))
+            taken |= {i, j}
     return best
 
 
