@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial import ConvexHull, cKDTree
 
 import signedheat as sh
 from signedheat import samples
@@ -66,12 +67,40 @@ def groups_on_tets(n: int) -> Callable[[], object]:
     return lambda: solver.distance(shape, sh.EachComponent())
 
 
+def open_boxes(n: int) -> Callable[[], object]:
+    """Solids of n boxes without a lid."""
+    corners = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
+    sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4]])
+    faces = sides[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    places = 2.0 * np.stack(np.unravel_index(np.arange(n), (int(np.ceil(n ** (1 / 3))),) * 3), axis=1)
+    vertices = (corners + places[:, None]).reshape(-1, 3)
+    shape = sh.TriangleMesh(vertices, (faces + 8 * np.arange(n)[:, None, None]).reshape(-1, 3))
+    return lambda: sh.complete(shape)
+
+
+def holes_in_one_part(n: int) -> Callable[[], object]:
+    """The solid of a ball with n holes, of 200 faces each."""
+    angles = np.pi * (1 + 5**0.5) * (np.arange(100 * n) + 0.5)
+    heights = 1 - 2 * (np.arange(100 * n) + 0.5) / (100 * n)
+    wide = np.sqrt(1 - heights**2)
+    points = np.stack([wide * np.cos(angles), wide * np.sin(angles), heights], axis=1)
+    faces = ConvexHull(points).simplices
+    a, b, c = points[faces].transpose(1, 0, 2)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
+    faces[inward] = faces[inward, ::-1]
+    away = cKDTree(points[50::100]).query(points[faces].mean(axis=1))[0]
+    shape = sh.TriangleMesh(points, faces[away > 0.8 / n**0.5])
+    return lambda: sh.complete(shape)
+
+
 CASES = {
     fine_curve_in_a_face: 1000,
     curve_along_an_edge: 1000,
     many_curves: 640,
     piecewise_on_many_parts: 200,
     groups_on_tets: 16,
+    open_boxes: 250,
+    holes_in_one_part: 100,
 }
 
 
