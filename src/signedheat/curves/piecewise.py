@@ -37,8 +37,16 @@ from ..memory import refuse_beyond_memory
 from ..method import diffuse, normalize
 from ..progress import Progress, Stopwatch
 from ..solver import as_list
-from .cut_lines import fewest_lines, high_jumps, integration_error, is_continuous, on_lines, typical_size
-from .jumps import JumpProblem, JumpSolution, concentrated, minimize
+from .cut_lines import (
+    fewest_lines,
+    high_jumps,
+    integration_error,
+    is_continuous,
+    on_lines,
+    smoothed,
+    typical_size,
+)
+from .jumps import JumpProblem, JumpSolution, concentrated, keeping, minimize
 
 SMOOTHING = 10.0
 """Width of the smoothing in mean edge lengths. Less leaves steps where a fork was, more spreads over the surface what
@@ -171,6 +179,9 @@ def piecewise_distance(
             found = [clean(slopes + constants[:, None]) for constants in candidates]
             best = fewest_lines(found)
             jumping, cut, values = candidates[best], found[best].cut, found[best].values
+            if best:
+                jumping = keeping(problem, cut)
+                values = smoothed(triangles, pairs, directions, slopes + jumping[:, None], cut, width)[0]
     with stopwatch("finish"):
         phi = _field(domain, triangles, centered(triangles, values, parts), cut)
         error = integration_error(phi, directions)
