@@ -58,6 +58,7 @@ def test_gaps_of_curves_far_smaller_than_the_triangles_are_closed(radius, seed):
     assert np.abs(np.linalg.norm(places - center, axis=1) / radius - 1).max() < 0.8
 
 
+@pytest.mark.filterwarnings("ignore::signedheat.errors.InexactWarning")  # half of the ring gone is a guess
 @pytest.mark.parametrize(("n", "gap"), [(9, 0.6), (9, 3.1), (13, 0.0)])
 def test_rounding_chooses_between_no_equals(n, gap):
     """Strokes along a great circle of symmetric triangles, of which many are mirrored: paths, cuts, refinements tie."""

@@ -90,6 +90,21 @@ def test_a_wide_gap_of_a_single_stroke_is_told(gone, guessed):
     assert bool(told) == guessed
 
 
+@pytest.mark.parametrize("seed", [4004, 4011, 4016])
+def test_a_loop_of_which_most_is_gone_is_a_guess(seed):
+    """What is left bounds something with a line nearly half as long as itself."""
+    random = np.random.default_rng(seed)
+    drawn = strokes.whole(strokes.surface(random), random, most=1)
+    begin = random.random()
+    for gone, guessed in ((0.1, False), (0.6, True)):
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            sh.signed_distance(
+                strokes.arc(drawn.mesh, drawn.curves[0], begin + gone / 2, begin + 1 - gone / 2), drawn.mesh
+            )
+        assert bool(told) == guessed
+
+
 def test_the_side_does_not_depend_on_where_a_curve_starts():
     """A tenth of the faces is turned: left is as most of the faces along the curve see it."""
     mesh = sphere(3)

@@ -153,14 +153,14 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     found = replace(fine, values=values).contour(0.0)
     given = [each for each in flattened(curves) if isinstance(each, Curve) and each.oriented]
     shortest = min(length(field.domain, each) for each in given)
-    near = scipy.spatial.cKDTree(np.concatenate([places(field.domain, each) for each in given]))
+    near = scipy.spatial.cKDTree(np.concatenate([field.domain.positions(each) for each in given]))
     whole = [
         curve
         for curve in found
         if not curve.closed
         or (
             length(field.domain, curve) > WHOLE * shortest
-            and near.query(places(field.domain, curve))[0].min() < WHOLE * shortest
+            and near.query(field.domain.positions(curve))[0].min() < WHOLE * shortest
         )
     ]
     return whole or found
@@ -191,12 +191,6 @@ def beyond_the_rim(triangles: IntrinsicMesh, values: NDArray[np.float64]) -> Non
 
 def length(mesh: TriangleMesh, curve: Curve) -> float:
     """Length of a curve, measured straight between its points."""
-    points = places(mesh, curve)
+    points = mesh.positions(curve)
     following = np.roll(points, -1, axis=0) if curve.closed else points[1:]
     return float(np.linalg.norm(following - points[: len(following)], axis=1).sum())
-
-
-def places(mesh: TriangleMesh, curve: Curve) -> NDArray[np.float64]:
-    """(n, 3) points of a curve in space."""
-    result: NDArray[np.float64] = np.einsum("nk,nkd->nd", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]])
-    return result

@@ -32,6 +32,10 @@ from .directions import Decision, Pieces, decide
 from .orientation import with_turned
 from .resolution import are_small, flattened, for_zero_set, surface_of, triangulated_once
 
+WIDE = 0.4
+"""Length of the widest gap, relative to that of all curves, from which its completion is a guess. Of 398 drawings of
+which up to a third is gone two have wider ones, with 0.3 six; of seven loops that are wrong, 60 % gone, all but those
+whose ends are nearer than a fifth of what is left."""
 APART = 0.1
 """Share of the area on whose side the shortest completion and that by heat differ where neither can be trusted."""
 
@@ -71,8 +75,8 @@ def distance_to_pieces(
     unless most of them do not. Where faces look either way, as on surfaces with one side, pieces are taken as they are:
     left of a curve is another side from face to face.
 
-    There is a warning if it could have been decided in another way that is nearly as good, if nothing is bounded, and
-    if heat completes the curves otherwise than by what is shortest.
+    There is a warning if it could have been decided in another way that is nearly as good, if most bound nothing, if a
+    gap is wide, and if heat completes the curves otherwise than by what is shortest.
 
     Parameters
     ----------
@@ -130,12 +134,21 @@ def warn_of_guesses(decision: Decision, field: VertexField[Surface], curves: Seq
             "likely. Turn or remove them, or draw more; as_oriented=True takes curves as they are",
             InexactWarning,
         )
+        return
+    strokes = decision.pieces.strokes
+    gap = strokes.widest_gap(decision.best) / strokes.lengths.sum()
+    if gap > WIDE:
+        warn_user(
+            f"the widest gap of the curves is {gap:.0%} as long as they are: how it is completed is a guess. Draw more "
+            "of them",
+            InexactWarning,
+        )
     elif not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
         return  # other curves and points have sides of their own
     else:
-        surface = decision.pieces.strokes.surface
+        surface = strokes.surface
         chosen = slice(None) if surface.restriction is None else surface.restriction
-        areas, sides = decision.pieces.strokes.areas[chosen], decision.best.sides[chosen]
+        areas, sides = strokes.areas[chosen], decision.best.sides[chosen]
         near = np.abs(field.values) <= surface.triangles.lengths_of_edges.mean()
         apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
         if apart > APART:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..geometry.components import members_of
+from ..geometry.components import connected_components, members_of
 from ..geometry.curve_segments import CurveSegments
 from ..geometry.geodesics.sources import PlacedSegments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
@@ -21,17 +21,13 @@ from ..lowering.surface.discretization import SurfaceDiscretization
 REWARD = 1.0
 """What explaining a stroke is worth, relative to its length: at most 1, since a line round a stroke is as long again.
 From 0.8 to 1.0 the table of damaged curves stays as it is."""
-RINGS = 1
-"""Rings of vertices on either side of a stroke from which at least it is seen whether it is explained."""
-EDGES, OF_ALL, OF_ONE = 2.0, 0.01, 0.05
+EDGES, OF_ALL = 2.0, 0.01
 """How far from a stroke sides count for whether it is explained, so that strokes drawn again next to it are one: in
-edges of the mesh, but no more of the length of all strokes; and of its own."""
+edges of the mesh, but no more of the length of all strokes."""
 STAIRS = 0.92
 """Length of a line relative to that of the edges' duals that it cuts."""
 LEVEL = 1e-6
 """Height above a segment, relative to its face, up to which a corner is on it."""
-AHEAD = 0.2
-"""Sine of the angle, seen from the end of a stroke, below which a vertex lies beyond it and on no side."""
 BLOCK = 64
 """Strokes whose jumps are solved for at a time."""
 
@@ -101,7 +97,7 @@ class Strokes:
         crossed.eliminate_zeros()
         areas = areas_of_vertices(triangles)
         width = min(EDGES * edge, OF_ALL * float(lengths.sum()))
-        around = widened(triangles, seen, np.maximum(OF_ONE * lengths, width))
+        around = widened(triangles, seen, width)
         left, right = (_means(around.multiply(around * side > 0), areas) for side in (1, -1))
         means = sparse.csr_matrix(0.5 * (left - right))
         return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width)
@@ -149,27 +145,41 @@ class Strokes:
         symmetric: NDArray[np.float64] = 0.5 * (result + result.T)
         return symmetric
 
-    def inside(self, signs: NDArray[np.float64], rewards: NDArray[np.float64] | float = REWARD) -> Inside:
-        """The sides of least energy for strokes with these directions: a minimum cut.
-
-        With other rewards, (k,) or one, than those of the energy, the sides of what would be best then.
-        """
-        rewards = np.broadcast_to(np.asarray(rewards, dtype=np.float64), signs.shape)
-        key = np.stack([signs, rewards]).tobytes()
+    def inside(self, signs: NDArray[np.float64]) -> Inside:
+        """The sides of least energy for strokes with these directions: a minimum cut."""
+        key = signs.tobytes()
         if key not in self._found:
-            self._found[key] = self._least(signs, rewards)
+            self._found[key] = self._least(signs)
         return self._found[key]
 
-    def _least(self, signs: NDArray[np.float64], rewards: NDArray[np.float64]) -> Inside:
+    def _least(self, signs: NDArray[np.float64]) -> Inside:
+        falling, rising = self._uncovered(signs)
+        sides = self.graph.cut(falling, rising, self.means.T @ (REWARD * self.lengths * signs))
+        explained = signs * (self.means @ sides)
+        boundary = self._boundary(sides, falling, rising).sum()
+        return Inside(signs, sides, explained, float(boundary - REWARD * (self.lengths @ explained)))
+
+    def widest_gap(self, inside: Inside) -> float:
+        """Length of the longest stretch of the boundary of an inside along which there is no stroke."""
+        boundary = self._boundary(inside.sides, *self._uncovered(inside.signs))
+        sides = self.surface.triangles.edges.face_edges
+        bare = boundary[sides] > 0
+        through = bare.sum(axis=1) == 2  # faces through which the boundary runs on
+        stretch = connected_components(len(boundary), *sides[through][bare[through]].reshape(-1, 2).T)
+        return float(np.bincount(stretch, boundary).max(initial=0.0))
+
+    def _uncovered(self, signs: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """(e,) cost of each edge between sides that fall from its first vertex to its second, and that rise."""
         along = self.crossed.multiply(signs[:, None]).tocsr()
         free = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
-        falling, rising = (np.where(each, 0.0, self.costs) for each in free)
-        edges = self.surface.triangles.edges.vertices
-        sides = self.graph.cut(falling, rising, self.means.T @ (rewards * self.lengths * signs))
-        explained = signs * (self.means @ sides)
-        first, second = sides[edges].T
-        boundary = falling[(first > 0) & (second < 0)].sum() + rising[(first < 0) & (second > 0)].sum()
-        return Inside(signs, sides, explained, float(boundary - REWARD * (self.lengths @ explained)))
+        return [np.where(each, 0.0, self.costs) for each in free]
+
+    def _boundary(
+        self, sides: NDArray[np.float64], falling: NDArray[np.float64], rising: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(e,) cost of each edge between these sides."""
+        first, second = sides[self.surface.triangles.edges.vertices].T
+        return np.where(first > second, falling, np.where(first < second, rising, 0.0))
 
 
 def areas_of_vertices(triangles: IntrinsicMesh) -> NDArray[np.float64]:
@@ -216,14 +226,14 @@ def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> spar
     order = np.lexsort((-sines.ravel(), steps_away.ravel(), keys))
     first = order[np.concatenate([[True], np.diff(keys[order]) > 0])[: len(order)]]
     on = steps_away.ravel()[first] == 0
-    clear = first[on | (sines.ravel()[first] > AHEAD)]
+    clear = first[on | (sides.ravel()[first] != 0)]  # what lies straight ahead of an end is on no side
     values = np.where(steps_away.ravel()[clear] == 0, 0.0, sides.ravel()[clear]) + 2.0
     shape = (len(parts), triangles.n_vertices)
     return sparse.csr_matrix((values, np.divmod(keys[clear], triangles.n_vertices)), shape=shape)
 
 
-def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, widths: NDArray[np.float64]) -> sparse.csr_matrix:
-    """(k, n) sparse ±1 at vertices on either side of each stroke: two rings of them, and more up to its width."""
+def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> sparse.csr_matrix:
+    """(k, n) sparse ±1 at vertices on either side of each stroke: corners of crossed faces, and more up to a width."""
     n = triangles.n_vertices
     tails, heads = triangles.edges.vertices.T
     lengths = np.tile(triangles.lengths_of_edges, 2)
@@ -234,14 +244,13 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, widths: NDArray[n
     taken = np.sort(found.row.astype(np.int64) * n + found.col)
     off = found.data != 2
     stroke, vertex, side = found.row[off].astype(np.int64), found.col[off], found.data[off] - 2
-    far, chosen, ring = np.zeros(len(stroke)), [(stroke, vertex, side)], 1
+    far, chosen = np.zeros(len(stroke)), [(stroke, vertex, side)]
     while len(stroke):
         which, at = members_of(neighbors.indptr, np.arange(neighbors.nnz), vertex)
         stroke, vertex, side = stroke[which], neighbors.indices[at].astype(np.int64), side[which]
         far = far[which] + neighbors.data[at]
-        ring += 1
         keys = stroke * n + vertex
-        near = ((ring <= RINGS) | (far <= widths[stroke])) & ~np.isin(keys, taken)
+        near = (far <= width) & ~np.isin(keys, taken)
         order = np.flatnonzero(near)[np.lexsort((far[near], keys[near]))]
         order = order[np.diff(keys[order], prepend=-1) > 0]
         stroke, vertex, side, far = stroke[order], vertex[order], side[order], far[order]

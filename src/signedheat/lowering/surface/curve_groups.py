@@ -44,7 +44,7 @@ class CurveGroups:
         pieces = [c for c in listed if isinstance(c, Curve) and c.oriented and not c.closed]
         if not pieces:
             return cls(np.empty(0), np.empty(0))
-        points = [np.einsum("nk,nkd->nd", c.barycentric, mesh.vertices[mesh.faces[c.faces]]) for c in pieces]
+        points = [mesh.positions(c) for c in pieces]
         length = np.array([float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in points])
         ends = np.array([p[[0, -1]] for p in points]).reshape(-1, 3)
         group = connected_components(len(pieces), *nearest_others(ends).T)
