@@ -8,6 +8,7 @@ import pytest
 import signedheat as sh
 from signedheat import samples
 from signedheat.diagnostics import BoundsNothing, LeftOut
+from signedheat.geometry.edges import edge_table
 from signedheat.solids.loose import fragments
 
 
@@ -45,6 +46,28 @@ def volume(solid):
 def ball():
     mesh = samples.sphere(4)
     return np.array(mesh.vertices), np.array(mesh.faces)
+
+
+def cut_finer(vertices, faces):
+    """The same surface with each triangle in four."""
+    table = edge_table(faces)
+    middles = len(vertices) + table.face_edges
+    (a, b, c), (ab, bc, ca) = faces.T, middles.T
+    parts = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
+    return (
+        np.concatenate([vertices, vertices[table.vertices].mean(axis=1)]),
+        np.concatenate([np.stack(part, axis=1) for part in parts]),
+    )
+
+
+@pytest.mark.parametrize("sides", [1, 2, 3])
+def test_lids_do_not_depend_on_how_finely_a_shape_is_cut(sides):
+    """Half a ball, a quarter and an eighth with a bit more, cut off along the zigzags of triangles."""
+    vertices, faces = ball()
+    kept = faces[(vertices[faces].mean(axis=1)[:, :sides] > (-0.15 if sides == 3 else 0)).all(axis=1)]
+    once = cut_finer(vertices, kept)
+    volumes = [volume(sh.complete(shape)) for shape in ((vertices, kept), once, cut_finer(*once))]
+    np.testing.assert_allclose(volumes, volumes[0], rtol=0.02)
 
 
 @pytest.mark.parametrize("without", [(5,), (0, 1), (2, 3)])
