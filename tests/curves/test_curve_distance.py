@@ -67,6 +67,7 @@ def test_loops_inside_single_faces(as_oriented):
     assert np.abs(phi.values + to_polygon(mesh.vertices, corners, True)).max() < 2e-5
 
 
+@pytest.mark.filterwarnings("ignore::signedheat.errors.InexactWarning")  # one of the gaps is wide
 @pytest.mark.parametrize("radius", [0.05, 0.3])
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_pieces_of_curves_smaller_than_the_triangles_are_completed(radius, seed):
