@@ -118,17 +118,27 @@ def _lid(
     ends: NDArray[np.int64],
 ) -> lids.Lid:
     if len(corners) == 3:
-        return lids.Lid(corners, np.array([[0, 1, 2]]), 3)
+        return lids.Lid(corners, np.array([[0, 1, 2]]), 3, np.zeros((3, 2)))
     rim, cut = lids.SmoothRim.of(corners), lids.cut_to_pieces(corners)
-    smooth = lids.film(rim.points)
+    flat, smooth = _films(rim, cut)
     width, points = bending.width_of(smooth), smooth.vertices[: smooth.n_rim]
     if width <= SLIT * rim.length:
-        return lids.film(cut)
+        return flat
     near = bending.samples_near(own, tree, patches, scipy.spatial.cKDTree(cut), bending.REACH * width)
     normals, curvatures, held = bending.continuation(smooth, near, ends[rim.edges_at(points)], width)
     bent = lids.plate(smooth, normals, curvatures, held) if held.max() > bending.FREE else None
     if bent is not None:
-        return rim.joined(bent)
+        return lids.draped(flat, bent)
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     nearest = scipy.spatial.cKDTree(points).query(middles)[1]
-    return creases.creased(corners, normals[nearest]) or lids.film(cut)
+    return creases.creased(corners, normals[nearest]) or flat
+
+
+def _films(rim: lids.SmoothRim, cut: NDArray[np.float64]) -> tuple[lids.Lid, lids.Lid]:
+    """Lids of least area over a loop and over the smooth one, triangulated in the same plane or disc."""
+    frame = lids.frame_of(cut)
+    if frame is not None:
+        flat, smooth = lids.film(cut, frame), lids.film(rim.points, frame)
+        if flat is not None and smooth is not None:
+            return flat, smooth
+    return lids.film_over_disc(cut), lids.film_over_disc(rim.points, float(rim.places[0]))

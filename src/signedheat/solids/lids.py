@@ -33,6 +33,10 @@ MOVED = 1e-9
 """Over the size of a lid, how far points are moved to choose among equal triangles: rounding moves them by 1e-15."""
 
 
+Frame = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Origin and (3, 2) axes of a plane."""
+
+
 @dataclass(frozen=True, eq=False)
 class Lid:
     """Triangles that close a rim.
@@ -45,11 +49,14 @@ class Lid:
         Counterclockwise from outside.
     n_rim : int
         How many points the rim has.
+    plane : (n, 2) float
+        The vertices in the plane in which they were triangulated.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     n_rim: int
+    plane: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,21 +114,6 @@ class SmoothRim:
         """(m,) corner that comes last before each of these points."""
         return _last_before(self.starts, self.places_of(rim) % 1.0)
 
-    def joined(self, lid: Lid) -> Lid:
-        """A lid that spans the smooth loop, and triangles between that and the corners."""
-        n, m = len(self.corners), lid.n_rim
-        turned = self.starts[:-1] + np.ceil(self.places[0] - self.starts[:-1])
-        corner, point = np.argsort(turned, kind="stable"), n + np.arange(m)
-        order = np.argsort(np.concatenate([turned[corner], self.places_of(lid.vertices[:m]) - MOVED]), kind="stable")
-        is_corner = order < n
-        i, j = np.cumsum(is_corner), np.cumsum(~is_corner)  # how many have come
-        before = corner[(i - is_corner - 1) % n], point[(j - ~is_corner - 1) % m]
-        strip = np.stack([before[0], np.where(is_corner, corner[i - 1], point[j - 1]), before[1]], axis=1)
-        vertices = np.concatenate([self.corners, lid.vertices])
-        a, b, c = vertices[strip].transpose(1, 0, 2)
-        proper = np.linalg.norm(np.cross(b - a, c - a), axis=1) > MOVED * self.length**2  # not where both loops are one
-        return Lid(vertices, np.concatenate([strip[proper], n + lid.faces]), n)
-
 
 def _shares(loop: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
     """(n + 1,) share of the length of a closed loop at which each corner comes, and 1; and that length."""
@@ -153,21 +145,37 @@ def area_vector(loop: NDArray[np.float64]) -> NDArray[np.float64]:
     return vector
 
 
-def film(rim: NDArray[np.float64]) -> Lid:
-    """The lid of least area, near enough: a hinged plate, which is a membrane.
-
-    It is triangulated in the plane of the loop's area, or, where the loop's shadow there crosses itself, over a disc;
-    unless the loop lies in that plane, the first shape is harmonic there, and the lengths of each shape give the next
-    (Pinkall & Polthier 1993). No weight is negative, so that the lid stays within the hull of its rim.
-    """
+def frame_of(rim: NDArray[np.float64]) -> Frame | None:
+    """The plane of a loop's area; None if it has none."""
     axes = _axes(rim)
-    found = None if axes is None else _in_polygon(rim, (rim - rim[0]) @ axes)
-    rim, plane, faces = _in_disc(rim) if found is None else found
+    return None if axes is None else (rim[0], axes)
+
+
+def film(rim: NDArray[np.float64], frame: Frame) -> Lid | None:
+    """The lid of least area, near enough, triangulated in a plane; None if the loop's shadow there crosses itself."""
+    origin, axes = frame
+    found = _in_polygon(rim, (rim - origin) @ axes)
+    if found is None:
+        return None
+    rim, plane, faces = found
+    n, lifted = len(rim), origin + plane @ axes.T
+    if n == len(plane) or np.abs(lifted[:n] - rim).max() <= PLANE * np.abs(plane).max():
+        return Lid(np.concatenate([rim, lifted[n:]]), faces, n, plane)
+    return _relaxed(rim, plane, faces)
+
+
+def film_over_disc(rim: NDArray[np.float64], begin: float = 0.0) -> Lid:
+    """The same, triangulated in a disc, around which the loop begins at a share of the circle."""
+    return _relaxed(*_in_disc(rim, begin))
+
+
+def _relaxed(rim: NDArray[np.float64], plane: NDArray[np.float64], faces: NDArray[np.int64]) -> Lid:
+    """A hinged plate, which is a membrane.
+
+    The first shape is harmonic in the plane, and the lengths of each shape give the next (Pinkall & Polthier 1993). No
+    weight is negative, so that the lid stays within the hull of its rim.
+    """
     n = len(rim)
-    if found is not None and axes is not None:
-        lifted = rim[0] + plane @ axes.T
-        if n == len(plane) or np.abs(lifted[:n] - rim).max() <= PLANE * np.abs(plane).max():
-            return Lid(np.concatenate([rim, lifted[n:]]), faces, n)
     vertices = np.zeros((len(plane), 3))
     vertices[:n] = rim
     edges, sides = np.unique(_sides(faces, len(plane)), return_inverse=True)
@@ -176,7 +184,18 @@ def film(rim: NDArray[np.float64]) -> Lid:
     for _ in range(1 + ROUNDS):
         weights = np.bincount(sides.ravel(), _cotangents(shape, faces).ravel())
         vertices = shape = _membrane(vertices, n, ends, np.maximum(weights, 1e-6))
-    return Lid(vertices, faces, n)
+    return Lid(vertices, faces, n, plane)
+
+
+def draped(lid: Lid, over: Lid) -> Lid:
+    """A lid that follows another, triangulated in the same plane; what their rims differ by fades inside, harmonic."""
+    n = lid.n_rim
+    found = scipy.interpolate.LinearNDInterpolator(_delaunay(over.plane), over.vertices)(lid.plane)
+    off = np.isnan(found).any(axis=1)
+    found[off] = over.vertices[scipy.spatial.cKDTree(over.plane).query(lid.plane[off])[1]]
+    if n == len(found):
+        return lid
+    return Lid(found + _harmonic(lid, lid.vertices[:n] - found[:n]), lid.faces, n, lid.plane)
 
 
 def _membrane(
@@ -244,7 +263,7 @@ def plate(
         vertices = lid.vertices.copy()
         vertices[n:] = sparse.linalg.splu(normal).solve(-(inner.T @ (weights[:, None] * given)))
         rises = ((vertices - lid.vertices) * up).sum(axis=1)  # what slides along the surface does not change it
-        lid = Lid(lid.vertices + rises[:, None] * up, lid.faces, n)
+        lid = Lid(lid.vertices + rises[:, None] * up, lid.faces, n, lid.plane)
         move = float(np.abs(rises).max())
         if move <= AT_REST * size:
             return lid
@@ -266,7 +285,7 @@ def _load(rim: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.
 
 
 def _harmonic(lid: Lid, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) values at the rim, and between them harmonic on the lid."""
+    """Values at the rim, one or several for each point, and between them harmonic on the lid."""
     n, matrix = lid.n_rim, stiffness(lid.vertices, lid.faces)
     inner = sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))
     return np.concatenate([values, inner])
@@ -298,7 +317,7 @@ def _in_polygon(
     for _ in range(SPLITS):
         n = len(plane)
         points = np.concatenate([plane, inner])
-        faces = _delaunay(points)
+        faces = _delaunay(points).simplices.astype(np.int64)
         a, b, c = points[faces].transpose(1, 0, 2)
         area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
         faces[area < 0] = faces[area < 0][:, ::-1]
@@ -323,13 +342,12 @@ def _in_polygon(
     return None
 
 
-def _delaunay(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(m, 3) Delaunay triangles, of which, where four points lie on a circle, no rounding chooses: points are moved."""
+def _delaunay(points: NDArray[np.float64]) -> scipy.spatial.Delaunay:
+    """Delaunay triangles, of which, where four points lie on a circle, no rounding chooses: points are moved."""
     numbers = np.arange(len(points))[:, None]
     moves = (numbers * 0.5 * (5**0.5 - 1) * np.array([1.0, 2**0.5])) % 1.0 - 0.5
     size = float(np.ptp(points, axis=0).max())
-    faces: NDArray[np.int64] = scipy.spatial.Delaunay(points + MOVED * size * moves).simplices.astype(np.int64)
-    return faces
+    return scipy.spatial.Delaunay(points + MOVED * size * moves)
 
 
 def _sides(faces: NDArray[np.int64], n: int) -> NDArray[np.int64]:
@@ -386,11 +404,11 @@ def _inside_polygon(points: NDArray[np.float64], polygon: NDArray[np.float64]) -
 
 
 def _in_disc(
-    rim: NDArray[np.float64],
+    rim: NDArray[np.float64], begin: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Triangles of the disc with points of the rim on its boundary, as far apart as they are, and others inside."""
     lengths = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
-    angles = 2 * np.pi * (np.cumsum(lengths) - lengths) / lengths.sum()
+    angles = 2 * np.pi * (begin + (np.cumsum(lengths) - lengths) / lengths.sum())
     n = len(rim)
     rings, radius, step, turn = [np.stack([np.cos(angles), np.sin(angles)], axis=1)], 1.0, 2 * np.pi / n, 0.0
     while True:
@@ -404,7 +422,7 @@ def _in_disc(
         rings.append(radius * np.stack([np.cos(ring), np.sin(ring)], axis=1))
         step *= 1 + GROWTH
     points = np.concatenate(rings)
-    faces = _delaunay(points)
+    faces = _delaunay(points).simplices.astype(np.int64)
     a, b, c = points[faces].transpose(1, 0, 2)
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     faces[area < 0] = faces[area < 0][:, ::-1]
