@@ -23,8 +23,8 @@ SAMPLES = 4
 MOST = 4096
 """Samples around a rim at most, or nearly."""
 DIVIDED = 1 << 20
-"""Triangles behind a rim that are made by division at most, of which `MOST` are taken: a smooth surface behind the
-narrowest opening that is no slit is divided into 200,000, balls and boxes with round holes into some 1,000."""
+"""Triangles behind a rim that are made by division at most, of which `MOST` are taken: those of a flat side behind
+slots .0012 to .1 as wide as they are long are 430,000 to 140,000."""
 NEAR = 0.05
 """Part of that strip nearest to a place of the rim, which gives the normal there."""
 STIFF = 0.1

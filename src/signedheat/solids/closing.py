@@ -118,7 +118,7 @@ def _lid(
     ends: NDArray[np.int64],
 ) -> lids.Lid:
     if len(corners) == 3:
-        return lids.Lid(corners, np.array([[0, 1, 2]]), 3, np.zeros((3, 2)))
+        return lids.Lid(corners, np.array([[0, 1, 2]]), 3)
     rim, cut = lids.SmoothRim.of(corners), lids.cut_to_pieces(corners)
     flat, smooth = _films(rim, cut)
     width, points = bending.width_of(smooth), smooth.vertices[: smooth.n_rim]
@@ -134,7 +134,7 @@ def _lid(
     return creases.creased(corners, normals[nearest]) or flat
 
 
-def _films(rim: lids.SmoothRim, cut: NDArray[np.float64]) -> tuple[lids.Lid, lids.Lid]:
+def _films(rim: lids.SmoothRim, cut: NDArray[np.float64]) -> tuple[lids.Film, lids.Film]:
     """Lids of least area over a loop and over the smooth one, triangulated in the same plane or disc."""
     frame = lids.frame_of(cut)
     if frame is not None:

@@ -152,4 +152,4 @@ def _lid(loop: NDArray[np.float64], polygons: list[NDArray[np.float64]]) -> Lid:
         vertices.append(polygon)
         faces.append(count + least_triangles(polygon))
         count += len(polygon)
-    return Lid(np.concatenate(vertices), np.concatenate(faces), len(loop), np.zeros((0, 2)))
+    return Lid(np.concatenate(vertices), np.concatenate(faces), len(loop))

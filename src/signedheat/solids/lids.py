@@ -49,13 +49,17 @@ class Lid:
         Counterclockwise from outside.
     n_rim : int
         How many points the rim has.
-    plane : (n, 2) float
-        The vertices in the plane in which they were triangulated.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int64]
     n_rim: int
+
+
+@dataclass(frozen=True, eq=False)
+class Film(Lid):
+    """A lid that was triangulated in a plane, or over a disc: (n, 2) its vertices there."""
+
     plane: NDArray[np.float64]
 
 
@@ -65,12 +69,10 @@ class SmoothRim:
 
     Attributes
     ----------
-    corners : (n, 3) float
-        The loop.
     length : float
-        Its length.
+        That of the loop.
     starts : (n + 1,) float
-        Share of it at which each corner comes; the last is 1.
+        Share of it at which each corner of the loop comes; the last is 1.
     points : (k, 3) float
         Means over parts of the loop of `SMOOTH` of its length.
     places : (k + 1,) float
@@ -78,7 +80,6 @@ class SmoothRim:
         centre on, once around.
     """
 
-    corners: NDArray[np.float64]
     length: float
     starts: NDArray[np.float64]
     points: NDArray[np.float64]
@@ -104,7 +105,7 @@ class SmoothRim:
         first = starts[np.argmax(away > (1 - 1e-9) * away.max())]
         places = first + np.arange(PIECES + 1) / PIECES
         ends = integral(places[:-1] + 0.5 * SMOOTH), integral(places[:-1] - 0.5 * SMOOTH)
-        return cls(corners, length, starts, (ends[0] - ends[1]) / SMOOTH, places)
+        return cls(length, starts, (ends[0] - ends[1]) / SMOOTH, places)
 
     def places_of(self, rim: NDArray[np.float64]) -> NDArray[np.float64]:
         """(m,) places of the points of the smooth loop and of others on its edges."""
@@ -151,7 +152,7 @@ def frame_of(rim: NDArray[np.float64]) -> Frame | None:
     return None if axes is None else (rim[0], axes)
 
 
-def film(rim: NDArray[np.float64], frame: Frame) -> Lid | None:
+def film(rim: NDArray[np.float64], frame: Frame) -> Film | None:
     """The lid of least area, near enough, triangulated in a plane; None if the loop's shadow there crosses itself."""
     origin, axes = frame
     found = _in_polygon(rim, (rim - origin) @ axes)
@@ -160,16 +161,16 @@ def film(rim: NDArray[np.float64], frame: Frame) -> Lid | None:
     rim, plane, faces = found
     n, lifted = len(rim), origin + plane @ axes.T
     if n == len(plane) or np.abs(lifted[:n] - rim).max() <= PLANE * np.abs(plane).max():
-        return Lid(np.concatenate([rim, lifted[n:]]), faces, n, plane)
+        return Film(np.concatenate([rim, lifted[n:]]), faces, n, plane)
     return _relaxed(rim, plane, faces)
 
 
-def film_over_disc(rim: NDArray[np.float64], begin: float = 0.0) -> Lid:
+def film_over_disc(rim: NDArray[np.float64], begin: float = 0.0) -> Film:
     """The same, triangulated in a disc, around which the loop begins at a share of the circle."""
     return _relaxed(*_in_disc(rim, begin))
 
 
-def _relaxed(rim: NDArray[np.float64], plane: NDArray[np.float64], faces: NDArray[np.int64]) -> Lid:
+def _relaxed(rim: NDArray[np.float64], plane: NDArray[np.float64], faces: NDArray[np.int64]) -> Film:
     """A hinged plate, which is a membrane.
 
     The first shape is harmonic in the plane, and the lengths of each shape give the next (Pinkall & Polthier 1993). No
@@ -184,10 +185,10 @@ def _relaxed(rim: NDArray[np.float64], plane: NDArray[np.float64], faces: NDArra
     for _ in range(1 + ROUNDS):
         weights = np.bincount(sides.ravel(), _cotangents(shape, faces).ravel())
         vertices = shape = _membrane(vertices, n, ends, np.maximum(weights, 1e-6))
-    return Lid(vertices, faces, n, plane)
+    return Film(vertices, faces, n, plane)
 
 
-def draped(lid: Lid, over: Lid) -> Lid:
+def draped(lid: Film, over: Film) -> Lid:
     """A lid that follows another, triangulated in the same plane; what their rims differ by fades inside, harmonic."""
     n = lid.n_rim
     found = scipy.interpolate.LinearNDInterpolator(_delaunay(over.plane), over.vertices)(lid.plane)
@@ -195,7 +196,7 @@ def draped(lid: Lid, over: Lid) -> Lid:
     found[off] = over.vertices[scipy.spatial.cKDTree(over.plane).query(lid.plane[off])[1]]
     if n == len(found):
         return lid
-    return Lid(found + _harmonic(lid, lid.vertices[:n] - found[:n]), lid.faces, n, lid.plane)
+    return Lid(found + _harmonic(lid, lid.vertices[:n] - found[:n]), lid.faces, n)
 
 
 def _membrane(
@@ -216,11 +217,11 @@ def _membrane(
 
 
 def plate(
-    lid: Lid,
+    lid: Film,
     normals: NDArray[np.float64],
     curvatures: NDArray[np.float64],
     held: NDArray[np.float64],
-) -> Lid | None:
+) -> Film | None:
     """A lid bent as a thin plate whose shape at rest is as curved as the surface behind its rim (Helfrich 1973).
 
     ``min Σ c_v |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / m_v``, with c = 1 but at hinges of the rim. L is the
@@ -230,7 +231,7 @@ def plate(
 
     Parameters
     ----------
-    lid : Lid
+    lid : Film
         To begin with.
     normals : (n, 3) float
         Unit normals of the surface at the rim.
@@ -241,7 +242,7 @@ def plate(
 
     Returns
     -------
-    Lid or None
+    Film or None
         None where it does not come to rest, as on rims in tatters, where nothing is smooth.
     """
     n = lid.n_rim
@@ -263,7 +264,7 @@ def plate(
         vertices = lid.vertices.copy()
         vertices[n:] = sparse.linalg.splu(normal).solve(-(inner.T @ (weights[:, None] * given)))
         rises = ((vertices - lid.vertices) * up).sum(axis=1)  # what slides along the surface does not change it
-        lid = Lid(lid.vertices + rises[:, None] * up, lid.faces, n, lid.plane)
+        lid = Film(lid.vertices + rises[:, None] * up, lid.faces, n, lid.plane)
         move = float(np.abs(rises).max())
         if move <= AT_REST * size:
             return lid
