@@ -120,25 +120,25 @@ def _lid(
     if len(corners) == 3:
         return lids.Lid(corners, np.array([[0, 1, 2]]), 3)
     rim, cut = lids.SmoothRim.of(corners), lids.cut_to_pieces(corners)
-    flat, smooth = _films(rim, cut)
+    pattern, smooth = _spanned(rim, cut)
     width, points = bending.width_of(smooth), smooth.vertices[: smooth.n_rim]
     if width <= SLIT * rim.length:
-        return flat
+        return lids.draped(pattern, smooth)
     near = bending.samples_near(own, tree, patches, scipy.spatial.cKDTree(cut), bending.REACH * width)
     normals, curvatures, held = bending.continuation(smooth, near, ends[rim.edges_at(points)], width)
     bent = lids.plate(smooth, normals, curvatures, held) if held.max() > bending.FREE else None
     if bent is not None:
-        return lids.draped(flat, bent)
+        return lids.draped(pattern, bent)
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     nearest = scipy.spatial.cKDTree(points).query(middles)[1]
-    return creases.creased(corners, normals[nearest]) or flat
+    return creases.creased(corners, normals[nearest]) or lids.draped(pattern, smooth)
 
 
-def _films(rim: lids.SmoothRim, cut: NDArray[np.float64]) -> tuple[lids.Film, lids.Film]:
-    """Lids of least area over a loop and over the smooth one, triangulated in the same plane or disc."""
+def _spanned(rim: lids.SmoothRim, cut: NDArray[np.float64]) -> tuple[lids.Film, lids.Film]:
+    """The pattern of a loop, and a film over the smooth one, triangulated in the same plane or disc."""
     frame = lids.frame_of(cut)
     if frame is not None:
-        flat, smooth = lids.film(cut, frame), lids.film(rim.points, frame)
-        if flat is not None and smooth is not None:
-            return flat, smooth
-    return lids.film_over_disc(cut), lids.film_over_disc(rim.points, float(rim.places[0]))
+        pattern, smooth = lids.pattern(cut, frame), lids.pattern(rim.points, frame)
+        if pattern is not None and smooth is not None:
+            return pattern, lids.film(smooth)
+    return lids.disc_pattern(cut), lids.film(lids.disc_pattern(rim.points, float(rim.places[0])))

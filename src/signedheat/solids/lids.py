@@ -26,7 +26,7 @@ SPLITS = 8
 """How often edges of a rim are halved at most until all are edges of its triangulation."""
 
 PLANE = 1e-12
-"""Over its size, how far a rim may be off its plane for its lid to lie in it, unsolved: rounding."""
+"""How far a film moves, over its size, when it is at rest: rounding. One in a plane is from the first."""
 AT_ONCE = 1 << 20
 """Pairs of a point and an edge that are looked at together."""
 MOVED = 1e-9
@@ -152,51 +152,55 @@ def frame_of(rim: NDArray[np.float64]) -> Frame | None:
     return None if axes is None else (rim[0], axes)
 
 
-def film(rim: NDArray[np.float64], frame: Frame) -> Film | None:
-    """The lid of least area, near enough, triangulated in a plane; None if the loop's shadow there crosses itself."""
+def pattern(rim: NDArray[np.float64], frame: Frame) -> Film | None:
+    """A film before it is solved for, flat inside its rim; None if the loop's shadow in the plane crosses itself."""
     origin, axes = frame
     found = _in_polygon(rim, (rim - origin) @ axes)
     if found is None:
         return None
     rim, plane, faces = found
-    n, lifted = len(rim), origin + plane @ axes.T
-    if n == len(plane) or np.abs(lifted[:n] - rim).max() <= PLANE * np.abs(plane).max():
-        return Film(np.concatenate([rim, lifted[n:]]), faces, n, plane)
-    return _relaxed(rim, plane, faces)
+    return Film(np.concatenate([rim, origin + plane[len(rim) :] @ axes.T]), faces, len(rim), plane)
 
 
-def film_over_disc(rim: NDArray[np.float64], begin: float = 0.0) -> Film:
+def disc_pattern(rim: NDArray[np.float64], begin: float = 0.0) -> Film:
     """The same, triangulated in a disc, around which the loop begins at a share of the circle."""
-    return _relaxed(*_in_disc(rim, begin))
+    plane, faces = _in_disc(rim, begin)
+    vertices = np.zeros((len(plane), 3))
+    vertices[: len(rim)] = rim
+    return Film(vertices, faces, len(rim), plane)
 
 
-def _relaxed(rim: NDArray[np.float64], plane: NDArray[np.float64], faces: NDArray[np.int64]) -> Film:
-    """A hinged plate, which is a membrane.
+def film(pattern: Film) -> Film:
+    """The lid of least area, near enough.
 
     The first shape is harmonic in the plane, and the lengths of each shape give the next (Pinkall & Polthier 1993). No
     weight is negative, so that the lid stays within the hull of its rim.
     """
-    n = len(rim)
-    vertices = np.zeros((len(plane), 3))
-    vertices[:n] = rim
+    n, vertices, faces, plane = pattern.n_rim, pattern.vertices, pattern.faces, pattern.plane
+    if n == len(vertices):
+        return pattern
     edges, sides = np.unique(_sides(faces, len(plane)), return_inverse=True)
     ends = np.stack(np.divmod(edges, len(plane)))
-    shape = np.c_[plane, np.zeros(len(plane))]
+    shape, size = np.c_[plane, np.zeros(len(plane))], np.ptp(vertices[:n], axis=0).max()
     for _ in range(1 + ROUNDS):
         weights = np.bincount(sides.ravel(), _cotangents(shape, faces).ravel())
-        vertices = shape = _membrane(vertices, n, ends, np.maximum(weights, 1e-6))
+        shape = _membrane(vertices, n, ends, np.maximum(weights, 1e-6))
+        if np.abs(shape - vertices).max() <= PLANE * size:
+            break
+        vertices = shape
     return Film(vertices, faces, n, plane)
 
 
-def draped(lid: Film, over: Film) -> Lid:
+def draped(pattern: Film, over: Film) -> Lid:
     """A lid that follows another, triangulated in the same plane; what their rims differ by fades inside, harmonic."""
-    n = lid.n_rim
-    found = scipy.interpolate.LinearNDInterpolator(_delaunay(over.plane), over.vertices)(lid.plane)
+    n = pattern.n_rim
+    found = scipy.interpolate.LinearNDInterpolator(_delaunay(over.plane), over.vertices)(pattern.plane)
     off = np.isnan(found).any(axis=1)
-    found[off] = over.vertices[scipy.spatial.cKDTree(over.plane).query(lid.plane[off])[1]]
+    found[off] = over.vertices[scipy.spatial.cKDTree(over.plane).query(pattern.plane[off])[1]]
     if n == len(found):
-        return lid
-    return Lid(found + _harmonic(lid, lid.vertices[:n] - found[:n]), lid.faces, n)
+        return pattern
+    flat = Lid(np.c_[pattern.plane, np.zeros(len(found))], pattern.faces, n)
+    return Lid(found + _harmonic(flat, pattern.vertices[:n] - found[:n]), pattern.faces, n)
 
 
 def _membrane(
@@ -404,9 +408,7 @@ def _inside_polygon(points: NDArray[np.float64], polygon: NDArray[np.float64]) -
     return inside
 
 
-def _in_disc(
-    rim: NDArray[np.float64], begin: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+def _in_disc(rim: NDArray[np.float64], begin: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Triangles of the disc with points of the rim on its boundary, as far apart as they are, and others inside."""
     lengths = np.linalg.norm(np.roll(rim, -1, axis=0) - rim, axis=1)
     angles = 2 * np.pi * (begin + (np.cumsum(lengths) - lengths) / lengths.sum())
@@ -427,7 +429,7 @@ def _in_disc(
     a, b, c = points[faces].transpose(1, 0, 2)
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     faces[area < 0] = faces[area < 0][:, ::-1]
-    return rim, points, faces
+    return points, faces
 
 
 def _cotangents(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
