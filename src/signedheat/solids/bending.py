@@ -25,16 +25,12 @@ MOST = 4096
 DIVIDED = 1 << 20
 """Triangles behind a rim that are made by division at most, of which `MOST` are taken: those of a flat side behind
 slots .0012 to .1 as wide as they are long are 430,000 to 140,000."""
-NEAR = 0.05
-"""Part of that strip nearest to a place of the rim, which gives the normal there."""
 STIFF = 0.1
 """Depth of a wall, over that strip's, whose bending counts by half."""
 AGREEMENT = 0.5
 """Ratio of how far a surface bends and how far it would have to, from which on the lid is clamped: 1 on a ball."""
-FLAT = 0.05
-"""Turn of a surface, in radians, that is as good as none: a lid is then out by less than a hundredth of its width."""
-FREE = 0.01
-"""How far a rim is held at most where the lid is as good as flat."""
+UNBENT = 1e-6
+"""Turn of a surface, in radians, that rounding makes of none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,16 +143,15 @@ def continuation(
         return np.asarray(totals.reshape(n, *columns.shape[1:]))
 
     x, normals, areas = samples.positions[near] - loop[rows], samples.normals[near], samples.areas[near]
-    squares = (x * x).sum(axis=1)
-    behind = _units(sums(areas / (squares + (NEAR * reach) ** 2) ** 1.5, normals))
-    way = np.cross(behind, along)
+    weights = areas * (1.0 - (x * x).sum(axis=1) / reach**2)  # what comes into reach weighs nothing yet
+    weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
+    middle = sums(weights, normals)
+    way = np.cross(middle, along)
     enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
     way = _units(way)
-    frame = np.stack([way, np.cross(behind, way)], axis=1)
-    weights = areas * (1.0 - squares / reach**2)  # what comes into reach weighs nothing yet
-    weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
+    frame = np.stack([way, _units(np.cross(middle, way))], axis=1)
     at = np.einsum("kij,kj->ki", frame[rows], x)
-    mean, middle = sums(weights, at), sums(weights, normals)
+    mean = sums(weights, at)
     at = at - mean[rows]
     spread = sums(weights, at[:, :, None], at[:, None, :]) + (STIFF * reach) ** 2 * np.eye(2)
     slopes = np.linalg.solve(spread, sums(weights, at[:, :, None], (normals - middle[rows])[:, None, :]))
@@ -189,5 +184,5 @@ def _agreement(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[
     """1 where two numbers agree within a factor of 1 / `AGREEMENT`, 0 where they differ by its square or are 0."""
     swap = np.abs(one) > np.abs(other)
     low, high = np.where(swap, other, one), np.where(swap, one, other)
-    ratio = low * np.sign(high) / np.maximum(np.abs(high), FLAT)
+    ratio = low * np.sign(high) / np.maximum(np.abs(high), UNBENT)
     return np.asarray(np.clip((ratio - AGREEMENT**2) / (AGREEMENT - AGREEMENT**2), 0.0, 1.0))

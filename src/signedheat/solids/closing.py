@@ -13,9 +13,6 @@ from ..geometry.components import connected_components
 from . import bending, creases, lids
 from .rims import loops, meeting_edges, open_edges
 
-SLIT = 1e-3
-"""Width of an opening, over the length of its rim, up to which its lid is flat: its strip has no end of samples."""
-
 
 def lids_of(
     triangles: NDArray[np.float64], ids: NDArray[np.int64], parts: NDArray[np.int64], vertices: NDArray[np.float64]
@@ -122,11 +119,9 @@ def _lid(
     rim, cut = lids.SmoothRim.of(corners), lids.cut_to_pieces(corners)
     pattern, smooth = _spanned(rim, cut)
     width, points = bending.width_of(smooth), smooth.vertices[: smooth.n_rim]
-    if width <= SLIT * rim.length:
-        return lids.draped(pattern, smooth)
     near = bending.samples_near(own, tree, patches, scipy.spatial.cKDTree(cut), bending.REACH * width)
     normals, curvatures, held = bending.continuation(smooth, near, ends[rim.edges_at(points)], width)
-    bent = lids.plate(smooth, normals, curvatures, held) if held.max() > bending.FREE else None
+    bent = lids.plate(smooth, normals, curvatures, held) if held.any() else None
     if bent is not None:
         return lids.draped(pattern, bent)
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
