@@ -11,7 +11,7 @@ from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.welding import same_positions
 from ..geometry.winding_tree import WindingTree
-from .parts import FRAGMENTS, face_areas, level, own_levels
+from .parts import face_areas, level, own_levels
 
 COPY = 0.5
 """Distance from a body, over the size of a piece, up to which the piece is a copy of what is there."""
@@ -150,8 +150,7 @@ def bound_together(triangles: NDArray[np.float64], labels: NDArray[np.int64], lo
         return False
     pieces = np.bincount(np.unique(labels[loose], return_inverse=True)[1], areas)
     n = pieces.sum() ** 2 / (pieces**2).sum()
-    joint = level(triangles, np.flatnonzero(loose))
-    return joint >= FRAGMENTS and joint * float(np.sqrt(n)) >= CHANCE
+    return level(triangles, np.flatnonzero(loose)) * float(np.sqrt(n)) >= CHANCE
 
 
 def scatter_of(triangles: NDArray[np.float64], labels: NDArray[np.int64]) -> float:

@@ -23,8 +23,6 @@ ball .16, a quarter .20, three sides of a box .22."""
 UPRIGHT = 0.45
 """Uprightness of the rims of a part from which on it is a body, however thin. Three sides of a cube at a corner have
 .58, of a flat box .54, a tray 1; a half pipe .32, a shallow dome .34, a sheet folded at a right angle .24."""
-FRAGMENTS = 0.06
-"""The same for parts that bound together: an eighth of the faces of a ball has .0625."""
 PLACES = 4096
 """Faces of a large part that its level is the mean of."""
 FEW = 256
