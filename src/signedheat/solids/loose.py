@@ -39,20 +39,10 @@ def without_copies(
         return np.ones(len(triangles), dtype=bool)
     corners = bodies.reshape(-1, 3)
     tree = FaceTree.of(FaceFeatures.of(corners, np.arange(len(corners)).reshape(-1, 3)))
-    found = tree.search(triangles.reshape(-1, 3))
-    away = found.distances.reshape(-1, 3)
-    a, b, c = triangles.transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    facing = np.abs((normals[:, None] * tree.features.face_normals[found.faces].reshape(-1, 3, 3)).sum(axis=2))
-    doubled = np.linalg.norm(normals, axis=1)
-    parallel = (facing > 0.7 * doubled[:, None]).any(axis=1)
     n = int(labels.max()) + 1
-    sizes = np.sqrt(np.bincount(labels, 0.5 * doubled, n))
-    farthest = np.zeros(n)
-    np.maximum.at(farthest, labels, away.max(axis=1))
-    share = np.bincount(labels, parallel, n) / np.maximum(np.bincount(labels, minlength=n), 1)
-    copy = (farthest < COPY * sizes) & (share > 0.5)
-    kept: NDArray[np.bool_] = ~copy[labels]
+    sizes, farthest = np.sqrt(np.bincount(labels, face_areas(triangles), n)), np.zeros(n)
+    np.maximum.at(farthest, labels, tree.distances(triangles.reshape(-1, 3)).reshape(-1, 3).max(axis=1))
+    kept: NDArray[np.bool_] = (farthest >= COPY * sizes)[labels]
     return kept
 
 
