@@ -33,3 +33,11 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     is_worker = hasattr(session.config, "workerinput")
     if not is_worker and session.config.getoption("numprocesses", None):
         subprocess.run([sys.executable, "-m", "signedheat", "warmup", "--quiet"], check=False)
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Batches start no processes."""
+    from batch_jobs import Here  # imports NumPy, which must know the number of threads
+
+    monkeypatch.setattr("signedheat.batches.pool.Worker", Here)

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from batch_jobs import measure
+from batch_jobs import Here, measure
 from refusals import refused
 from signedheat import samples
+from signedheat.batches import pool
 from signedheat.batches.inputs import expand
 from signedheat.batches.manifest import Manifest
 
@@ -67,6 +68,7 @@ def test_whatever_happens_to_one_the_others_are_done(tmp_path, files):
     assert present == {"manifest.jsonl", *(f"{name}.{end}" for name in ("a", "loud", "z") for end in ("begun", "txt"))}
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_restart_does_what_is_not_done_yet(tmp_path, files):
     folder, out = files("a.ply", "b.ply", "c.ply"), tmp_path / "out"
     first = sh.batches.run(folder, out, measure, workers=1)
@@ -85,6 +87,7 @@ def test_a_restart_does_what_is_not_done_yet(tmp_path, files):
     assert sh.batches.run(folder, out, measure, workers=1).skipped == 3
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_another_job_does_everything_again(tmp_path):
     samples.sphere(2).save(tmp_path / "ball.ply")
     out = tmp_path / "out"
@@ -103,12 +106,15 @@ def test_what_was_short_of_memory_is_tried_again_alone(tmp_path, files):
 
 
 def test_results_do_not_depend_on_the_number_of_workers(tmp_path):
+    """Nor on the process: this one, and two workers."""
     for k in range(2):
         samples.without_faces(samples.sphere(2, radius=1 + k), 0.2, seed=k).save(tmp_path / f"in{k}.ply")
     sampling = sh.batches.Sampling(n=300, normalize=True)
     job = sh.batches.Job(volume=".npy", offsets=(0.1, -0.1), samples=sampling, info=True, resolution=16)
     one, two = tmp_path / "one", tmp_path / "two"
-    sh.batches.run(str(tmp_path / "in*.ply"), one, job, workers=1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pool, "Worker", Here)
+        sh.batches.run(str(tmp_path / "in*.ply"), one, job, workers=1)
     batch = sh.batches.run(str(tmp_path / "in*.ply"), two, job, workers=2)
     names = sorted(path.name for path in one.iterdir())
     assert names == sorted(path.name for path in two.iterdir())
@@ -122,10 +128,11 @@ def test_results_do_not_depend_on_the_number_of_workers(tmp_path):
     np.testing.assert_array_equal(sh.load_field(one / "in1.npy").values, field.values)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_killing_the_whole_batch_loses_only_what_was_under_way(tmp_path, files):
     folder, out = files("a.ply", "b.ply", "slow.ply"), tmp_path / "out"
     code = (
-        "import signedheat as sh\nfrom batch_jobs import measure\n"
+        "import signedheat as sh\nfrom batch_jobs import Here, measure\n"
         f"sh.batches.run({str(folder)!r}, {str(out)!r}, measure, workers=1)"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
@@ -169,6 +176,7 @@ def is_running(number):
         return False
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_progress_estimates_and_stops(tmp_path, files):
     folder, heard = files("a.ply", "b.ply", "c.ply"), []
 
@@ -254,6 +262,7 @@ def test_odd_time_limits(tmp_path, odd):
 
 
 @pytest.mark.parametrize("name", ["new\nline", "separator\u2028", "next\x85", "quote\"'", "-dash", "\udcff"])
+@pytest.mark.usefixtures("in_this_process")
 def test_odd_names_are_one_line_of_the_manifest(tmp_path, files, name):
     try:
         folder = files(f"{name}.ply")
@@ -289,6 +298,7 @@ def test_links_that_run_in_circles_give_every_file_once(tmp_path, files):
         assert len(expand([given], tmp_path / "out")) == 3
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_results_among_the_shapes_are_refused(tmp_path, files):
     folder = files("a.ply")
     for target in (folder, tmp_path):
@@ -299,6 +309,7 @@ def test_results_among_the_shapes_are_refused(tmp_path, files):
     assert sh.batches.run(folder, folder / "out", measure, workers=1).outcomes[0].is_done
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_folder_is_written_by_one_batch_at_a_time(tmp_path, files):
     folder, out = files("a.ply", "b.ply"), tmp_path / "out"
 
@@ -326,6 +337,7 @@ def test_what_has_the_name_of_the_manifest_is_refused(tmp_path, files, odd):
         sh.batches.run(files("a.ply"), tmp_path / "out", measure, workers=1)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_damaged_manifests_are_begun_anew(tmp_path, files):
     folder, out = files("a.ply"), tmp_path / "out"
     sh.batches.run(folder, out, measure, workers=1)
@@ -340,6 +352,7 @@ def test_damaged_manifests_are_begun_anew(tmp_path, files):
 
 
 @pytest.mark.parametrize("odd", ["folder", "device"])
+@pytest.mark.usefixtures("in_this_process")
 def test_results_replace_nothing_but_files(tmp_path, files, odd):
     folder, out = files("a.ply"), tmp_path / "out"
     out.mkdir()
@@ -349,6 +362,7 @@ def test_results_replace_nothing_but_files(tmp_path, files, odd):
     assert {path.name for path in out.iterdir()} == {"a.txt", "manifest.jsonl"}
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_results_go_where_links_lead_with_the_permissions_there(tmp_path, files):
     folder, out = files("a.ply"), tmp_path / "out"
     out.mkdir()

@@ -35,6 +35,7 @@ def test_batch_makes_what_is_asked_for_and_says_what_failed(tmp_path, folder, ca
     assert "1 done (1 of them before)" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_list_on_standard_input(tmp_path, folder, capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO(f"{folder / 'ball.ply'}\n\n"))
     assert main(["batch", "-", "-o", str(tmp_path / "out"), "--info", "--workers", "1"]) == 0
@@ -60,6 +61,7 @@ def test_bad_usage(tmp_path, folder, capsys, options):
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_bands_of_many_shapes(tmp_path, folder, capsys):
     (folder / "bad.stl").unlink()
     out, options = tmp_path / "out", ["--resolution", "40", "--band", "0.3", "--workers", "1"]

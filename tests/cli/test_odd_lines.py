@@ -131,6 +131,7 @@ def told_by_batch(capsys, *options):
     return status, told
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_batch_of_odd_files(folder, capsys):
     odd = ["missing.stl", "empty.stl", "text.stl", "shape.xyzzy", "shape"]
     status, told = told_by_batch(capsys, *(f"{folder}/{name}" for name in odd), "-o", f"{folder}/many")

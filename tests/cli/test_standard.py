@@ -1,4 +1,4 @@
-"""``-`` for standard input and output, in processes of their own."""
+"""``-`` for standard input and output."""
 
 import io
 import json
@@ -10,12 +10,19 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.cli import main
 from signedheat.cli.standard import sniffed
 
 
-def run(*arguments, data=b""):
-    command = [sys.executable, "-m", "signedheat", *arguments]
-    return subprocess.run(command, input=data, capture_output=True, check=False)
+@pytest.fixture
+def run(monkeypatch, capsysbinary):
+    """A command with what it reads on standard input: its status, and what it writes on both outputs."""
+
+    def ran(*arguments, data=b""):
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
+        return main(list(arguments)), *capsysbinary.readouterr()
+
+    return ran
 
 
 @pytest.mark.parametrize("ending", [".stl", ".obj", ".ply", ".off", ".vtp"])
@@ -39,30 +46,34 @@ def test_points_curves_and_fields_too(tmp_path):
         assert caught.value.path == "standard input"
 
 
-def test_a_shape_goes_through_a_pipe(tmp_path):
+def test_a_shape_goes_through_a_pipe(tmp_path, run):
+    """Of a process the first time."""
     ball = tmp_path / "ball.ply"
     samples.sphere(2).save(ball)
     arguments = ["--resolution", "20"]
-    done = run("offset", "-", "0.5", "-o", "-", "--format", "obj", *arguments, data=ball.read_bytes())
+    command = [sys.executable, "-m", "signedheat", "offset", "-", "0.5", "-o", "-", "--format", "obj", *arguments]
+    done = subprocess.run(command, input=ball.read_bytes(), capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     (tmp_path / "grown.obj").write_bytes(done.stdout)
     assert np.linalg.norm(sh.read(tmp_path / "grown.obj").vertices, axis=1) == pytest.approx(1.5, abs=0.05)
-    done = run("volume", "-", "-o", "-", "--json", *arguments, data=ball.read_bytes())
-    with np.load(io.BytesIO(done.stdout)) as arrays:
+    status, printed, _ = run("volume", "-", "-o", "-", "--json", *arguments, data=ball.read_bytes())
+    assert status == 0
+    with np.load(io.BytesIO(printed)) as arrays:
         same = sh.signed_distance(sh.read(ball), resolution=20)
         np.testing.assert_array_equal(arrays["values"], same.values)
-    told = json.loads(run("info", "-", "--json", data=ball.read_bytes()).stdout)
+    told = json.loads(run("info", "-", "--json", data=ball.read_bytes())[1])
     assert told["file"] == "standard input" and told["n_vertices"] == 162
 
 
-def test_what_goes_wrong_names_standard_input(tmp_path):
-    done = run("volume", "-", "-o", str(tmp_path / "a.npz"), data=b"ply\nformat ascii 1.0\nelement vertex 9\n")
-    assert done.returncode == 1 and done.stderr.startswith(b"signedheat: standard input: ")
-    assert done.stderr.count(b"\n") == 1
-    done = run("volume", "-", "-o", str(tmp_path / "a.npz"))
-    assert done.returncode == 1 and b"standard input" in done.stderr
+def test_what_goes_wrong_names_standard_input(tmp_path, run):
+    status, _, said = run(
+        "volume", "-", "-o", str(tmp_path / "a.npz"), data=b"ply\nformat ascii 1.0\nelement vertex 9\n"
+    )
+    assert status == 1 and said.startswith(b"signedheat: standard input: ") and said.count(b"\n") == 1
+    status, _, said = run("volume", "-", "-o", str(tmp_path / "a.npz"))
+    assert status == 1 and b"standard input" in said
     samples.sphere(1).save(tmp_path / "ball.ply")
-    done = run("offset", str(tmp_path / "ball.ply"), "0.1", "0.2", "-o", "-", "--resolution", "16")
-    assert done.returncode == 2 and b"one surface" in done.stderr and done.stdout == b""
-    done = run("offset", str(tmp_path / "ball.ply"), "0.1", "-o", "-", "--format", "txt")
-    assert done.returncode == 1 and done.stderr.startswith(b"signedheat: standard output: ") and done.stdout == b""
+    status, printed, said = run("offset", str(tmp_path / "ball.ply"), "0.1", "0.2", "-o", "-", "--resolution", "16")
+    assert status == 2 and b"one surface" in said and printed == b""
+    status, printed, said = run("offset", str(tmp_path / "ball.ply"), "0.1", "-o", "-", "--format", "txt")
+    assert status == 1 and said.startswith(b"signedheat: standard output: ") and printed == b""

@@ -36,6 +36,7 @@ def test_closed_meshes_and_a_line_for_each(tmp_path, folder, capsys):
     assert_closed_manifold(sh.read(tmp_path / "out" / "ball.stl"))
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_contours_say_how_far_they_are_from_the_faces(tmp_path, folder, capsys):
     options = "--contour", "--spacing", "0.07", "--surface", "ply"
     (found,) = figures(tmp_path, capsys, folder / "plank.ply", *options)["shapes"]
@@ -46,6 +47,7 @@ def test_contours_say_how_far_they_are_from_the_faces(tmp_path, folder, capsys):
     assert_closed_manifold(sh.read(tmp_path / "out" / "plank.ply"))
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_sheets_need_a_thickness(tmp_path, capsys):
     sheet([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.1]]).save(tmp_path / "sheet.ply")
     command = ["watertight", str(tmp_path / "sheet.ply"), "-o", str(tmp_path / "out"), "--workers", "1"]
@@ -63,6 +65,7 @@ def test_bad_usage(tmp_path, folder, capsys):
         assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_samples_for_trainers(tmp_path, folder, capsys):
     """Of a box with a face gone: all in closed form."""
     (found,) = figures(tmp_path, capsys, folder / "plank.ply", "--sample", "300")["shapes"]
