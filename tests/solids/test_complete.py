@@ -117,35 +117,30 @@ def test_lids_of_a_ball_go_on_as_the_ball_bends():
 def test_what_is_gone_of_a_ball_shrinks_it_and_never_lets_it_jump():
     vertices, faces = ball()
     heights = vertices[faces].mean(axis=1)[:, 2]
-    volumes = [volume(sh.complete((vertices, faces[heights < z]))) for z in np.linspace(0.95, -0.2, 24)]
+    volumes = [volume(sh.complete((vertices, faces[heights < z]))) for z in np.arange(13, -3, -1) * 0.07]
     assert np.abs(np.diff(volumes)).max() < 0.06 * volumes[0]
-    assert volumes[19] > 0.95 * volumes[0]  # half of it
+    assert volumes[13] > 0.95 * volumes[0]  # half of it
 
 
 @pytest.mark.parametrize("share", [0.3, 0.75])
 def test_faces_missing_at_random_leave_the_ball(share):
-    vertices, faces = ball()
-    kept = faces[np.random.default_rng(1).random(len(faces)) > share]
-    solid = sh.complete((vertices, kept))
-    points = np.random.default_rng(2).uniform(-1.4, 1.4, (4000, 3))
+    sphere = samples.sphere(3)
+    kept = sphere.faces[np.random.default_rng(1).random(sphere.n_faces) > share]
+    solid = sh.complete((sphere.vertices, kept))
+    points = np.random.default_rng(2).uniform(-1.4, 1.4, (1000, 3))
     radius = np.linalg.norm(points, axis=1)
     clear = np.abs(radius - 1) > 0.05
     assert (solid.inside(points[clear]) == (radius[clear] < 1)).all()
 
 
-def wrong_share(solid, n_vertices):
-    """Share of the unit ball whose sign is wrong."""
-    points = np.random.default_rng(n_vertices).uniform(-1.4, 1.4, (4000, 3))
-    real = np.linalg.norm(points, axis=1) < 1
-    return (solid.inside(points) != real).sum() / real.sum()
-
-
-@pytest.mark.parametrize(("share", "seed"), [(0.6, 1), (0.65, 0), (0.65, 2)])
-def test_a_large_part_of_a_ball_is_completed_with_the_fragments_around_it(share, seed):
-    """Of nine such balls those that are wrong, by up to two thirds, where large parts are left as they are."""
+def test_a_large_part_of_a_ball_is_completed_with_the_fragments_around_it():
+    """Of nine such balls one of those that are wrong, by two thirds, where large parts are left as they are."""
     sphere = samples.sphere(3)
-    kept = sphere.faces[np.random.default_rng(seed).random(sphere.n_faces) > share]
-    assert wrong_share(sh.complete((sphere.vertices, kept)), seed) < 0.05
+    kept = sphere.faces[np.random.default_rng(0).random(sphere.n_faces) > 0.65]
+    solid = sh.complete((sphere.vertices, kept))
+    points = np.random.default_rng(0).uniform(-1.4, 1.4, (1000, 3))
+    real = np.linalg.norm(points, axis=1) < 1
+    assert (solid.inside(points) != real).sum() < 0.05 * real.sum()
 
 
 def test_litter_around_an_open_box_changes_nothing_of_its_completion():
@@ -186,7 +181,7 @@ def pipe(sections, inner=0.3, outer=0.5, height=1.4):
     return vertices, np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
 
 
-@pytest.mark.parametrize(("sections", "seed"), [(24, 0), (24, 1), (24, 2), (96, 0)])
+@pytest.mark.parametrize(("sections", "seed"), [(24, 0), (48, 0)])
 def test_half_of_the_triangles_of_a_coarse_part_close_to_about_its_volume(sections, seed):
     vertices, faces = pipe(sections)
     whole = volume(sh.complete((vertices, faces)))
@@ -377,8 +372,12 @@ def moved(name, vertices, faces):
     }[name]
 
 
-@pytest.mark.parametrize("name", ["turned", "shifted", "scaled", "reordered", "rounded"])
-def test_what_is_inside_does_not_depend_on_how_the_shape_is_given(name):
+AROUND = np.random.default_rng(0).uniform(-1.2, 1.4, (4000, 3))
+
+
+@pytest.fixture(scope="module")
+def as_given():
+    """Shapes, and which points around them are inside."""
     vertices, faces = ball()
     centres = vertices[faces].mean(axis=1)
     shapes = [
@@ -386,10 +385,14 @@ def test_what_is_inside_does_not_depend_on_how_the_shape_is_given(name):
         (vertices, faces[centres[:, 2] < 0.3]),
         (vertices, faces[centres[:, 0] * 2 < centres[:, 2]]),
     ]
-    points = np.random.default_rng(0).uniform(-1.2, 1.4, (4000, 3))
-    for v, f in shapes:
-        w, g, along = moved(name, v, f)
-        assert np.mean(sh.complete((w, g)).inside(along(points)) != sh.complete((v, f)).inside(points)) < 6e-3
+    return [(shape, sh.complete(shape).inside(AROUND)) for shape in shapes]
+
+
+@pytest.mark.parametrize("name", ["turned", "shifted", "scaled", "reordered", "rounded"])
+def test_what_is_inside_does_not_depend_on_how_the_shape_is_given(name, as_given):
+    for shape, inside in as_given:
+        vertices, faces, along = moved(name, *shape)
+        assert np.mean(sh.complete((vertices, faces)).inside(along(AROUND)) != inside) < 6e-3
 
 
 @pytest.mark.parametrize("parts", [1, 2, 3, 4])
@@ -407,9 +410,9 @@ def test_rounding_chooses_nothing(parts):
 def test_points_with_normals_and_noisy_soups_are_completed_by_heat():
     points = np.random.default_rng(0).uniform(-1.5, 1.5, (3000, 3))
     truth = np.linalg.norm(points, axis=1) - 1
-    cloud = samples.oriented_points(samples.sphere(4), 3000)
+    cloud = samples.oriented_points(samples.sphere(4), 1000)
     soup = samples.soup(samples.sphere(3), 0.02)
-    for shape, error in ((cloud, 0.005), (soup, 0.02)):
+    for shape, error in ((cloud, 0.003), (soup, 0.013)):  # noise is averaged
         solid = sh.complete(shape)
         assert np.sqrt(np.mean((solid.distance(points) - truth) ** 2)) < error
         assert (solid.origins == -1).all()

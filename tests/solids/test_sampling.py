@@ -26,7 +26,7 @@ def exact_distance(points):
 
 @pytest.fixture(scope="module")
 def holed():
-    return sh.signed_distance(samples.without_faces(samples.sphere(4), 0.5, seed=3), resolution=40)
+    return sh.complete(samples.without_patches(samples.sphere(3), 3, 0.4)).field(resolution=8)
 
 
 def test_distances_are_exact_and_gradients_theirs(box):

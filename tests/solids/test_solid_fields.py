@@ -63,7 +63,7 @@ def test_on_grids_that_cut_the_solid_or_miss_it(solid):
 
 
 def test_on_coarse_grids_around_many_faces():
-    solid = complete(samples.sphere(6))
+    solid = complete(samples.sphere(5))
     assert_exact(solid.field(resolution=12), solid)
     assert_exact(solid.field(spacing=0.15, padding=0.4), solid)
 
@@ -72,7 +72,7 @@ def test_gaps_beside_what_was_given_do_not_leak():
     """Between faces and the zero set of φ they are wider than these steps."""
     solid = complete(samples.without_faces(samples.sphere(3), 0.75, seed=1), completion="heat")
     rim = solid.faces.vertices[0]
-    field = solid.field(grid=sh.Grid(1.02 * rim - 0.12, 0.005, (48, 48, 48)))
+    field = solid.field(grid=sh.Grid(1.02 * rim - 0.12, 0.01, (24, 24, 24)))
     assert_exact(field, solid)
     assert 0.2 < (field.values < 0).mean() < 0.8
 
