@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -254,7 +252,7 @@ def test_walls_come_from_pictures_and_volumes(tmp_path, capsys):
 
 
 def test_intrinsic_triangles_for_meshes_with_large_angles(tmp_path, capsys):
-    mesh = stretched_square(300, 30.0)
+    mesh = stretched_square(80, 30.0)
     mesh.save(tmp_path / "square.ply")
     (tmp_path / "line.csv").write_text("-1 0.1 0\n1 0.1 0\n")
     out = tmp_path / "phi.npz"
@@ -292,12 +290,3 @@ def test_tets_from_the_command_line(tmp_path, capsys):
     succeed(capsys, "view", tmp_path / "bare.vtu", "-o", tmp_path / "picture.png")
     message = fail(capsys, "volume", tmp_path / "ball.stl", *flags, "--mask", "x.npy", "-o", tmp_path / "x.vtu", code=2)
     assert "--mask" in message and "--tets" in message
-
-
-def test_who_reads_the_output_may_stop_reading(tmp_path):
-    sphere(1).save(tmp_path / "ball.stl")
-    command = [sys.executable, "-m", "signedheat", "info", str(tmp_path / "ball.stl")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        process.stdout.close()
-        assert process.stderr.read() == b""
-        assert process.wait() == 0

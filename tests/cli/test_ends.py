@@ -65,10 +65,9 @@ def test_output_that_cannot_hold_the_text(ball, tmp_path):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
-@pytest.mark.parametrize("json", [[], ["--json"]])
-def test_full_output(field, json):
+def test_full_output(field):
     with open("/dev/full", "w") as full:
-        done = run("info", field, *json, stdout=full)
+        done = run("info", field, stdout=full)
     assert done.returncode == 1
     assert_one_line(done.stderr)
 
