@@ -66,6 +66,9 @@ def test_tags_may_be_any_numbers_and_elements_of_any_kind(tmp_path, data):
         ("3 1 0 0", "nan 1 0 0"),
         ("3 1 0 0", "x 1 0 0"),
         ("$EndNodes", ""),
+        ("$Nodes\n5\n7 0", "$Nodes\n5\n9000000000000 0"),
+        ("$Nodes\n5", "$PhysicalNames\n1000000000000\n$Nodes\n5"),
+        ("$Elements\n6", "$NodeData\n1000000000000\n$Elements\n6"),
         ("2.2 0 8", "4 0 8"),
         ("2.2 0 8", "2.2 1 8"),
     ],
@@ -84,3 +87,20 @@ def test_blocks_of_version_four_that_are_only_announced(tmp_path):
         (tmp_path / "odd.msh").write_bytes(FOUR.replace(old.encode(), new.encode(), 1))
         with refused(sh.errors.SignedHeatError):
             sh.read(tmp_path / "odd.msh")
+
+
+def test_numbers_of_nodes_for_whose_table_there_is_no_memory(tmp_path, monkeypatch):
+    """In text and in blocks of bytes; coordinates may be as large as they like."""
+    monkeypatch.setattr("signedheat.io.files.available_memory", lambda: 10**9)
+    (tmp_path / "odd.msh").write_bytes(FOUR.replace(b"\n40\n", b"\n855000000\n", 1))
+    with refused(sh.errors.MemoryLimitError):
+        sh.read(tmp_path / "odd.msh")
+    (tmp_path / "odd.msh").write_bytes(FOUR.replace(b"\n1 1 1\n", b"\n9000000000000 1 1\n", 1))
+    assert sh.read(tmp_path / "odd.msh").vertices[4].tolist() == [9e12, 1.0, 1.0]
+    meshio.Mesh(BOX.vertices, [("tetra", BOX.tets)]).write(tmp_path / "box.msh", file_format="gmsh")
+    data = (tmp_path / "box.msh").read_bytes()
+    number = np.arange(1, 4, dtype=np.uint64).tobytes()
+    assert data.count(number) == 1
+    (tmp_path / "box.msh").write_bytes(data.replace(number, number[:-5] + b"\x09" + number[-4:]))
+    with refused(sh.errors.MemoryLimitError):
+        sh.read(tmp_path / "box.msh")

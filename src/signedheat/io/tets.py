@@ -20,6 +20,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..errors import FileFormatError, GeometryError
 from ..packages import require
 from .files import PathLike, contents, extension, format_for, parsed_by_others, replacing, writing
+from .gmsh import refuse_announcements
 from .vtk_xml import read_vtu
 
 MODULES = {
@@ -72,6 +73,8 @@ def load_cells(path: PathLike) -> Any:
     for file in files:
         if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would look on
             raise FileFormatError("there is nothing in it", remedy="write it again", path=file)
+    if extension(path) == ".msh":
+        refuse_announcements(path)
     return parsed_by_others(lambda: module.read(str(path)), sum(len(contents(file)) for file in files))
 
 
