@@ -120,3 +120,13 @@ def test_what_packages_tell_each_other_is_no_warning_of_a_command(tmp_path, monk
     monkeypatch.setattr("signedheat.io.shapes.READERS", {".ply": deprecated})
     assert main(["info", "ball.ply"]) == 0
     assert capsys.readouterr().err == "signedheat: a surface with holes\n"
+
+
+def test_info_of_voxels_in_an_array(tmp_path, capsys):
+    """An array without the description of a field holds voxels."""
+    volume = np.zeros((6, 6, 6), dtype=bool)
+    volume[1:4, 2:4, 3:4] = True
+    np.save(tmp_path / "box.npy", volume)
+    assert main(["info", str(tmp_path / "box.npy"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["kind"], found["n_faces"], found["open_edges"], found["area"]) == ("DigitalSurface", 22, 0, 22.0)

@@ -217,8 +217,7 @@ def in_band(solid: Any, grid: Grid, arguments: Namespace, progress: Progress | N
     """Distance in a band: all of it in memory, or tile by tile."""
     options = {"grid": grid, "band": arguments.band, "store": arguments.tiles, "progress": progress}
     if arguments.tiles is None or arguments.workers is None:
-        field: GridField = solid.field(scheduler=arguments.scheduler, **options)
-        return field
+        return solid.field(scheduler=arguments.scheduler, **options)
     with ProcessPoolExecutor(arguments.workers, multiprocessing.get_context("spawn")) as pool:
         field = solid.field(scheduler=pool, **options)
         return field
@@ -273,8 +272,10 @@ def field_or_image(path: str) -> Any:
     """The field in a file; the image in it, if its axes are not x, y, z; None if the format holds neither."""
     if extension(path) in NIFTI:
         return read_labels(path)
-    if extension(path) not in FIELD_FORMATS:
-        return None
+    if extension(path) not in FIELD_FORMATS or (
+        extension(path) == ".npy" and not Path(path).with_suffix(".json").is_file()
+    ):
+        return None  # an array alone holds voxels
     try:
         return load_field(path)
     except FileFormatError as error:

@@ -12,6 +12,8 @@ from ..geometry.edges import HalfedgePairs, following_corners, may_coincide, pai
 from ..geometry.triangle_kernels import areas_of_polygons
 from ..geometry.welding import coincident_faces, same_positions
 from ..operators.tetrahedral import FLAT
+from .digital_surface import DigitalSurface
+from .foreign import Shape
 from .point_cloud import PointCloud
 from .polygon_mesh import PolygonMesh
 from .tet_mesh import TetMesh
@@ -135,12 +137,12 @@ class TetReport:
     upper: tuple[float, ...]
 
 
-def inspect(shape: TriangleMesh | PolygonMesh | PointCloud | TetMesh) -> SurfaceReport | CloudReport | TetReport:
+def inspect(shape: Shape) -> SurfaceReport | CloudReport | TetReport:
     """Count the elements and defects of a shape, in O(n) time.
 
     Parameters
     ----------
-    shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh
+    shape : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
         Any shape, however broken.
 
     Returns
@@ -162,7 +164,9 @@ def inspect(shape: TriangleMesh | PolygonMesh | PointCloud | TetMesh) -> Surface
             lower=_tuple(shape.bounds[0]),
             upper=_tuple(shape.bounds[1]),
         )
-    return _inspect_tets(shape) if isinstance(shape, TetMesh) else _inspect_surface(shape)
+    if isinstance(shape, TetMesh):
+        return _inspect_tets(shape)
+    return _inspect_surface(shape.squares if isinstance(shape, DigitalSurface) else shape)
 
 
 def _inspect_tets(mesh: TetMesh) -> TetReport:
