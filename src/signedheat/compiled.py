@@ -92,12 +92,12 @@ class Kernel(Generic[Parameters, Returned]):
             if Kernel.is_kept and Path(self.function.__code__.co_filename).is_file():  # not what was typed in
                 wanted, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(cache_folder() / _digest(self))
                 try:
-                    return numba.njit(cache=True, **self.options)(self.function)  # type: ignore[no-any-return]
+                    return numba.njit(cache=True, **self.options)(self.function)
                 except RuntimeError as error:  # no folder can be written to
                     logger.info("compiled in every process: %s", error)
                 finally:
                     numba.config.CACHE_DIR = wanted
-            return numba.njit(**self.options)(self.function)  # type: ignore[no-any-return]
+            return numba.njit(**self.options)(self.function)
 
 
 @overload

@@ -453,8 +453,7 @@ def _linear(shape: Shapes | Solid, values: NDArray[np.float64]) -> Reach:
     def interpolated(places: NDArray[np.float64]) -> NDArray[np.float64]:
         found = faces.search(places)
         ids = corners[faces.features.ids[found.faces]]
-        result: NDArray[np.float64] = (weights_in(vertices[ids], found.places) * values[ids]).sum(axis=1)
-        return result
+        return (weights_in(vertices[ids], found.places) * values[ids]).sum(axis=1)
 
     return interpolated
 

@@ -94,8 +94,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         progress = self.progress
         report = None if progress is None else lambda share, _: progress((1 + share) / 5, "refine")
         if self.intrinsic == "auto":
-            refined: Adaptable = lowered_by_angles(self.domain, report)
-            return refined
+            return lowered_by_angles(self.domain, report)
         return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)
 
     def _times(self, discretization: Discretization) -> Diffusion:

@@ -90,5 +90,4 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     slopes = torch.from_numpy(found.gradients)
     moved = (exact - exact.detach()) - (nearest - nearest.detach())
     values = torch.from_numpy(found.distances) + (moved * slopes).sum(dim=1)
-    result: Tensor = values.to(device=points.device, dtype=points.dtype)
-    return result
+    return values.to(device=points.device, dtype=points.dtype)

@@ -1,4 +1,4 @@
-"""The type check that CI runs: what it counts, and that it knows when there is more of it."""
+"""The type check that CI runs, and that no public name is of any type."""
 
 from __future__ import annotations
 
@@ -13,33 +13,10 @@ import pytest
 from public_names import PUBLIC
 
 ROOT = Path(__file__).parents[2]
-PUBLIC_MODULES = (
-    "__init__",
-    "constraints",
-    "discretization",
-    "errors",
-    "method",
-    "solver",
-    "domains/",
-    "curves/",
-    "fields/",
-    "io/",
-)
 
 
 def tool() -> dict[str, object]:
     return runpy.run_path(str(ROOT / "tools" / "check_types.py"))
-
-
-def test_the_baseline_names_no_module_of_the_public_face():
-    allowed = tool()["read_baseline"]((ROOT / "tools" / "type_errors.txt").read_text(encoding="utf-8"))
-    assert allowed
-    assert [name for name in allowed if name.removeprefix("src/signedheat/").startswith(PUBLIC_MODULES)] == []
-
-
-def test_errors_are_counted_by_file():
-    output = "a.py:1: error: bad  [x]\na.py:1: note: see\na.py:4: error: bad  [x]\nb.py:7: error: worse  [y]\nFound 3"
-    assert tool()["counted"](output) == {"a.py": 2, "b.py": 1}
 
 
 def test_code_of_the_first_pages_is_checked(tmp_path):

@@ -190,8 +190,7 @@ def do_apart(task: Task, threads: int, time_limit: float | None) -> Done:
     """Do a task in a process of its own on the machine of a Dask worker: Dask cannot stop what takes too long."""
     if getattr(_here, "worker", None) is None or _here.worker.threads != threads:
         _here.worker = Worker(threads)
-    done: Done = _here.worker.do(task, time_limit)
-    return done
+    return _here.worker.do(task, time_limit)
 
 
 def main() -> None:

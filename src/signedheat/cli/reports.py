@@ -14,6 +14,7 @@ from ..domains.grid import Grid
 from ..domains.inspection import CloudReport, SurfaceReport, TetReport, inspect
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.segments import segments_of
+from ..domains.tet_mesh import TetMesh
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import SourceError
 from ..geometry.geodesics.paths import gaps
@@ -69,7 +70,7 @@ def report(file: str, arguments: Namespace) -> Summary:
     summary |= extra
     text = _table(rows | extra)
     if arguments.curves:
-        if not hasattr(shape, "triangulation"):
+        if isinstance(shape, TetMesh):
             raise SourceError(
                 f"curves lie on meshes and point clouds, not a {type(shape).__name__}",
                 element="shape",

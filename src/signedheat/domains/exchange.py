@@ -65,8 +65,7 @@ class Displayed:
         MissingPackageError
             If PyVista is not installed (``pip install pyvista``).
         """
-        plotter: pyvista.Plotter = windows.plotter_of(self)
-        return plotter
+        return windows.plotter_of(self)
 
     def plot(self) -> object:
         """Show this in a window, or in the notebook, by PyVista; with trame installed, notebooks can turn it.
@@ -84,8 +83,7 @@ class Displayed:
         return self.plotter().show()
 
     def _repr_html_(self) -> str:
-        html: str = drawing.html_of(self)
-        return html
+        return drawing.html_of(self)
 
 
 def _no_ids() -> NDArray[np.int64]:
@@ -162,8 +160,7 @@ def outer_faces(points: NDArray[Any], tets: NDArray[np.int64]) -> NDArray[np.int
     ids = element_ids(tets, "tets", 4, len(points))
     turned = np.where(signed_volumes(coordinates(points, "vertices", 3), ids)[:, None] < 0, ids[:, [0, 1, 3, 2]], ids)
     table = face_table(turned)
-    outer: NDArray[np.int64] = table.vertices[table.tet_counts == 1]
-    return outer
+    return table.vertices[table.tet_counts == 1]
 
 
 class Exchangeable(Displayed, Generic[Trimesh]):
@@ -200,8 +197,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     def to_trimesh(self) -> Trimesh:
         """As a `trimesh.Trimesh`, not processed, or `trimesh.PointCloud`; polygons raise `GeometryError`."""
-        thing: Trimesh = to_trimesh(self._elements)
-        return thing
+        return to_trimesh(self._elements)
 
     @classmethod
     def from_pyvista(cls: type[Kind], thing: object) -> Kind:
@@ -218,8 +214,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData`; the normals of points are point data ``Normals``."""
-        thing: pyvista.PolyData = to_pyvista(self._elements)
-        return thing
+        return to_pyvista(self._elements)
 
     @classmethod
     def from_meshio(cls: type[Kind], thing: object) -> Kind:
@@ -237,8 +232,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     def to_open3d(self) -> open3d.geometry.Geometry:
         """As a `TriangleMesh` or `PointCloud` of ``open3d.geometry``; polygons raise `GeometryError`."""
-        thing: open3d.geometry.Geometry = to_open3d(self._elements)
-        return thing
+        return to_open3d(self._elements)
 
 
 def elements_of(package: str, thing: Any) -> Elements:

@@ -180,8 +180,7 @@ def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | Te
     if elements.tets is not None:
         return TetMesh(elements.points, elements.tets)
     kinds = {kind.__name__: kind for kind in (TriangleMesh, PolygonMesh, PointCloud)}
-    shape: TriangleMesh | PolygonMesh | PointCloud = kinds[elements.kind]._of(elements)
-    return shape
+    return kinds[elements.kind]._of(elements)
 
 
 def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:

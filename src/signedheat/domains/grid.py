@@ -193,8 +193,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
     @property
     def upper(self) -> NDArray[np.float64]:
         """(d,) position of the last node."""
-        result: NDArray[np.float64] = self.origin + self.spacing * (np.array(self.shape) - 1)
-        return result
+        return self.origin + self.spacing * (np.array(self.shape) - 1)
 
     @cached_property
     def axes(self) -> tuple[NDArray[np.float64], ...]:
@@ -211,8 +210,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """(n,) whether each of the (n, d) points lies within the bounding box of the nodes."""
         positions = numbers(points, "points")
-        inside: NDArray[np.bool_] = np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
-        return inside
+        return np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
 
     def to_pyvista(self) -> pyvista.ImageData:
         """As a `pyvista.ImageData`, with boolean point data ``solid`` if nodes are; a grid in the plane has z = 0."""

@@ -149,8 +149,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         positions = np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[faces]])
         lost = np.flatnonzero(np.asarray(faces) < 0)
         positions[lost] = self.mesh.vertices[lost]
-        result: NDArray[np.float64] = positions
-        return result
+        return positions
 
     def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Faces and barycentric coordinates, on the triangulation, of points given by those on the mesh.
@@ -369,8 +368,7 @@ def gradients_along(sides: NDArray[np.float64], rises: NDArray[np.float64]) -> N
     normals = np.cross(sides[:, 0], sides[:, 1])
     square = np.einsum("pd,pd->p", normals, normals)
     across = rises[:, :1] * sides[:, 1] - rises[:, 1:] * sides[:, 0]
-    result: NDArray[np.float64] = np.cross(across, normals) / np.where(square > 0, square, np.inf)[:, None]
-    return result
+    return np.cross(across, normals) / np.where(square > 0, square, np.inf)[:, None]
 
 
 def triangle_mesh(domain: object) -> TriangleMesh:

@@ -104,8 +104,7 @@ def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.in
     rise = values[mesh.faces[faces]]
     most = np.abs(rise).max(axis=1, keepdims=True, initial=0.0)
     rise = rise / np.where(most > 0, most, 1.0)  # lest their sum is beyond what can be written
-    result: NDArray[np.float64] = np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
-    return result
+    return np.einsum("ik,ikj->ij", rise - rise.mean(axis=1, keepdims=True), of_corners)
 
 
 def region_boundary(mesh: Triangles, mask: NDArray[np.bool_]) -> list[Curve]:

@@ -151,8 +151,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     def on_triangulation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the vertices of `triangulation`, from values at the vertices of the mesh."""
-        refined: NDArray[np.float64] = self.refinement.prolongation @ values
-        return refined
+        return self.refinement.prolongation @ values
 
     def _triangle_mask(self, face_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         check_mask(face_mask, self.n_polygons)

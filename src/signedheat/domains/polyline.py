@@ -120,8 +120,7 @@ class Polyline(Displayed, Frozen):
     @cached_property
     def segment_lengths(self) -> NDArray[np.float64]:
         """(m,) lengths."""
-        result: NDArray[np.float64] = np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
-        return result
+        return np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
 
     @property
     def length(self) -> float:
@@ -141,8 +140,7 @@ class Polyline(Displayed, Frozen):
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData`, a line with z = 0."""
         points = np.column_stack([self.points, np.zeros(self.n_points)])
-        made: pyvista.PolyData = pyvista.lines_from_points(points, close=self.closed)
-        return made
+        return pyvista.lines_from_points(points, close=self.closed)
 
     def __repr__(self) -> str:
         return f"Polyline({self.n_points} points, {'closed' if self.closed else 'open'})"

@@ -104,8 +104,7 @@ class Surface(Frozen):
                 element=f"point {wrong[0]}",
             )
         corners = triangles.vertices[triangles.faces[points.faces]]
-        result: NDArray[np.float64] = np.einsum("nk,nkd->nd", points.barycentric, corners)
-        return result
+        return np.einsum("nk,nkd->nd", points.barycentric, corners)
 
     def polyline(
         self, points: ArrayLike, closed: bool = False, oriented: bool = True, max_distance: float | None = None

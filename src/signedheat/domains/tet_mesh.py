@@ -110,8 +110,7 @@ class TetMesh(Displayed, Frozen):
     @cached_property
     def tet_barycenters(self) -> NDArray[np.float64]:
         """(m, 3) barycentres."""
-        result: NDArray[np.float64] = self.vertices[self.tets].mean(axis=1)
-        return result
+        return self.vertices[self.tets].mean(axis=1)
 
     @cached_property
     def boundary(self) -> TriangleMesh:

@@ -88,15 +88,13 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     @cached_property
     def face_areas(self) -> NDArray[np.float64]:
         """(m,) areas."""
-        areas: NDArray[np.float64] = np.linalg.norm(self.face_area_vectors, axis=1)
-        return areas
+        return np.linalg.norm(self.face_area_vectors, axis=1)
 
     @cached_property
     def edge_lengths(self) -> NDArray[np.float64]:
         """(e,) lengths, in the order of `edges`."""
         tail, head = self.edges.vertices.T
-        lengths: NDArray[np.float64] = np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
-        return lengths
+        return np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
 
     @cached_property
     def intrinsic(self) -> IntrinsicMesh:

@@ -333,8 +333,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             self._refuse_beyond_band(level)
             placed = self._placed(self._refined(level))
             parts = contour_parts(BlockValues(self.blocks, self.values), self.grid.spacing, level, placed)
-        counts: tuple[int, int] = ply.write_parts(parts, path)
-        return counts
+        return ply.write_parts(parts, path)
 
     def dense(self) -> GridField[Dimension]:
         """The field at all nodes of its grid, those beyond a band interpolated from the coarse ones."""
@@ -452,8 +451,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             found = BlockValues(self.blocks, self.confidence.astype(np.float32)).interpolated(index)
             beyond = np.isnan(found)
             found[beyond] = self.whole.confidence_at(inside[beyond])
-        clipped: NDArray[np.float32] = np.clip(found, 0, 1).astype(np.float32)
-        return clipped
+        return np.clip(found, 0, 1).astype(np.float32)
 
     @property
     def surface_confidence(self) -> float | None:
@@ -501,8 +499,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             values[beyond] = self.whole.interpolate(points[beyond])
             return values
         if self._known is None:
-            result: NDArray[np.float64] = scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
-            return result
+            return scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
         filled, known = self._known
         sums = scipy.ndimage.map_coordinates(filled, index, order=1, mode="nearest")
         weights = scipy.ndimage.map_coordinates(known, index, order=1, mode="nearest")

@@ -114,8 +114,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         area = np.where(area > 0, area, np.inf)
         along_first = (g * rise_first - f * rise_second) / area
         along_second = (e * rise_second - f * rise_first) / area
-        result: NDArray[np.float64] = along_first[:, None] * first + along_second[:, None] * second
-        return result
+        return along_first[:, None] * first + along_second[:, None] * second
 
     def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
         """φ at points of the surface; on edges and at vertices, the value in the face through which the point is given.
@@ -126,8 +125,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
             If the face of a point does not exist.
         """
         places = locate_points(self.triangles, points.faces, points.barycentric)
-        result: NDArray[np.float64] = (self.values[places.faces] * places.barycentric).sum(axis=1)
-        return result
+        return (self.values[places.faces] * places.barycentric).sum(axis=1)
 
     @cached_property
     def jumps(self) -> NDArray[np.float64]:
@@ -257,8 +255,7 @@ class IntrinsicPiecewiseField(PiecewiseField):
     def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
         """(n,) φ at points of the mesh."""
         faces, weights = self.domain.locate(points.faces, points.barycentric)
-        result: NDArray[np.float64] = (self.values[faces] * weights).sum(axis=1)
-        return result
+        return (self.values[faces] * weights).sum(axis=1)
 
     def split(self) -> VertexField[TriangleMesh | PolygonMesh]:
         """The same field on the common subdivision of mesh and triangulation, with vertices doubled along the cut."""

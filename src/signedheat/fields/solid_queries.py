@@ -39,8 +39,7 @@ class Closest:
     @property
     def completed(self) -> NDArray[np.bool_]:
         """(n,) whether the place lies on the completion."""
-        result: NDArray[np.bool_] = self.faces < 0
-        return result
+        return self.faces < 0
 
     def __repr__(self) -> str:
         return f"Closest({len(self.points)} points, {int(self.completed.sum())} on the completion)"

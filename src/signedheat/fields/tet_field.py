@@ -108,8 +108,7 @@ class TetField(Displayed, Combinable, Frozen):
         if len(outside):
             slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
             values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
-        result: NDArray[np.float64] = values if points.ndim == 2 else values[0]
-        return result
+        return values if points.ndim == 2 else values[0]
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """∇φ at points in space: volume-weighted means at the vertices, interpolated.
@@ -127,8 +126,7 @@ class TetField(Displayed, Combinable, Frozen):
             Gradients; of length about 1, since φ is a distance.
         """
         corners, weights, _ = self._place(_checked(points).reshape(-1, 3))
-        result: NDArray[np.float64] = np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
-        return result
+        return np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
 
     @property
     def tet_gradients(self) -> NDArray[np.float64]:
@@ -194,8 +192,7 @@ class TetField(Displayed, Combinable, Frozen):
 
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         """As a `pyvista.UnstructuredGrid` with point data ``signed_distance``."""
-        made: pyvista.UnstructuredGrid = with_values(self.mesh.to_pyvista(), self.values)
-        return made
+        return with_values(self.mesh.to_pyvista(), self.values)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write mesh and values to a ``.vtu``, ``.vtk`` or ``.msh`` file; `signedheat.load_field` reads it."""

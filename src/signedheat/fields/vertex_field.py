@@ -104,8 +104,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
             mesh, _, faces, weights = self._at(points)
             corners = mesh.faces[faces]
         values = finest.domain.on_triangulation(finest.values)
-        result: NDArray[np.float64] = np.einsum("ik,ik->i", weights, values[corners])
-        return result
+        return np.einsum("ik,ik->i", weights, values[corners])
 
     @property
     def finest(self) -> VertexField[SurfaceDomain]:
@@ -139,8 +138,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         square = np.einsum("ij,ij->i", doubled, doubled)
         turned = np.cross(doubled[:, None], opposite)
         sums = np.einsum("ik,ikj->ij", rise, turned)
-        result: NDArray[np.float64] = sums / np.where(square > 0, square, np.inf)[:, None]
-        return result
+        return sums / np.where(square > 0, square, np.inf)[:, None]
 
     def contour(self, level: float = 0.0) -> list[Curve]:
         """The level set φ = level, as curves on the surface.
@@ -170,8 +168,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
                 remedy="choose a level between",
                 element=f"level {level:g}",
             )
-        result: list[Curve] = field.domain.level_set(field.values, level)
-        return result
+        return field.domain.level_set(field.values, level)
 
     def with_values(self, values: NDArray[np.float64]) -> VertexField[Surface]:
         """Other values on the same surface, without the diagnostics and the source of these."""
@@ -201,8 +198,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     def to_pyvista(self) -> pyvista.PolyData:
         """As a `pyvista.PolyData` with point data ``signed_distance``: triangles, polygons or points."""
         simple = on_simple_surface(self)
-        made: pyvista.PolyData = with_values(simple.domain.to_pyvista(), simple.values)
-        return made
+        return with_values(simple.domain.to_pyvista(), simple.values)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the surface with φ at its vertices, in the format given by the extension.

@@ -144,8 +144,7 @@ def morton_codes(points: NDArray[np.float64]) -> NDArray[np.uint64]:
     """(n,) Morton codes of (n, 3) points: their positions along a space-filling curve, with 21 bits per axis."""
     lower = points.min(axis=0)
     extent = max(float((points.max(axis=0) - lower).max()), 1e-290)
-    codes: NDArray[np.uint64] = _codes(np.ascontiguousarray(points), lower, (2**21 - 1) / extent)
-    return codes
+    return _codes(np.ascontiguousarray(points), lower, (2**21 - 1) / extent)
 
 
 @compiled

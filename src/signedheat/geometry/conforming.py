@@ -86,16 +86,14 @@ def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     _, same, counts = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
     same = same.ravel()
     ways = np.bincount(same, np.where(turned[:, 1] < turned[:, 2], 1, -1))
-    kept: NDArray[np.int64] = faces[~((counts == 2) & (ways == 0))[same]]
-    return kept
+    return faces[~((counts == 2) & (ways == 0))[same]]
 
 
 def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """(m,) of triangles above their longest sides."""
     sides = np.roll(corners, -1, axis=1) - corners
     areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    heights: NDArray[np.float64] = areas / np.linalg.norm(sides, axis=2).max(axis=1)
-    return heights
+    return areas / np.linalg.norm(sides, axis=2).max(axis=1)
 
 
 def _open_sides(faces: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -261,8 +261,7 @@ def carried_left(
     links = Links(number[one[near]], number[other[near]], agree[near] * pairs.shares[near])
     signs = signs_of(links, int(around.sum()))[number[telling]]
     most = float(np.sign(signs @ lengths)) or signs[0]
-    relative: NDArray[np.float64] = signs * most
-    return relative
+    return signs * most
 
 
 def in_layout(
@@ -279,8 +278,7 @@ def in_layout(
     second = np.cross(normal, first)
     seen = np.einsum("ij,ij->i", vectors, first) + 1j * np.einsum("ij,ij->i", vectors, second)
     edge = triangles.edge_vectors[faces, 0]
-    result: NDArray[np.complex128] = seen * edge / np.abs(edge)
-    return result
+    return seen * edge / np.abs(edge)
 
 
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:

@@ -155,8 +155,7 @@ def dual_cells(
 
 def open_cells(edges: NDArray[np.int64]) -> NDArray[np.int64]:
     """Cells with a face of which an odd number of edges is crossed: a node around them has no value."""
-    found: NDArray[np.int64] = np.flatnonzero((_crossed_faces(edges) % 2 == 1).any(axis=1))
-    return found
+    return np.flatnonzero((_crossed_faces(edges) % 2 == 1).any(axis=1))
 
 
 def _face_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -168,8 +167,7 @@ def _face_edges(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _crossed_faces(edges: NDArray[np.int64]) -> NDArray[np.int64]:
     """(c, 6) number of crossed edges of each face."""
-    crossed: NDArray[np.int64] = (edges[:, _face_edges(np.arange(6))] >= 0).sum(axis=2)
-    return crossed
+    return (edges[:, _face_edges(np.arange(6))] >= 0).sum(axis=2)
 
 
 def _pieces(edges: NDArray[np.int64], ways: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -323,5 +321,4 @@ def _safe(flat: NDArray[np.float64], height: NDArray[np.float64]) -> tuple[NDArr
 
 
 def _cross(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-    product: NDArray[np.float64] = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    return product
+    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]

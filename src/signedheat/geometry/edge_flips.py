@@ -155,8 +155,7 @@ def _bend(
 ) -> NDArray[np.float64]:
     """(k,) length times the angle between the unit normals on both sides of edges."""
     lengths = np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
-    bends: NDArray[np.float64] = lengths * np.arccos(np.clip(np.einsum("ij,ij->i", one, other), -1.0, 1.0))
-    return bends
+    return lengths * np.arccos(np.clip(np.einsum("ij,ij->i", one, other), -1.0, 1.0))
 
 
 def _unit_normals(

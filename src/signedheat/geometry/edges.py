@@ -36,8 +36,7 @@ class HalfedgePairs:
     @property
     def around(self) -> NDArray[np.int64]:
         """(h,) halfedges along the edge of each; 0 for those that have none."""
-        result: NDArray[np.int64] = np.append(self.counts, 0)[self.edges]
-        return result
+        return np.append(self.counts, 0)[self.edges]
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,5 +248,4 @@ def edge_table(faces: NDArray[np.int64]) -> EdgeTable:
 
 def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
     """(k,) a number for each pair of vertices, whichever comes first."""
-    keys: NDArray[np.int64] = (np.minimum(one, other).astype(np.int64) << 32) | np.maximum(one, other)
-    return keys
+    return (np.minimum(one, other).astype(np.int64) << 32) | np.maximum(one, other)

@@ -64,8 +64,7 @@ class FaceTree:
 
         Thickness is negative where there is no disc, or none that is flat.
         """
-        discs: NDArray[np.float64] = _discs(self.features.corners, self.tree.bounds, self.tree.items)
-        return discs
+        return _discs(self.features.corners, self.tree.bounds, self.tree.items)
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) distance of each of (n, 3) points to the nearest face."""
@@ -92,8 +91,7 @@ class FaceTree:
         nearer = self._brought_near(points)
         if nearer is not points:
             return self.search(points).distances
-        distances: NDArray[np.float64] = np.sqrt(self.nearest(points)[1])
-        return distances
+        return np.sqrt(self.nearest(points)[1])
 
     def _brought_near(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """The points; those farther than `FAR` sizes of the surface are moved towards its middle, to that distance."""

@@ -112,8 +112,7 @@ class IntrinsicMesh(Frozen):
     def face_areas(self) -> NDArray[np.float64]:
         """(m,) areas, where rounding does not make them negative."""
         first, _, last = self.edge_vectors.T
-        result: NDArray[np.float64] = np.maximum(-0.5 * (np.conj(first) * last).imag, 0.0)
-        return result
+        return np.maximum(-0.5 * (np.conj(first) * last).imag, 0.0)
 
     @property
     def areas_as_divisors(self) -> NDArray[np.float64]:
@@ -148,8 +147,7 @@ class IntrinsicMesh(Frozen):
         """
         is_first = np.zeros(3 * self.n_faces, dtype=bool)
         is_first[self.first_halfedges] = True
-        result: NDArray[np.bool_] = self.edges.forward != is_first.reshape(-1, 3)
-        return result
+        return self.edges.forward != is_first.reshape(-1, 3)
 
     @cached_property
     def first_halfedges(self) -> NDArray[np.int64]:
@@ -193,8 +191,7 @@ class IntrinsicMesh(Frozen):
 
     def sum_in_faces(self, vectors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """(m,) sum of the vectors at the three edges of each face, in its layout: three times the average of Sec. 6."""
-        result: NDArray[np.complex128] = self.in_face_frames(vectors).sum(axis=1)
-        return result
+        return self.in_face_frames(vectors).sum(axis=1)
 
 
 MARGIN = 1e-14

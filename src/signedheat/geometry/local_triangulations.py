@@ -134,8 +134,7 @@ def on_one_side(
 ) -> NDArray[np.bool_]:
     """(n, k) whether points at offsets (n, k, 3) from one with a normal (n, 3) lie on its side of a plate."""
     alike = np.einsum("nkd,nd->nk", normals, normal) > OPPOSITE
-    result: NDArray[np.bool_] = alike | (np.abs(np.einsum("nkd,nd->nk", offsets, normal)) < OVER * reach[:, None])
-    return result
+    return alike | (np.abs(np.einsum("nkd,nd->nk", offsets, normal)) < OVER * reach[:, None])
 
 
 def principal_axes(offsets: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -208,8 +207,7 @@ def nonoverlapping_triangles(
             angle.append(np.arctan2((step * axes[here, 1]).sum(axis=1), (step * axes[here, 0]).sum(axis=1)))
         turn = np.mod(angle[1] - angle[0] + np.pi, 2 * np.pi) - np.pi
         starts[:, k], widths[:, k] = np.where(turn < 0, angle[1], angle[0]), np.abs(turn)
-    result: NDArray[np.int64] = triangles[accept_apart(triangles, starts, widths, len(points))]
-    return result
+    return triangles[accept_apart(triangles, starts, widths, len(points))]
 
 
 def split_at_points_left(
@@ -254,8 +252,7 @@ def aligned(
     found = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), own)), n + 1)
     signs = (found[:n] * found[n]).astype(np.int64)
     preference = np.bincount(parts, signs * (axes * given).sum(axis=1))
-    result: NDArray[np.int64] = np.where(preference < 0, -1, 1)[parts] * signs
-    return result
+    return np.where(preference < 0, -1, 1)[parts] * signs
 
 
 def facing(points: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:

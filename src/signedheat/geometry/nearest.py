@@ -198,8 +198,7 @@ def barycentric_on_triangles(
 def weights_in(triangles: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n, 3) barycentric coordinates of (n, 3) places, each in one of (n, 3, 3) triangles."""
     rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
-    weights: NDArray[np.float64] = barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), places)
-    return weights
+    return barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), places)
 
 
 @dataclass(frozen=True, eq=False)

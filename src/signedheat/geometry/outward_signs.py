@@ -142,8 +142,7 @@ def outward_signs(
 def _lone(places: NDArray[np.float64], reaches: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n,) points that are far from those next to them, compared with these: outliers."""
     near = scipy.spatial.cKDTree(places).query(places, k=min(NEARBY + 1, len(places)), workers=-1)[1]
-    result: NDArray[np.bool_] = reaches > LONE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
-    return result
+    return reaches > LONE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
 
 
 def _followed(

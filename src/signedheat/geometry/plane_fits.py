@@ -176,8 +176,7 @@ def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz:
         longest = axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2
     length = longest**0.5
     axis[0], axis[1], axis[2] = axis[0] / length, axis[1] / length, axis[2] / length
-    value: float = max(least, 0.0)
-    return value
+    return max(least, 0.0)
 
 
 @compiled
@@ -197,8 +196,7 @@ def weighted_plane(offsets: Floats, weights: Floats, count: int, axis: Floats, c
         xx, xy, xz = xx + wa * a, xy + wa * b, xz + wa * c
         yy, yz, zz = yy + wb * b, yz + wb * c, zz + weights[j] * c * c
     center[0], center[1], center[2] = x, y, z
-    square: float = least_eigenvector(xx / total, xy / total, xz / total, yy / total, yz / total, zz / total, axis)
-    return square
+    return least_eigenvector(xx / total, xy / total, xz / total, yy / total, yz / total, zz / total, axis)
 
 
 @compiled

@@ -123,5 +123,4 @@ def _solved(
 ) -> NDArray[np.float64]:
     """A⁻¹ b without what is less than the least eigenvalue."""
     inverse = np.where(values > least[:, None], 1.0 / np.where(values > least[:, None], values, 1.0), 0.0)
-    found: NDArray[np.float64] = np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)
-    return found
+    return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)

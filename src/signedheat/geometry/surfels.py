@@ -134,8 +134,7 @@ def corrected_normals(
     normals = np.divide(-gradient, length, out=own.copy(), where=length > 0)
     steep = _STEEPEST - (normals * own).sum(axis=1)
     normals += np.maximum(steep, 0)[:, None] * own
-    result: NDArray[np.float64] = normals / np.linalg.norm(normals, axis=1)[:, None]
-    return result
+    return normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:

@@ -152,8 +152,7 @@ def containing_tets(mesh: TetShapes, planes: Planes, points: NDArray[np.float64]
 def _slack(mesh: TetShapes) -> NDArray[np.float64]:
     """(3,) how far beyond its box a tet is looked for: rounding may put a point there."""
     lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
-    slack: NDArray[np.float64] = 1e-9 * (upper - lower)
-    return slack
+    return 1e-9 * (upper - lower)
 
 
 def barycentric(mesh: TetShapes, tets: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -163,12 +162,11 @@ def barycentric(mesh: TetShapes, tets: NDArray[np.int64], points: NDArray[np.flo
     inward = np.maximum(inward / np.maximum(np.abs(inward).max(axis=1, keepdims=True), np.finfo(float).tiny), 0)
     total = inward.sum(axis=1, keepdims=True)
     middle = np.full_like(inward, 0.25)  # of flat tets
-    result: NDArray[np.float64] = np.divide(inward, total, out=middle, where=total > 0)
-    return result
+    return np.divide(inward, total, out=middle, where=total > 0)
 
 
 @compiled
-def beyond(planes, tet, k, x, y, z):
+def beyond(planes: Planes, tet: int, k: int, x: float, y: float, z: float) -> float:
     """Signed distance by which a point, relative to the centre, lies outside the face opposite corner k of a tet."""
     f = planes.tet_faces[tet, k]
     height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
@@ -176,7 +174,9 @@ def beyond(planes, tet, k, x, y, z):
 
 
 @compiled
-def _locate(planes, points, starts, near):
+def _locate(
+    planes: Planes, points: NDArray[np.float64], starts: NDArray[np.int64], near: NDArray[np.int64]
+) -> NDArray[np.int64]:
     found = np.full(len(points), -1, dtype=np.int64)
     for p in range(len(points)):
         deepest = -np.inf
@@ -194,7 +194,9 @@ def _locate(planes, points, starts, near):
 
 
 @compiled
-def _clip(planes, triangles, parents, tets):
+def _clip(
+    planes: Planes, triangles: NDArray[np.float64], parents: NDArray[np.int64], tets: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """Area vector, area and centroid of what of a triangle lies in a tet, and the face of the tet that it lies in."""
     area_vectors, centers = np.zeros((len(tets), 3)), np.zeros((len(tets), 3))
     areas, in_face = np.zeros(len(tets)), np.full(len(tets), -1)
@@ -228,7 +230,15 @@ def _clip(planes, triangles, parents, tets):
 
 
 @compiled
-def _cut(planes, tet, corner, polygon, n, other, heights):
+def _cut(
+    planes: Planes,
+    tet: int,
+    corner: int,
+    polygon: NDArray[np.float64],
+    n: int,
+    other: NDArray[np.float64],
+    heights: NDArray[np.float64],
+) -> tuple[int, bool]:
     """Clip a polygon to the inner side of a face of a tet. Also whether the whole polygon lies in the face's plane.
 
     Heights and crossings are the same, to the last bit, for the tets on both sides of the plane.
@@ -260,7 +270,13 @@ def _cut(planes, tet, corner, polygon, n, other, heights):
 
 
 @compiled
-def _measure(polygon, n, normal, area_vector, center):
+def _measure(
+    polygon: NDArray[np.float64],
+    n: int,
+    normal: NDArray[np.float64],
+    area_vector: NDArray[np.float64],
+    center: NDArray[np.float64],
+) -> float:
     """Area vector and centroid of a convex polygon; returns its area, negative if rounding has turned it over."""
     area_vector[:] = 0.0
     center[:] = 0.0

@@ -13,7 +13,18 @@ GRAZING = 1e-6
 
 
 @compiled
-def stays_inside(planes, neighbors, tet, x, y, z, u, w, t, slack):
+def stays_inside(
+    planes: Planes,
+    neighbors: NDArray[np.int64],
+    tet: int,
+    x: float,
+    y: float,
+    z: float,
+    u: float,
+    w: float,
+    t: float,
+    slack: float,
+) -> bool:
     """Whether the segment from (x, y, z), in a tet, to (u, w, t), in the mesh, lies in the mesh."""
     for _ in range(len(neighbors)):
         leave, at = -1, np.inf

@@ -41,8 +41,7 @@ class Group(NamedTuple):
 def edge_vertices(domain: EmbeddedSurface) -> NDArray[np.int64]:
     """(e, 2) tails and heads of the edges of a domain, by first appearance in its faces."""
     if not isinstance(domain, PolygonMesh):
-        result: NDArray[np.int64] = domain.triangulation.edges.vertices
-        return result
+        return domain.triangulation.edges.vertices
     ends = np.stack([domain.corners, domain.next_corners], axis=1)
     first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)[1]
     return ends[np.sort(first)]

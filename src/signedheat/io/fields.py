@@ -164,8 +164,7 @@ def load_field(path: PathLike) -> Field:
         if image.values.dtype == bool:
             raise FileFormatError("the values are no real numbers but bool: it holds no field")
         grid = _made(Grid, image.origin, image.spacing, image.values.shape, image.mask)
-        field: GridField = _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence)
-        return field
+        return _made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence)
 
 
 def _made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
@@ -203,8 +202,7 @@ def _load_tet_field(path: PathLike) -> TetField:
         if NAME not in cells.point_data:
             raise FileFormatError(f"it has no point data '{NAME}': it was not written as a field")
         values = np.asarray(cells.point_data[NAME], dtype=np.float64)
-        field: TetField = _made(TetField, _made(TetMesh.from_meshio, cells), values)
-        return field
+        return _made(TetField, _made(TetMesh.from_meshio, cells), values)
 
 
 def _load_band(path: PathLike) -> GridField:
@@ -218,8 +216,7 @@ def _load_band(path: PathLike) -> GridField:
         if not np.array_equal(blocks.places, found["places"]):
             raise damaged("its blocks are not in order", element="places")
         options = {"blocks": blocks, "coarse": coarse, "width": float(found["width"])}
-        field: GridField = _made(GridField, grid, found["values"], confidence=found.get(CONFIDENCE), **options)
-        return field
+        return _made(GridField, grid, found["values"], confidence=found.get(CONFIDENCE), **options)
 
 
 def _write_npz(field: GridField, path: Path) -> None:

@@ -63,8 +63,7 @@ class LabelImage:
     @property
     def spacing(self) -> NDArray[np.float64]:
         """(3,) distance between the centres of neighbouring voxels."""
-        lengths: NDArray[np.float64] = np.linalg.norm(self.axes, axis=0)
-        return lengths
+        return np.linalg.norm(self.axes, axis=0)
 
     @property
     def grid(self) -> Grid:

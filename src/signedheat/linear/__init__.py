@@ -41,10 +41,11 @@ advise = Announcement(
 
 
 class Factor(Protocol):
-    """A factorised Hermitian positive definite matrix."""
+    """What solves systems with a Hermitian positive definite matrix."""
 
-    backend: str
-    n: int
+    @property
+    def n(self) -> int:
+        """Number of unknowns."""
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
         """Solution for one right-hand side (n,) or several (n, k)."""

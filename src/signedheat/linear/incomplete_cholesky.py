@@ -88,8 +88,7 @@ class IncompleteCholesky:
         diagonal, factor = self.matrix.diagonal(), self.factor
 
         def multiply(p: NDArray[np.float64]) -> NDArray[np.float64]:
-            product: NDArray[np.float64] = (self.matrix @ p.reshape(shape)).ravel()
-            return product
+            return (self.matrix @ p.reshape(shape)).ravel()
 
         def precondition(r: NDArray[np.float64]) -> NDArray[np.float64]:
             solution: NDArray[np.float64] = _precondition(
@@ -133,7 +132,9 @@ def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
 
 
 @compiled
-def _factorize(indptr, indices, factor, pivots):
+def _factorize(
+    indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: NDArray[np.float64], pivots: NDArray[np.float64]
+) -> bool:
     """IC(0) in place; `pivots` becomes the inverse diagonal. Returns False if a pivot is not clearly positive."""
     for i in range(len(pivots)):
         own = pivots[i]
@@ -161,7 +162,13 @@ def _factorize(indptr, indices, factor, pivots):
 
 
 @compiled
-def _precondition(indptr, indices, factor, pivots, r):
+def _precondition(
+    indptr: NDArray[np.int32],
+    indices: NDArray[np.int32],
+    factor: NDArray[np.float64],
+    pivots: NDArray[np.float64],
+    r: NDArray[np.float64],
+) -> NDArray[np.float64]:
     """z = (L Lᵀ)⁻¹ r, row by row down and up."""
     n, width = r.shape
     z = np.empty((n, width))
@@ -183,7 +190,9 @@ def _precondition(indptr, indices, factor, pivots, r):
 
 
 @compiled
-def _settled(diagonal, x, r, componentwise):
+def _settled(
+    diagonal: NDArray[np.float64], x: NDArray[np.float64], r: NDArray[np.float64], componentwise: float
+) -> bool:
     """Whether every row's residual is small compared with its own unknowns."""
     n, width = x.shape
     for i in range(n):

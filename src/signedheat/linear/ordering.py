@@ -117,7 +117,16 @@ def dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32], leaf: int) 
 
 
 @compiled
-def _levels(starts, neighbors, region, here, seed, level, queue, begin):
+def _levels(
+    starts: NDArray[np.int32],
+    neighbors: NDArray[np.int32],
+    region: NDArray[np.int64],
+    here: int,
+    seed: int,
+    level: NDArray[np.int64],
+    queue: NDArray[np.int64],
+    begin: int,
+) -> int:
     """Breadth-first search within a region, into the queue from `begin` on; returns the end of the queue."""
     level[seed] = 0
     queue[begin] = seed
@@ -135,7 +144,7 @@ def _levels(starts, neighbors, region, here, seed, level, queue, begin):
 
 
 @compiled
-def _thinnest(level, queue, reached, last):
+def _thinnest(level: NDArray[np.int64], queue: NDArray[np.int64], reached: int, last: int) -> int:
     """The smallest level that leaves at least 40 % of the unknowns on either side, or the median level."""
     best, size, median = -1, reached, level[queue[reached // 2]]
     p = 0

@@ -227,28 +227,29 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid, size: float) -> AreaSample
         spacing = max(spacing, elements.spacing)
         parts.append((positions, vectors, weights, components + first, np.full(len(weights), owner)))
         first += int(elements.components.max()) + 1
-    joined = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
+    positions, vectors, weights, components, owners = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     if total <= 0:
         raise SourceError("the source has no area: every face is degenerate", element="source")
-    if not len(joined[2]):
+    if not len(weights):
         raise SourceError(
             f"the grid from {grid.origin.tolist()} to {grid.upper.tolist()} misses the shape",
             remedy="move or enlarge it",
         )
-    if not nodes.sums.any() and joined[1].any():
+    if not nodes.sums.any() and vectors.any():
         raise SourceError(
             f"the shape is lost in the cells of the grid, whose spacing {grid.spacing.tolist()} is so much larger",
             element="source",
             remedy="choose a smaller spacing, or scale the shape",
         )
-    left = float(np.linalg.norm(joined[1], axis=1).sum() / joined[2].sum())
+    left = float(np.linalg.norm(vectors, axis=1).sum() / weights.sum())
     if left < ROUNDING:
         raise CancellingNormalsError(
             "the normals of the source cancel each other everywhere, so that nothing separates inside from outside",
             remedy="remove or turn one of its coinciding sides",
         )
     outside = max(0.0, 1.0 - inside / total)
-    return AreaSamples(*joined, spacing=spacing, outside=outside, cancelled=max(0.0, 1.0 - left), nodes=nodes)
+    cancelled = max(0.0, 1.0 - left)
+    return AreaSamples(positions, vectors, weights, components, owners, spacing, outside, cancelled, nodes)
 
 
 @area_elements.register

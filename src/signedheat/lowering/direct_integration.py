@@ -176,8 +176,7 @@ class DirectIntegration(Frozen):
 
     def _component_of(self, rows: sparse.csr_matrix) -> NDArray[np.int64]:
         """(s,) connected component of the domain that each sample lies in."""
-        result: NDArray[np.int64] = self.components[rows.indices[rows.indptr[:-1]]]
-        return result
+        return self.components[rows.indices[rows.indptr[:-1]]]
 
     def _reached(self, values: NDArray[np.float64], rows: sparse.csr_matrix) -> NDArray[np.float64]:
         """The values, with NaN on connected components without samples."""
@@ -191,13 +190,11 @@ class DirectIntegration(Frozen):
         mean = np.full(n_parts, np.nan)
         at_samples = source.weights * self._at_samples(values, source)
         np.divide(np.bincount(part, at_samples, n_parts), weight, out=mean, where=weight > 0)
-        result: NDArray[np.float64] = values - mean[self.components]
-        return result
+        return values - mean[self.components]
 
     def _at_samples(self, values: NDArray[np.float64], source: SourceTerm) -> NDArray[np.float64]:
         """(s,) φ on the source."""
-        result: NDArray[np.float64] = source.interpolation @ values
-        return result
+        return source.interpolation @ values
 
 
 def _grounded(matrix: sparse.csr_matrix, vertices: NDArray[np.int64]) -> sparse.csr_matrix:

@@ -55,5 +55,4 @@ def smoothed_corners(
     moved = conjugate_gradients(
         lambda x: matrix @ x, -(heights.T @ (heights @ (vertices - center).ravel())), tolerance=1e-8
     )
-    result: NDArray[np.float64] = vertices + moved.reshape(n, 3)
-    return result
+    return vertices + moved.reshape(n, 3)

@@ -81,8 +81,7 @@ def inner_walls(
     volumes = np.where(front != back, volumes, 0.0)  # surface that is open has one shell around it
     inside = np.bincount(shells.ravel(), np.stack([-volumes, volumes], axis=1).ravel()) > 0
     cavities = _cavities(shells, inside, np.where(chosen, areas, 0.0))
-    inner: NDArray[np.bool_] = chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
-    return inner
+    return chosen & inside[front] & inside[back] & (cavities[front] == cavities[back])
 
 
 def _angles(

@@ -271,8 +271,7 @@ def _middles_of_largest(faces: MeshFaces, parts: NDArray[np.int64]) -> NDArray[n
     largest[of_part[order]] = order  # the last written
     of_face = np.zeros(len(areas), dtype=np.int64)
     of_face[faces.triangle_faces[::-1]] = np.arange(len(faces.triangles))[::-1]
-    middles: NDArray[np.float64] = faces.positions[faces.triangles[of_face[largest[parts]]]].mean(axis=1)
-    return middles
+    return faces.positions[faces.triangles[of_face[largest[parts]]]].mean(axis=1)
 
 
 def _doubled_walls(surface: SurfaceParts, lines: LineCrossings, crossed: NDArray[np.int64]) -> NDArray[np.bool_]:

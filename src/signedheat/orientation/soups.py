@@ -178,5 +178,4 @@ def disagreeing_with_neighbors(
         if not wrong.any():
             break
         signs[here[wrong]] *= -1
-    result: NDArray[np.bool_] = signs < 0
-    return result
+    return signs < 0

@@ -221,8 +221,7 @@ class Convex:
 
 def at_most_one(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Projection of rows on the unit ball: rows longer than one are scaled to length one."""
-    result: NDArray[np.float64] = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
-    return result
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
 
 
 def typical_size(sizes: NDArray[np.float64], dimension: int) -> float:

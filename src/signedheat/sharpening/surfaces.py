@@ -266,8 +266,7 @@ def without_false_zeros(
     own[line[(~near[corners] | is_sided[corners]).any(axis=1)]] = False
     result = values.copy()
     result[corners[own[line]]] = np.nan
-    answer: NDArray[np.float64] = result
-    return answer
+    return result
 
 
 def note_on_searches(triangles: IntrinsicMesh, *counts: int) -> GeodesicWindows:

@@ -236,5 +236,4 @@ def _join_leaves(
 
 def _contains(sorted_keys: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.bool_]:
     found = np.minimum(np.searchsorted(sorted_keys, keys), len(sorted_keys) - 1)
-    result: NDArray[np.bool_] = sorted_keys[found] == keys
-    return result
+    return sorted_keys[found] == keys

@@ -39,8 +39,7 @@ def colors(values: NDArray[np.float64], found: Deviation) -> NDArray[np.uint8]:
     stops = np.array([[int(color[at : at + 2], 16) for at in (1, 3, 5)] for color in INSIDE_TO_OUTSIDE])
     places = np.linspace(-found.extreme or -1.0, found.extreme or 1.0, len(stops))
     mixed = [np.interp(values, places, stops[:, channel]) for channel in range(3)]
-    result: NDArray[np.uint8] = np.stack(mixed, axis=1).round().astype(np.uint8)
-    return result
+    return np.stack(mixed, axis=1).round().astype(np.uint8)
 
 
 def _draw(found: Deviation, path: PathLike) -> None:

@@ -89,8 +89,7 @@ def even_colors(reach: float) -> ScalarMappable:
 def scale_of(norm: Any) -> ScalarMappable:
     """Colours from inside to outside, over a norm of values."""
     colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
-    scale: ScalarMappable = mpl_cm.ScalarMappable(norm, colors)
-    return scale
+    return mpl_cm.ScalarMappable(norm, colors)
 
 
 def signed_root(values: Any) -> Any:

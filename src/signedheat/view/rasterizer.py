@@ -62,8 +62,7 @@ class Camera:
         """(m,) brightness of faces, from 0.45 to 1, the same for both sides of a face."""
         normals = area_vectors @ self.frame.T
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-        result: NDArray[np.float64] = 0.45 + 0.55 * np.abs(normals @ LIGHT)
-        return result
+        return 0.45 + 0.55 * np.abs(normals @ LIGHT)
 
 
 def looking(direction: NDArray[np.float64], up: int = 2) -> NDArray[np.float64]:

@@ -154,7 +154,7 @@ def _draw_panel(
     """Draw values on a plane, indexed [u, v], as colours and isolines; dashed levels where confidence is low."""
     shown = np.ma.masked_invalid(values.T)
     shading: Literal["nearest", "gouraud"] = "nearest" if shown.mask.any() else "gouraud"
-    panel.pcolormesh(u, v, shown, cmap=colors.cmap, norm=colors.norm, shading=shading, rasterized=True)
+    panel.pcolormesh(u, v, shown, shading=shading, rasterized=True).set(cmap=colors.cmap, norm=colors.norm)
     panel.set_facecolor("#b9b9b9")
     low, high = float(shown.min()), float(shown.max())
     isolines = isolines[(isolines > low) & (isolines < high)]

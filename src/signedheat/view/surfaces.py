@@ -228,8 +228,7 @@ def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> N
         mean = (stacked[lengths > 0] / lengths[lengths > 0, None]).sum(axis=0) / len(stacked)
     direction = oblique(22, -58, up)
     if np.linalg.norm(mean) > 0.3:
-        towards: NDArray[np.float64] = mean / np.linalg.norm(mean) + 0.2 * direction
-        return towards
+        return mean / np.linalg.norm(mean) + 0.2 * direction
     extents = np.ptp(mesh.bounds, axis=0)
     if not normals or extents.min() < 1e-3 * extents.max():
         total: NDArray[np.float64] = mesh.face_area_vectors.sum(axis=0)

@@ -10,16 +10,27 @@ anywhere on an edge, costs a length of second order.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiled import compiled
 from ..nearest import foot_on_triangle
-from ..tet_clipping import beyond
+from ..tet_clipping import Planes, beyond
 from ..visibility import stays_inside
-from .heap_kernels import pop, push
+from .heap_kernels import Queue, pop, push
 
 
 @compiled
-def _seen(planes, neighbors, tets, points, first_tet, tets_at, v, target, slack):
+def _seen(
+    planes: Planes,
+    neighbors: NDArray[np.int64],
+    tets: NDArray[np.int64],
+    points: NDArray[np.float64],
+    first_tet: NDArray[np.int64],
+    tets_at: NDArray[np.int64],
+    v: int,
+    target: NDArray[np.float64],
+    slack: float,
+) -> bool:
     """Whether the segment from vertex v to a target in the mesh lies in the mesh."""
     x, y, z = points[v]
     u, w, t = target
@@ -37,7 +48,16 @@ def _seen(planes, neighbors, tets, points, first_tet, tets_at, v, target, slack)
 
 
 @compiled
-def nearest_around(rows, triangles_at, first_triangle, corners, near, x, y, z):
+def nearest_around(
+    rows: NDArray[np.float64],
+    triangles_at: NDArray[np.int64],
+    first_triangle: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    near: int,
+    x: float,
+    y: float,
+    z: float,
+) -> tuple[int, NDArray[np.float64]]:
     """The triangle nearest to (x, y, z) of those that share a corner with triangle `near`, and its nearest point."""
     best, found, place = np.inf, near, np.zeros(3)
     for c in range(3):
@@ -50,15 +70,27 @@ def nearest_around(rows, triangles_at, first_triangle, corners, near, x, y, z):
 
 
 @compiled
-def _length(point, x, y, z):
+def _length(point: NDArray[np.float64], x: float, y: float, z: float) -> float:
     return np.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)
 
 
 @compiled
 def any_angle_distance(
-    planes, neighbors, tets, points, first_tet, tets_at,
-    rows, corners, first_triangle, triangles_at, owners, nearest, slack, queue,
-):  # fmt: skip
+    planes: Planes,
+    neighbors: NDArray[np.int64],
+    tets: NDArray[np.int64],
+    points: NDArray[np.float64],
+    first_tet: NDArray[np.int64],
+    tets_at: NDArray[np.int64],
+    rows: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    first_triangle: NDArray[np.int64],
+    triangles_at: NDArray[np.int64],
+    owners: NDArray[np.int64],
+    nearest: NDArray[np.int64],
+    slack: float,
+    queue: Queue,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], int]:
     """Distance of every vertex from triangles in the mesh.
 
     Parameters

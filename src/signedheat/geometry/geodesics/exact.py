@@ -206,8 +206,7 @@ def along_edges(
     first = np.ones(len(rows), dtype=bool)  # the shortest of the edges that join two vertices
     first[1:] = (np.diff(rows) != 0) | (np.diff(columns) != 0)
     graph = csr_matrix((lengths[first], (rows[first], columns[first])), shape=(n + 1, n + 1))
-    result: NDArray[np.float64] = dijkstra(graph, directed=False, indices=n)[:n]
-    return result
+    return dijkstra(graph, directed=False, indices=n)[:n]
 
 
 FLIPPED = 0.05

@@ -12,6 +12,7 @@ from ...memory import refuse_beyond_memory
 from ..components import grouped
 from ..intrinsic_mesh import IntrinsicMesh
 from .heap_kernels import Queue, push
+from .sources import GeodesicSources
 from .windows import BEAM, KIND, POINT, S0, S1, SIGMA, P, Q, arrival, clip, outrun, put
 
 
@@ -123,7 +124,19 @@ def free_row(counts: NDArray[np.int64], following: NDArray[np.int64], row: int) 
 
 
 @compiled
-def propagate_across(faces, search, face, side, kind, t0, t1, point, normal, sigma, slack):
+def propagate_across(
+    faces: Faces,
+    search: Search,
+    face: int,
+    side: int,
+    kind: float,
+    t0: float,
+    t1: float,
+    point: complex,
+    normal: complex,
+    sigma: float,
+    slack: float,
+) -> None:
     """Propagate distance across a side of a face, from within, to the faces beyond; nothing where there is no room.
 
     In the layout of the face: the interval of the side from fraction t0 to t1 sees the source, which is a point whose
@@ -170,7 +183,7 @@ def propagate_across(faces, search, face, side, kind, t0, t1, point, normal, sig
 
 
 @compiled
-def _reach_corners(faces, distance, face, start, end):
+def _reach_corners(faces: Faces, distance: NDArray[np.float64], face: int, start: complex, end: complex) -> None:
     """Distance of the corners of a face to a segment or a point in it."""
     along = end - start
     square = abs(along) ** 2
@@ -181,7 +194,7 @@ def _reach_corners(faces, distance, face, start, end):
 
 
 @compiled
-def _first_beam(faces, search, face, start, end, slack):
+def _first_beam(faces: Faces, search: Search, face: int, start: complex, end: complex, slack: float) -> None:
     """Parallel beam from a segment in a face, to the left of it, to the sides of the face that it meets."""
     along = (end - start) / abs(end - start)
     normal = 1j * along
@@ -203,7 +216,9 @@ def _first_beam(faces, search, face, start, end, slack):
 
 
 @compiled
-def _first_fan(faces, search, face, point, first, second, slack):
+def _first_fan(
+    faces: Faces, search: Search, face: int, point: complex, first: complex, second: complex, slack: float
+) -> None:
     """Circular waves from a point in a face, in directions of more than 90° from two given ones."""
     for side in range(3):
         a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
@@ -218,7 +233,7 @@ def _first_fan(faces, search, face, point, first, second, slack):
 
 
 @compiled
-def initial_windows(faces, sources, search, slack):
+def initial_windows(faces: Faces, sources: GeodesicSources, search: Search, slack: float) -> None:
     """Set distances at the corners of faces with sources, then make the initial windows."""
     for v in sources.vertices:
         search.distance[v] = 0.0

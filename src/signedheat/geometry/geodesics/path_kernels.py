@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from .heap_kernels import pop, push
+from .heap_kernels import Queue, pop, push
+from .initial_windows import Faces
 
 TIE = 1e-9
 """How much dearer ways are through one edge than through another of the same length: of ways around a symmetric peak,
@@ -20,7 +21,7 @@ whose lengths differ by 1e-16, the same one is always found. Any number from 1e-
 
 
 @compiled
-def middle(faces, h):
+def middle(faces: Faces, h: int) -> complex:
     """Midpoint of a halfedge, in the layout of its face."""
     return 0.5 * (faces.positions[h // 3, h % 3] + faces.positions[h // 3, (h % 3 + 1) % 3])
 
@@ -32,13 +33,23 @@ def toll(e: int) -> float:
 
 
 @compiled
-def find_sleeve(faces, starts, start_points, ends, end_points, cost, leave, enter, queue):
+def find_sleeve(
+    faces: Faces,
+    starts: NDArray[np.int64],
+    start_points: NDArray[np.complex128],
+    ends: NDArray[np.int64],
+    end_points: NDArray[np.complex128],
+    cost: NDArray[np.float64],
+    leave: NDArray[np.int64],
+    enter: NDArray[np.int64],
+    queue: Queue,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The faces between two sets of faces on the shortest path through midpoints of edges (Dijkstra).
 
     Returns the halfedges through which all faces but the last are left, and those through which all but the first are
     entered; empty if there is no path. `cost`, `leave`, `enter` and `queue` are work space, restored before returning.
     """
-    edge_of, touched = faces.edges.ravel(), [np.int64(0)]
+    edge_of, touched = faces.edges.ravel(), [0]
     touched.pop()
     for s in range(len(starts)):
         for k in range(3):
@@ -86,7 +97,9 @@ def find_sleeve(faces, starts, start_points, ends, end_points, cost, leave, ente
 
 
 @compiled
-def unfold(faces, left, entered):
+def unfold(
+    faces: Faces, left: NDArray[np.int64], entered: NDArray[np.int64]
+) -> tuple[NDArray[np.complex128], NDArray[np.int64], NDArray[np.complex128]]:
     """Unfold a sleeve into the plane of its first face: tail and head of each halfedge left, and the last face.
 
     Also whether each face, the last one included, is turned over in that plane.
@@ -121,12 +134,14 @@ def turns(a: complex, b: complex) -> float:
 
 
 @compiled
-def funnel(portals, over, start, end):
+def funnel(
+    portals: NDArray[np.complex128], over: NDArray[np.int64], start: complex, end: complex
+) -> tuple[list[int], list[int], float]:
     """Shortest path inside an unfolded sleeve, by the simple stupid funnel algorithm.
 
     Returns the portals at which the path bends, whether it bends at their tail (0) or head (1), and its length.
     """
-    bends, ends = [np.int64(0)], [np.int64(0)]
+    bends, ends = [0], [0]
     bends.pop()
     ends.pop()
     rims, at = np.full(2, start), np.full(2, -1)  # of the funnel, right and left, and the portals they come from
@@ -153,7 +168,14 @@ def funnel(portals, over, start, end):
 
 
 @compiled
-def other_way(faces, left, entered, portals, bend, point):
+def other_way(
+    faces: Faces,
+    left: NDArray[np.int64],
+    entered: NDArray[np.int64],
+    portals: NDArray[np.complex128],
+    bend: int,
+    point: complex,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
     first = last = bend
     while first > 0 and (portals[first - 1, 0] == point or portals[first - 1, 1] == point):
@@ -162,7 +184,7 @@ def other_way(faces, left, entered, portals, bend, point):
         last += 1
     goal, at_tail = entered[last] // 3, portals[first, 0] == point
     # walk around the vertex in all directions, breadth first: halfedges through which faces are left, and entered
-    out, into, before = [turned(left[first], at_tail)], [left[first]], [np.int64(-1)]
+    out, into, before = [turned(left[first], at_tail)], [left[first]], [-1]
     tail_there = [np.int64(not at_tail)]
     k = 0
     while k < len(out):
@@ -184,7 +206,7 @@ def other_way(faces, left, entered, portals, bend, point):
 
 
 @compiled
-def is_among(values: Sequence[np.int64] | NDArray[np.int64], value: int, begin: int, end: int) -> bool:
+def is_among(values: Sequence[int] | NDArray[np.int64], value: int, begin: int, end: int) -> bool:
     """Whether a value is among some of others."""
     for k in range(begin, end):
         if values[k] == value:
@@ -193,7 +215,17 @@ def is_among(values: Sequence[np.int64] | NDArray[np.int64], value: int, begin: 
 
 
 @compiled
-def spliced(left, entered, first, last, out, into, before, k, across):
+def spliced(
+    left: NDArray[np.int64],
+    entered: NDArray[np.int64],
+    first: int,
+    last: int,
+    out: list[int],
+    into: list[int],
+    before: list[int],
+    k: int,
+    across: int,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """A sleeve whose crossings `first` to `last` are exchanged for those of a walk, which ends at its entry k."""
     n, j = 1, k
     while before[j] >= 0:
@@ -221,14 +253,20 @@ def point_in(faces: NDArray[np.int64], points: NDArray[np.complex128], face: int
     """The point listed for a face, in its layout."""
     for s in range(len(faces)):
         if faces[s] == face:
-            found: complex = points[s]
-            return found
-    first: complex = points[0]
-    return first
+            return points[s]
+    return points[0]
 
 
 @compiled
-def path_in(faces, left, entered, starts, start_points, ends, end_points):
+def path_in(
+    faces: Faces,
+    left: NDArray[np.int64],
+    entered: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    start_points: NDArray[np.complex128],
+    ends: NDArray[np.int64],
+    end_points: NDArray[np.complex128],
+) -> tuple[NDArray[np.complex128], complex, complex, list[int], list[int], float]:
     """The shortest path in a sleeve: its portals, its two ends, the bends as `funnel` returns them, and its length."""
     portals, over, placed = unfold(faces, left, entered)
     last = entered[-1] // 3
@@ -239,7 +277,15 @@ def path_in(faces, left, entered, starts, start_points, ends, end_points):
 
 
 @compiled
-def straighten(faces, left, entered, starts, start_points, ends, end_points):
+def straighten(
+    faces: Faces,
+    left: NDArray[np.int64],
+    entered: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    start_points: NDArray[np.complex128],
+    ends: NDArray[np.int64],
+    end_points: NDArray[np.complex128],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """The shortest path in a sleeve, improved as long as passing a vertex on its other side makes it shorter.
 
     Returns the halfedges crossed and the fraction along each.
@@ -274,7 +320,16 @@ def straighten(faces, left, entered, starts, start_points, ends, end_points):
 
 
 @compiled
-def shortest_lines(faces, queue, starts, start_points, start_at, ends, end_points, end_at):
+def shortest_lines(
+    faces: Faces,
+    queue: Queue,
+    starts: NDArray[np.int64],
+    start_points: NDArray[np.complex128],
+    start_at: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    end_points: NDArray[np.complex128],
+    end_at: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
     """Shortest paths for many pairs of points: halfedges crossed, fractions along them, their number for each pair.
 
     The faces at the i-th start are ``starts[start_at[i] : start_at[i + 1]]``, and `start_points` has its position in
@@ -284,7 +339,7 @@ def shortest_lines(faces, queue, starts, start_points, start_at, ends, end_point
     cost = np.full(n_edges, np.inf)
     leave, enter = np.empty(n_edges, np.int64), np.empty(n_edges, np.int64)
     counts = np.empty(len(start_at) - 1, np.int64)
-    sides, fractions = [np.int64(0)], [0.0]
+    sides, fractions = [0], [0.0]
     sides.pop()
     fractions.pop()
     for job in range(len(counts)):

@@ -258,10 +258,7 @@ def halfedges_of(triangles: IntrinsicMesh, edges: Ids) -> tuple[Ids, Ids]:
 def on_sides(triangles: IntrinsicMesh, faces: Ids, sides: Ids, along: NDArray[np.float64]) -> Points:
     """(n, k) positions at fractions (n, k) along the edges, tail to head, that are given sides of faces."""
     share = np.where(triangles.edges.forward[faces, sides][:, None], along, 1 - along)
-    position: Points = (
-        triangles.corner_positions[faces, sides][:, None] + share * triangles.edge_vectors[faces, sides][:, None]
-    )
-    return position
+    return triangles.corner_positions[faces, sides][:, None] + share * triangles.edge_vectors[faces, sides][:, None]
 
 
 def along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ids) -> NDArray[np.float64]:
@@ -330,5 +327,4 @@ def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments 
 
 def rounded(barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
     kept = np.where(barycentric < NEAR, 0.0, barycentric)
-    result: NDArray[np.float64] = kept / kept.sum(axis=-1, keepdims=True)
-    return result
+    return kept / kept.sum(axis=-1, keepdims=True)

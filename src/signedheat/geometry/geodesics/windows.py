@@ -18,14 +18,14 @@ S0, S1, P, Q, SIGMA, KIND = range(6)
 
 
 @compiled
-def put(window, rows, k):
+def put(window: NDArray[np.float64], rows: NDArray[np.float64], k: int) -> None:
     """Write a window to row k, entry by entry: assignments to slices of arrays take long to compile."""
     for i in range(6):
         rows[k, i] = window[i]
 
 
 @compiled
-def arrival(w, x, y):
+def arrival(w: NDArray[np.float64], x: float, y: float) -> float:
     """Distance from the source of a window to a point in the frame of its edge."""
     if w[KIND] == BEAM:
         return w[SIGMA] + w[P] * x + w[Q] * y
@@ -33,7 +33,7 @@ def arrival(w, x, y):
 
 
 @compiled
-def ray(w, x):
+def ray(w: NDArray[np.float64], x: float) -> tuple[float, float]:
     """Direction of propagation at a point of the edge; of any length."""
     if w[KIND] == BEAM:
         return w[P], w[Q]
@@ -41,7 +41,7 @@ def ray(w, x):
 
 
 @compiled
-def outrun(w, at_tail, at_head, length, slack):
+def outrun(w: NDArray[np.float64], at_tail: float, at_head: float, length: float, slack: float) -> bool:
     """Whether paths through an end of the edge are shorter everywhere in the window."""
     if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
         return True
@@ -49,7 +49,7 @@ def outrun(w, at_tail, at_head, length, slack):
 
 
 @compiled
-def trim(a, b):
+def trim(a: NDArray[np.float64], b: NDArray[np.float64]) -> None:
     """Trim two overlapping windows, of which a begins first, to where each has the smaller distance."""
     if b[S0] >= a[S1]:
         return
@@ -122,7 +122,7 @@ def outdoes(w: NDArray[np.float64], old: NDArray[np.float64]) -> bool:
 
 
 @compiled
-def merge(a, b, length, tolerance):
+def merge(a: NDArray[np.float64], b: NDArray[np.float64], length: float, tolerance: float) -> bool:
     """Merge window b into a, if they are neighbours and one wave approximates both; whether it was done."""
     if abs(a[S1] - b[S0]) > 1e-6 * length:
         return False
@@ -170,7 +170,7 @@ def straighten(w: NDArray[np.float64]) -> None:
 
 
 @compiled
-def clip(s0, s1, at_start, slope):
+def clip(s0: float, s1: float, at_start: float, slope: float) -> tuple[float, float]:
     """The part of [s0, s1] where ``at_start + slope s ≤ 0``."""
     if slope > 0.0:
         s1 = min(s1, -at_start / slope)
@@ -182,7 +182,7 @@ def clip(s0, s1, at_start, slope):
 
 
 @compiled
-def hit(x0, dx, dy, ax, ay, bx, by):
+def hit(x0: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Fraction of the way from a to b at which the ray from (x0, 0) along (dx, dy) meets the line through both."""
     ex, ey = bx - ax, by - ay
     det = dx * ey - dy * ex

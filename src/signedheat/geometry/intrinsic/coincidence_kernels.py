@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .gluing_kernels import kernel
 
@@ -11,7 +12,7 @@ NEARNESS = 0.01
 
 
 @kernel
-def root(parent, a):
+def root(parent: NDArray[np.int64], a: int) -> int:
     """Representative of the group that a vertex belongs to (union–find with path halving)."""
     while parent[a] != a:
         parent[a] = parent[parent[a]]
@@ -20,7 +21,13 @@ def root(parent, a):
 
 
 @kernel
-def coinciding(tail, head, length, order, n_vertices):
+def coinciding(
+    tail: NDArray[np.int64],
+    head: NDArray[np.int64],
+    length: NDArray[np.float64],
+    order: NDArray[np.int64],
+    n_vertices: int,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Group vertices that nearly coincide.
 
     Edges join vertices into ever larger groups, shortest first (Kruskal). A group is kept if the lengths of the edges

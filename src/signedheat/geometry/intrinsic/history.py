@@ -37,6 +37,11 @@ class Lines(NamedTuple):
     ends: NDArray[np.float64]
     vectors: NDArray[np.float64]
 
+    def chosen(self, rows: NDArray[np.int64]) -> Lines:
+        """Some of the rows, in this order."""
+        owners, faces, starts, ends, vectors = self
+        return Lines(owners[rows], faces[rows], starts[rows], ends[rows], vectors[rows])
+
 
 @dataclass(frozen=True, eq=False)
 class History(Frozen):
@@ -141,30 +146,27 @@ def straight_lines(
     room = 4 * len(faces) + 16
     while True:
         shape = (room, vectors.shape[1], 3)
-        rows = Lines(
+        lines = Lines(
             np.empty(room, np.int64),
             np.empty(room, np.int64),
             np.empty((room, 3)),
             np.empty((room, 3)),
             np.empty(shape),
         )
-        count = trace_both_ways(gluing, faces, barycentric, halves, *rows[1:], rows.owners)
+        count = trace_both_ways(gluing, faces, barycentric, halves, *lines[1:], lines.owners)
         if count <= room:
             break
         room = count
-    owners, faces, starts, ends, vectors = (a[:count] for a in rows)
-    against = owners < 0
-    owners = np.where(against, -1 - owners, owners)
-    begin, finish = np.where(against[:, None], ends, starts), np.where(against[:, None], starts, ends)
-    position = np.where(against, -1 - np.arange(count), np.arange(count))
-    vectors[:, 0] *= 2.0
-    order = np.lexsort([position, owners])
-    owners, faces, begin, finish, vectors, against = (
-        a[order] for a in (owners, faces, begin, finish, vectors, against)
-    )
-    first_half = np.flatnonzero(against[:-1] & ~against[1:] & (owners[:-1] == owners[1:]))  # they meet in the middle
-    finish[first_half] = finish[first_half + 1]
-    return Lines(*(np.delete(a, first_half + 1, axis=0) for a in (owners, faces, begin, finish, vectors)))
+    rows = np.arange(count)
+    against = lines.owners[:count] < 0  # the half from the middle to the tail
+    owners = np.where(against, -1 - lines.owners[:count], lines.owners[:count])
+    order = np.lexsort([np.where(against, -1 - rows, rows), owners])
+    lines, against = lines._replace(owners=owners).chosen(order), against[order]
+    lines.vectors[:, 0] *= 2.0
+    lines.starts[against], lines.ends[against] = lines.ends[against], lines.starts[against]
+    middle = np.flatnonzero(against[:-1] & ~against[1:] & (lines.owners[:-1] == lines.owners[1:]))
+    lines.ends[middle] = lines.ends[middle + 1]
+    return lines.chosen(np.delete(rows, middle + 1))
 
 
 def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: NDArray[np.float64]) -> NDArray[np.int64]:

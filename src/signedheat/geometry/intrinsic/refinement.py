@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +87,7 @@ def refined(
             done = max(done, float(listed[-1] - agenda.seen[1]) / len(listed))
             progress(min(done, 1.0))
         if status == GROW:
-            grown = {k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")}
+            grown: dict[str, Any] = {k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")}
             gluing = gluing._replace(**grown)
             agenda = agenda._replace(**{k: doubled(getattr(agenda, k)) for k in TO_GROW})
         if status not in (PAUSED, GROW):
@@ -106,8 +107,7 @@ def close_faces(gluing: Gluing, agenda: Agenda) -> NDArray[np.bool_]:
     group = agenda.group[gluing.tail[: 3 * n_faces]].reshape(-1, 3)
     side = lengths.argmin(axis=1)
     one, other = group[faces, side], group[faces, (side + 1) % 3]
-    result: NDArray[np.bool_] = (one >= 0) & (one == other) & (lengths[faces, side] <= agenda.extent[one])
-    return result
+    return (one >= 0) & (one == other) & (lengths[faces, side] <= agenda.extent[one])
 
 
 def agenda_of(gluing: Gluing) -> tuple[NDArray[np.int64], Agenda]:

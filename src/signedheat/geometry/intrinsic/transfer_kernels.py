@@ -172,13 +172,23 @@ def transfer_backward(
 
 
 @kernel
-def swap_last(w):
+def swap_last(w: NDArray[np.float64]) -> None:
     """Exchange the last two entries, as a face that is turned over does with its corners."""
     w[1], w[2] = w[2], w[1]
 
 
 @kernel
-def exchange(kind, c, forward, corners, start, new_corners, new_start, w, vectors):
+def exchange(
+    kind: int,
+    c: NDArray[np.float64],
+    forward: bool,
+    corners: NDArray[np.int64],
+    start: int,
+    new_corners: NDArray[np.int64],
+    new_start: NDArray[np.int64],
+    w: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+) -> int:
     """Transfer one point, and vectors at it, over one step; returns which of the step's new faces contains it."""
     lead = 3 if kind == SPLIT_FACE else 2  # the points before it are on one side of the dependency
     x = np.zeros(4)
@@ -205,13 +215,13 @@ def exchange(kind, c, forward, corners, start, new_corners, new_start, w, vector
 
 
 @kernel
-def has(corners, l):
+def has(corners: NDArray[np.int64], l: int) -> bool:
     """Whether point l of a step is a corner of a face."""
     return corners[0] == l or corners[1] == l or corners[2] == l
 
 
 @kernel
-def shift(x, c, lead, gone, amount):
+def shift(x: NDArray[np.float64], c: NDArray[np.float64], lead: int, gone: int, amount: float) -> None:
     """Move weights along the affine dependency c, so that the one of point `gone` vanishes."""
     for l in range(4):
         x[l] += -amount * c[l] if l < lead else amount * c[l]
@@ -239,7 +249,18 @@ def keep_on_edges(w: NDArray[np.float64], v: NDArray[np.float64]) -> None:
 
 
 @kernel
-def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts, out_ends, out_vectors, n):
+def trace_geodesic(
+    g: Gluing,
+    face: int,
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    forward: bool,
+    out_faces: NDArray[np.int64],
+    out_starts: NDArray[np.float64],
+    out_ends: NDArray[np.float64],
+    out_vectors: NDArray[np.float64],
+    n: int,
+) -> int:
     """Trace a geodesic from a point along its first vector, or against it, over its length; other vectors are carried.
 
     Writes one row per face crossed, from row n on, as far as there is room: the face, where the line enters and leaves
@@ -306,7 +327,17 @@ def trace_geodesic(g, face, barycentric, vectors, forward, out_faces, out_starts
 
 
 @kernel
-def trace_both_ways(g, faces, barycentric, vectors, out_faces, out_starts, out_ends, out_vectors, owners):
+def trace_both_ways(
+    g: Gluing,
+    faces: NDArray[np.int64],
+    barycentric: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    out_faces: NDArray[np.int64],
+    out_starts: NDArray[np.float64],
+    out_ends: NDArray[np.float64],
+    out_vectors: NDArray[np.float64],
+    owners: NDArray[np.int64],
+) -> int:
     """Trace half of the first vector both ways from every point p; rows of the backward half have owner −1 − p."""
     n = 0
     for p in range(len(faces)):

@@ -73,7 +73,19 @@ def _with_room(sums: NDArray[np.float32], used: int, more: int) -> NDArray[np.fl
 
 
 @compiled
-def _merge(corners, vectors, weights, components, order, shape, size, slots, nodes, places, scale):
+def _merge(
+    corners: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    components: NDArray[np.int64],
+    order: NDArray[np.int64],
+    shape: NDArray[np.int64],
+    size: float,
+    slots: NDArray[np.int32],
+    nodes: NDArray[np.float32],
+    places: NDArray[np.int32],
+    scale: float,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float32]]:
     """Sums of weight · position, vector and weight per (component, cell).
 
     Arrays are copied entry by entry, since assignments to slices compile slowly.

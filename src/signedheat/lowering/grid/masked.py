@@ -113,8 +113,7 @@ class MaskedGridDiscretization(DiffusesEach):
         normals = unit(source.samples.vectors * spacing)[nearest]
         along = away - np.einsum("ij,ij->i", away, normals)[:, None] * normals
         past_end = source.near_wall[nearest] & (np.linalg.norm(along, axis=1) > FACING)
-        straight: NDArray[np.bool_] = nodes.see(source.samples.positions[nearest]) & ~past_end
-        return straight
+        return nodes.see(source.samples.positions[nearest]) & ~past_end
 
     def to_cells(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """X at the free nodes, which are the cells here: as it is."""

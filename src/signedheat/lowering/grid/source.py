@@ -81,5 +81,4 @@ class GridSource:
     def at_samples(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """(s,) node values interpolated at the samples."""
         nodes, weights = self.stencil
-        result: NDArray[np.float64] = np.einsum("ij,ij->i", values.ravel()[nodes], weights)
-        return result
+        return np.einsum("ij,ij->i", values.ravel()[nodes], weights)

@@ -70,5 +70,4 @@ def nearest_others(ends: NDArray[np.float64]) -> NDArray[np.int64]:
     gap = np.linalg.norm(ends[::2] - ends[1::2], axis=1)[piece]
     rows = np.arange(len(ends))
     other = np.where(own.all(axis=1) | (near[rows, first] > gap), piece, piece[found[rows, first]])
-    result: NDArray[np.int64] = np.stack([piece, other], axis=1)
-    return result
+    return np.stack([piece, other], axis=1)

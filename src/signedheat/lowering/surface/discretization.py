@@ -103,10 +103,9 @@ class SurfaceDiscretization:
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
-        segments = self.segments(sources)
-        triangles, groups = refine_to_conform(self.triangles, segments)
+        triangles, segments = refine_to_conform(self.triangles, self.segments(sources))
         surface = self if triangles is self.triangles else self._cut_into(triangles)
-        triangles, groups = nonmanifold_frames(triangles, groups)
+        triangles, groups = nonmanifold_frames(triangles, segments)
         return surface._turned_to(triangles), groups
 
     def segments(self, sources: Sequence[Any]) -> list[list[CurveSegments]]:
@@ -338,7 +337,7 @@ def _(domain: PointCloud) -> SurfaceDiscretization:
     duplicates = int((domain.representatives != np.arange(domain.n_points)).sum())
     notes = (PointsLeftOut(duplicates, np.flatnonzero(~used[domain.representatives])),)
     spacing = float(mesh.edge_lengths.mean())
-    return replace(discretize(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)
+    return replace(lowered_mesh(mesh), domain=domain, restriction=domain.representatives, spacing=spacing, notes=notes)
 
 
 BYTES_PER_VOXEL = 20

@@ -277,8 +277,7 @@ def ends_among(parts: Sequence[CurveSegments], who: NDArray[np.int64]) -> NDArra
     """(k, 2) points at the ends of every segment, from the number of each node's point."""
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
     ends: NDArray[np.int64] = np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])
-    result: NDArray[np.int64] = who[ends]
-    return result
+    return who[ends]
 
 
 def connected(parts: Sequence[CurveSegments]) -> NDArray[np.int64]:

@@ -143,12 +143,11 @@ class TetDiscretization(DiffusesEach):
         Each tet takes them from the last stage in which all its four faces are known.
         """
         tet_faces = self.mesh.faces.tet_faces
-        means, gradients, factors = None, None, np.full(self.mesh.n_tets, -np.inf)
+        n = self.mesh.n_tets
+        means, gradients, factors = np.zeros((n, stages[0].values.shape[1])), np.zeros((n, 3)), np.full(n, -np.inf)
         for vectors, factor in stages:
             of_faces = vectors[tet_faces]
             finite = ~np.isnan(of_faces[..., 0]).any(axis=1)
-            if means is None:
-                means, gradients = np.zeros((self.mesh.n_tets, vectors.shape[1])), np.zeros((self.mesh.n_tets, 3))
             means[finite] = of_faces[finite].mean(axis=1)
             slopes = np.einsum("mki,mk->mi", self.mesh.geometry.area_vectors[finite], of_faces[finite, :, -1])
             gradients[finite], factors[finite] = slopes, factor

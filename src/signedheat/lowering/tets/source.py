@@ -200,7 +200,7 @@ def _patches(
     keys += np.concatenate([at_vertices, nearest])
     areas = np.concatenate([np.repeat(polygons.areas[k] / 3, 3), polygons.areas[inside]])
     found, patch = np.unique(keys, return_inverse=True)
-    weights = np.bincount(patch, weights=areas)
+    weights: NDArray[np.float64] = np.bincount(patch, weights=areas).astype(np.float64)
     real = weights > 1e-9 * np.bincount(patch, weights=np.abs(areas))  # drop fan triangles that cancel
     n_on = len(at_vertices)
     columns = np.concatenate([at_vertices, corners[inside].ravel()])
@@ -218,10 +218,7 @@ def _patches(
 
 
 def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> NDArray[np.float64]:
-    centers: NDArray[np.float64] = np.einsum(
-        "pk,pki->pi", polygons.barycentric, mesh.vertices[mesh.tets[polygons.tets]]
-    )
-    return centers
+    return np.einsum("pk,pki->pi", polygons.barycentric, mesh.vertices[mesh.tets[polygons.tets]])
 
 
 def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -149,8 +149,7 @@ def block_points(places: NDArray[np.int32], steps: NDArray[np.float64]) -> NDArr
 def row_of_node(cubes: NDArray[np.int32], rows: NDArray[np.int32], i: int, j: int, k: int) -> np.int32:
     """The block that holds a node; −1 if there is none. The node is on the grid."""
     cube = cubes[i // 128, j // 128, k // 128]
-    row: np.int32 = rows[cube, i // 8 % 16, j // 8 % 16, k // 8 % 16] if cube >= 0 else np.int32(-1)
-    return row
+    return rows[cube, i // 8 % 16, j // 8 % 16, k // 8 % 16] if cube >= 0 else np.int32(-1)
 
 
 @compiled

@@ -87,8 +87,7 @@ def smoothed_signs(signs: NDArray[np.float64]) -> NDArray[np.float64]:
     [-0.6, -0.6, -0.4, 0.4, 0.6, 0.6]
     """
     agreement = scipy.ndimage.gaussian_filter(signs, SMOOTHING, mode="nearest") * signs
-    smooth: NDArray[np.float64] = signs * np.clip(agreement, LEAST, MOST)
-    return smooth
+    return signs * np.clip(agreement, LEAST, MOST)
 
 
 def zero_contour(
