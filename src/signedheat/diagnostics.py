@@ -73,7 +73,13 @@ class Diagnostics(ShortRepr):
         return next((note for note in self.notes if isinstance(note, kind)), None)
 
     def noting(self, *notes: Note) -> Diagnostics:
-        """The same with further notes, each replacing an older one of the same type."""
+        """The same with further notes, each replacing an older one of the same type.
+
+        Examples
+        --------
+        >>> Diagnostics().noting(TetsTurned(3)).noting(TetsTurned(4)).notes
+        (TetsTurned(tets_turned=4),)
+        """
         kinds = {type(note) for note in notes}
         return replace(self, notes=(*(note for note in self.notes if type(note) not in kinds), *notes))
 

@@ -197,7 +197,15 @@ def opening(
     resolution: int = RESOLUTION,
     measure: Measure | None = None,
 ) -> Boundary:
-    """Erode, then dilate: removes parts thinner than twice the distance, rounds convex corners. See `dilate`."""
+    """Erode, then dilate: removes parts thinner than twice the distance, rounds convex corners. See `dilate`.
+
+    Examples
+    --------
+    >>> bar = Polyline([[0, 0], [0, 1], [1, 1], [1, 0.5], [4, 0.5], [4, 0]], closed=True)
+    >>> [opened] = opening(bar, 0.3)  # what is .5 wide goes
+    >>> bool(opened.points[:, 0].max() < 1.1)
+    True
+    """
     distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (-distance, distance), domain, resolution, measure)
 
@@ -211,7 +219,14 @@ def closing(
     resolution: int = RESOLUTION,
     measure: Measure | None = None,
 ) -> Boundary:
-    """Dilate, then erode: fills gaps narrower than twice the distance, rounds concave corners. See `dilate`."""
+    """Dilate, then erode: fills gaps narrower than twice the distance, rounds concave corners. See `dilate`.
+
+    Examples
+    --------
+    >>> gap = [Polyline([[x, 0], [x, 1], [x + 1, 1], [x + 1, 0]], closed=True) for x in (0, 1.2)]
+    >>> len(gap), len(closing(gap, 0.2))  # what is .2 apart grows together
+    (2, 1)
+    """
     distance = finite_number(distance, "the distance", least=0)
     return _offsets(shape, (distance, -distance), domain, resolution, measure)
 

@@ -150,6 +150,14 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             If there is no source, or one does not fit the domain.
         ConstraintError
             If the constraint does not fit the sources.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> plane = sh.TriangleMesh([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> upwards = plane.polyline([[1, 0, 0], [1, 1, 0]])
+        >>> sh.SignedHeatSolver(plane).distance(upwards).values.round(3).tolist()  # positive on its left
+        [1.0, -1.0, -1.0, 1.0]
         """
         return warned(self._distance(sources, constraint))
 
@@ -203,6 +211,14 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         -------
         list of VertexField, GridField or TetField
             The result of `distance` for each, up to rounding. Timings are divided equally among the sources.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> solver = sh.SignedHeatSolver(sh.Grid((0, 0), 0.1, (21, 11)))
+        >>> lines = [sh.Polyline([[x, -1], [x, 2]]) for x in (0.5, 1.5)]
+        >>> [round(phi([1.0, 0.5]).item(), 2) for phi in solver.distance_many(lines)]
+        [-0.5, 0.5]
         """
         constraint = checked(constraint)
         fields: list[Field] = []

@@ -51,6 +51,11 @@ class Sampling:
         Move and scale the shape into the unit sphere.
     layout : "arrays" or "deepsdf"
         How they are kept in the file.
+
+    Examples
+    --------
+    >>> Job(samples=Sampling(n=10_000, seed=3)).samples.near
+    0.8
     """
 
     n: int = 250_000
@@ -88,6 +93,16 @@ class Job:
     ------
     SignedHeatError
         If there is nothing to make, samples are wanted of a plain field, or offsets beyond the band.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from signedheat import samples
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     samples.sphere(2).save(f"{folder}/ball.stl")
+    ...     figures = Job(offsets=(0.1,), resolution=16)(Path(folder, "ball.stl"), Path(folder, "made"))
+    >>> [surface["distance"] for surface in figures["surfaces"]]
+    [0.1]
     """
 
     volume: str | None = None

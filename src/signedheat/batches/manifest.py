@@ -40,6 +40,11 @@ class Outcome:
         What was to be made of it, and by which version of this package.
     source : tuple of int
         Size of the file in bytes, and when it was modified, in nanoseconds.
+
+    Examples
+    --------
+    >>> Outcome("ball", "parts/ball.stl", "failed", 0.1, "the file is empty").is_done
+    False
     """
 
     name: str

@@ -44,6 +44,12 @@ class Batch:
         The file that holds them, a line of JSON each.
     skipped : int
         Number of shapes that were done before.
+
+    Examples
+    --------
+    >>> from signedheat.batches import Outcome
+    >>> Batch((Outcome("a", "a.stl", "done", 1.0), Outcome("b", "b.stl", "timed out", 60.0)), Path("manifest.jsonl"))
+    Batch(1 of 2 shapes done, 0 of them before)
     """
 
     outcomes: tuple[Outcome, ...]

@@ -35,6 +35,14 @@ class CurveOrientation(Frozen, ShortRepr):
     agreement : (k,) float
         How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious pieces often do; 1
         for what has no ends of its own.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> mesh = samples.sphere(3)
+    >>> equator, = mesh.level_set(mesh.vertices[:, 2], 0.01)
+    >>> curve_orientation([equator], mesh).turned
+    array([False])
     """
 
     curves: list[CurveOrPoints]

@@ -99,7 +99,14 @@ class Curve(Frozen):
         return self.n_points if self.closed else self.n_points - 1
 
     def reversed(self) -> Curve:
-        """The curve in opposite direction: left and right are exchanged; given normals stay the same."""
+        """The curve in opposite direction: left and right are exchanged; given normals stay the same.
+
+        Examples
+        --------
+        >>> curve = Curve([0, 0], [[1, 0, 0], [0, 1, 0]])
+        >>> curve.reversed().barycentric.tolist()
+        [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
+        """
         normals = None
         if self.normals is not None:
             normals = np.roll(self.normals[::-1], -1, axis=0) if self.closed else self.normals[::-1]

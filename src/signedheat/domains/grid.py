@@ -208,7 +208,13 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether each of the (n, d) points lies within the bounding box of the nodes."""
+        """(n,) whether each of the (n, d) points lies within the bounding box of the nodes.
+
+        Examples
+        --------
+        >>> Grid((0, 0), 0.5, (3, 3)).contains([[1.0, 0.2], [1.1, 0.2]])
+        array([ True, False])
+        """
         positions = numbers(points, "points")
         return np.all((positions >= self.origin) & (positions <= self.upper), axis=-1)
 

@@ -68,6 +68,13 @@ class IntrinsicTriangulation(Displayed, Frozen):
         Whether refinement ended before the limit on the number of vertices.
     close : (m,) bool
         Faces at vertices that nearly coincide, which refinement leaves thin.
+
+    Examples
+    --------
+    >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> better = intrinsic_delaunay(strip, refine=True)
+    >>> better.n_vertices > strip.n_vertices, bool(np.isclose(better.triangles.face_areas.sum(), 9.0))
+    (True, True)
     """
 
     mesh: TriangleMesh
@@ -158,6 +165,13 @@ class IntrinsicTriangulation(Displayed, Frozen):
         ------
         GeometryError
             If a face does not exist, or a coordinate is NaN or infinite.
+
+        Examples
+        --------
+        >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> faces, barycentric = intrinsic_delaunay(strip, refine=True).locate([0], [[0.5, 0.25, 0.25]])
+        >>> faces.shape, float(barycentric.sum().round(9))
+        ((1,), 1.0)
         """
         barycentric = finite_rows(barycentric, "barycentric coordinates", 3)
         faces = np.asarray(faces, dtype=np.int64)

@@ -121,12 +121,31 @@ def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
 
 
 def smooth_intersection(a: Solid, b: Solid, width: float) -> Solid:
-    """The intersection of two solids, with a rounded edge where they meet; see `smooth_union`."""
+    """The intersection of two solids, with a rounded edge where they meet; see `smooth_union`.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> grid = sh.Grid((-2, -2), 0.5, (9, 9))
+    >>> left, right = (sh.GridField(grid, np.linalg.norm(grid.points - [x, 0], axis=-1) - 1) for x in (-0.5, 0.5))
+    >>> float((left & right)([0.0, 0.5]).round(3)), float(smooth_intersection(left, right, 0.4)([0.0, 0.5]).round(3))
+    (-0.293, -0.193)
+    """
     return combined(a, b, lambda x, y: x >= y, finite_number(width, "the width of the blend", least=0))
 
 
 def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
-    """The first solid without the second, with a rounded edge where they meet; see `smooth_union`."""
+    """The first solid without the second, with a rounded edge where they meet; see `smooth_union`.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> grid = sh.Grid((-2, -2), 0.5, (9, 9))
+    >>> disk = sh.GridField(grid, np.linalg.norm(grid.points, axis=-1) - 1)
+    >>> half = smooth_difference(disk, sh.GridField(grid, grid.points[..., 0]), 0.2)  # without the left side
+    >>> half([[0.5, 0.0], [-0.5, 0.0]]).round(2)
+    array([-0.45,  0.5 ])
+    """
     return smooth_intersection(a, complement(_checked(a, b)), width)
 
 

@@ -154,6 +154,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         -------
         (n,) float, or one float
             Signed distances, interpolated from the nodes around that have a value; NaN where none has one.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [3]), np.array([0.0, 1.0, 3.0]))
+        >>> line.interpolate([[0.5], [2.5]])  # between nodes, and beyond the last one
+        array([0.5, 4. ])
         """
         points = self._checked(points)
         (values,) = in_chunks(self._values_at, points.reshape(-1, self.grid.dimension))
@@ -173,6 +179,13 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         -------
         (n, d) float
             Gradients; of length about 1, since φ is a distance.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [3]), np.array([0.0, 1.0, 3.0]))
+        >>> line.gradient([[0.0], [1.0]])  # one-sided at the end
+        array([[1. ],
+               [1.5]])
         """
         points = np.atleast_2d(self._checked(points))
         if self.solid is not None:
@@ -197,6 +210,13 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         ------
         SourceError
             If the field does not know its solid: it was read from a file, or computed otherwise.
+
+        Examples
+        --------
+        >>> from signedheat import samples, signed_distance
+        >>> phi = signed_distance(samples.sphere(2), resolution=16)
+        >>> phi.closest([[0.0, 0.0, 3.0]]).points.round(3).tolist()
+        [[0.0, 0.0, 1.0]]
         """
         if self.solid is None:
             raise SourceError(
@@ -253,6 +273,14 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             If φ does not take the level anywhere on the grid.
         GeometryError
             If the grid has neither 2 nor 3 dimensions, or values are infinite.
+
+        Examples
+        --------
+        >>> grid = Grid((-1, -1), 0.1, (21, 21))
+        >>> disk = GridField(grid, np.linalg.norm(grid.points, axis=-1) - 0.5)
+        >>> [circle] = disk.contour(0.25)
+        >>> circle.closed, round(circle.length / (2 * np.pi), 2)
+        (True, 0.75)
         """
         grid, level = self.grid, finite_number(level, "level")
         if grid.dimension == 2:
@@ -336,7 +364,15 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return ply.write_parts(parts, path)
 
     def dense(self) -> GridField[Dimension]:
-        """The field at all nodes of its grid, those beyond a band interpolated from the coarse ones."""
+        """The field at all nodes of its grid, those beyond a band interpolated from the coarse ones.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> band = complete(samples.sphere(2)).field(resolution=48, band=0.2)
+        >>> band.n_nodes < band.dense().n_nodes == band.grid.n_nodes
+        True
+        """
         if self.blocks is None:
             return self
         values = np.empty(self.grid.shape)
@@ -372,6 +408,13 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         OutsideError
             If φ does not take the value on the grid, or the offset leaves the grid although the shape itself does not:
             the grid then needs more padding.
+
+        Examples
+        --------
+        >>> grid = Grid((-1, -1), 0.1, (21, 21))
+        >>> disk = GridField(grid, np.linalg.norm(grid.points, axis=-1) - 0.5)
+        >>> disk.offset(-0.1)
+        [Polyline(32 points, closed)]
         """
         self.refuse_beyond_walls(finite_number(distance, "distance"))
         return self.contour(distance)
@@ -437,6 +480,12 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         -------
         (n,) float
             From 0 to 1; at points outside the grid, that of the nearest point of its box. 1 if nothing is known of it.
+
+        Examples
+        --------
+        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]), confidence=np.array([1.0, 0.5]))
+        >>> line.confidence_at([[0.5]]).tolist()
+        [0.75]
         """
         places = np.atleast_2d(self._checked(points))
         if self.confidence is None:
@@ -463,7 +512,18 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
         return float(self.confidence[near].mean(dtype=np.float64))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format given by its extension; `signedheat.load_field` reads it."""
+        """Write to a file, in the format given by its extension; `signedheat.load_field` reads it.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import load_field
+        >>> line = GridField(Grid([0.0], 1.0, [2]), np.array([0.0, 1.0]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     line.save(f"{folder}/line.npz")
+        ...     load_field(f"{folder}/line.npz").values.tolist()
+        [0.0, 1.0]
+        """
         files.write_field(self, path)
 
     def _wall_range(self) -> tuple[float, float]:

@@ -85,6 +85,16 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         Those of the `pairs` of triangles that the cut separates.
     diagnostics : Diagnostics
         Timings, diffusion time, and the notes described in `signedheat.piecewise_distance`.
+
+    Examples
+    --------
+    A step across the diagonal of a square:
+
+    >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> triangles = IntrinsicMesh.from_lengths(mesh.faces, mesh.edge_lengths[mesh.edges.face_edges], 4)
+    >>> phi = PiecewiseField(mesh, mesh, np.array([[1.0] * 3, [0.0] * 3]), triangles, np.array([True]))
+    >>> phi.cut
+    [Cut(2 vertices, length 1.414, mean jump 1)]
     """
 
     domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation

@@ -27,6 +27,13 @@ class Closest:
         Gradients of the distance, of length 1; on the surface, its normals.
     confidence : (n,) float
         1 where surface was given; on the completion less, the farther from its rim.
+
+    Examples
+    --------
+    >>> from signedheat import complete, samples
+    >>> found = complete(samples.sphere(2)).closest([[0.0, 0.0, 3.0]])
+    >>> found.distances.round(3), found.gradients.round(3).tolist(), found.completed
+    (array([2.]), [[0.0, 0.0, 1.0]], array([False]))
     """
 
     distances: NDArray[np.float64]

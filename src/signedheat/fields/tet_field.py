@@ -124,6 +124,12 @@ class TetField(Displayed, Combinable, Frozen):
         -------
         (n, 3) float
             Gradients; of length about 1, since φ is a distance.
+
+        Examples
+        --------
+        >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> TetField(mesh, [0.0, 1.0, 2.0, 3.0]).gradient([0.2, 0.2, 0.2])
+        array([[1., 2., 3.]])
         """
         corners, weights, _ = self._place(_checked(points).reshape(-1, 3))
         return np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners])
@@ -152,6 +158,12 @@ class TetField(Displayed, Combinable, Frozen):
         ------
         OutsideError
             If φ does not take the level anywhere in the mesh.
+
+        Examples
+        --------
+        >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> TetField(mesh, [0.0, 0.0, 0.0, 1.0]).contour(0.5).bounds[:, 2].tolist()
+        [0.0, 0.5]
         """
         level = finite_number(level, "level")
         return TriangleMesh(*closed_level_set(self.mesh.geometry, self.values, self._vertex_gradients, level))
@@ -173,6 +185,12 @@ class TetField(Displayed, Combinable, Frozen):
         ------
         OutsideError
             If φ does not take the value in the mesh, or the offset leaves the mesh although the shape itself does not.
+
+        Examples
+        --------
+        >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> TetField(mesh, [-0.5, -0.5, -0.5, 0.5]).offset(0.25).bounds[:, 2].tolist()
+        [0.0, 0.75]
         """
         distance = finite_number(distance, "distance")
         walls = self.values[np.unique(self.mesh.boundary.faces)]

@@ -115,7 +115,16 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         return cast("VertexField[SurfaceDomain]", finer)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> NDArray[np.float64]:
-        """(n, 3) ∇φ in space at points, in the triangles on which φ is linear; for `points` see `__call__`."""
+        """(n, 3) ∇φ in space at points, in the triangles on which φ is linear; for `points` see `__call__`.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> phi = VertexField(mesh, np.array([-0.5, 0.5, 0.5, -0.5]))
+        >>> phi.gradient([[0.75, 0.5, 0.0]]).tolist()
+        [[1.0, 0.0, 0.0]]
+        """
         _, _, faces, weights = self._at(points)
         finest = self.finest
         if isinstance(finest.domain, IntrinsicTriangulation):
@@ -157,6 +166,15 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         ------
         OutsideError
             If φ does not take the level.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> phi = VertexField(mesh, np.array([-0.5, 0.5, 0.5, -0.5]))
+        >>> [line] = phi.contour(0.25)
+        >>> mesh.positions(line)[:, 0].tolist()
+        [0.75, 0.75, 0.75]
         """
         field, level = self.finest, finite_number(level, "level")
         finite = field.values[np.isfinite(field.values)]
@@ -215,6 +233,17 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         ------
         FileFormatError
             If the format is unknown or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> phi = VertexField(mesh, np.array([0.0, 1.0, 0.0]))
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     phi.save(f"{folder}/phi.ply")
+        ...     sh.load_field(f"{folder}/phi.ply").values.tolist()
+        [0.0, 1.0, 0.0]
         """
         files.write_field(self._embedded, path)
 
@@ -223,7 +252,17 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     @overload
     def restrict(self: VertexField[Embedded]) -> VertexField[Embedded]: ...
     def restrict(self) -> VertexField[EmbeddedSurface]:
-        """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself."""
+        """On an intrinsic triangulation: φ at the vertices of its mesh. On any other domain: the field itself.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> strip = sh.TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = sh.intrinsic_delaunay(strip, refine=True)
+        >>> phi = sh.SignedHeatSolver(better).distance(strip.points_at(0))
+        >>> len(phi.values) == better.n_vertices, len(phi.restrict().values)
+        (True, 4)
+        """
         return self._embedded
 
     def subdivided(self) -> VertexField[EmbeddedSurface]:

@@ -130,6 +130,15 @@ def write_curves(
     ------
     FileFormatError
         If the format is unknown or the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, signedheat as sh
+    >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_curves(f"{folder}/side.txt", mesh.path([0, 1]), mesh)
+    ...     read_curves(f"{folder}/side.txt", mesh)
+    [Curve(2 points, open, oriented)]
     """
     content_of = format_for(path, WRITERS, "curves")
     listed = [curves] if isinstance(curves, (Curve, SurfacePoints)) else list(curves)

@@ -45,6 +45,18 @@ def read_globe_curves(path: PathLike, mesh: TriangleMesh | PolygonMesh | Foreign
         If the file is missing, of unknown format, damaged, or has no curve.
     SourceError
         If a point is out of range, two in succession are opposite each other, or the mesh is no globe.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from signedheat import samples
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "meridian.csv")
+    ...     _ = path.write_text("0,0" + chr(10) + "0,90")
+    ...     [curve] = read_globe_curves(path, samples.sphere(3))
+    >>> curve.closed
+    False
     """
     mesh = converted(mesh)
     read_lines = format_for(path, GLOBE_FORMATS, "curves on a globe")

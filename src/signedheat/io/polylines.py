@@ -82,6 +82,14 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
     ------
     FileFormatError
         If the format is unknown or the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_polylines(f"{folder}/square.csv", Polyline([[0, 0], [1, 0], [1, 1], [0, 1]], closed=True))
+    ...     read_polylines(f"{folder}/square.csv")
+    [Polyline(4 points, closed)]
     """
     content_of = format_for(path, WRITERS, "polylines in the plane")
     content = content_of([lines] if isinstance(lines, Polyline) else list(lines))

@@ -302,6 +302,11 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
         If the file cannot be read, or has no surface.
     MissingPackageError
         If Open CASCADE (cadquery-ocp) is not installed.
+
+    Examples
+    --------
+    >>> mesh, cad_faces = read_step("part.step", deflection=0.01)  # doctest: +SKIP
+    >>> cad_faces[signedheat.complete(mesh).closest(points).faces]  # doctest: +SKIP
     """
     shape = _shape(path)
     box = boxes.Bnd_Box()

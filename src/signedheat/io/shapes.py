@@ -131,6 +131,14 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
         If the format is unknown, does not support this kind of shape, or the file cannot be written.
     UnsupportedTypeError
         If it is no shape.
+
+    Examples
+    --------
+    >>> import tempfile, signedheat as sh
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save(sh.PointCloud([[0, 0, 0], [1, 0, 0]]), f"{folder}/two.xyz")
+    ...     read(f"{folder}/two.xyz").n_points
+    2
     """
     shape = as_shape(shape)
     if isinstance(shape, TetMesh):

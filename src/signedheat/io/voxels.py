@@ -53,6 +53,12 @@ class LabelImage:
         Centre of the first voxel.
     space : str, optional
         What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
+
+    Examples
+    --------
+    >>> image = LabelImage(np.full((3, 4, 5), 7), axes=2.0 * np.eye(3), origin=np.zeros(3))
+    >>> image.grid.upper.tolist(), image.surface(7).bounds.round()[1].tolist()
+    ([4.0, 6.0, 8.0], [5.0, 7.0, 9.0])
     """
 
     labels: NDArray[np.generic]

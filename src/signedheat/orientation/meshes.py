@@ -85,6 +85,13 @@ class Orientation(Frozen, ShortRepr):
         Parts there twice, once facing each way; share of the area, both sides counted.
     nested_bodies, cavities : int
         Parts hidden in others: those that are bodies as well, and those that are walls of cavities.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> found = orientation(samples.with_flipped_faces(samples.sphere(2), 0.1))
+    >>> found.turned_faces, found.inconsistent_edges, found.n_parts
+    (33, 89, 1)
     """
 
     shape: Mesh

@@ -50,6 +50,13 @@ class Deviation(Frozen):
         The nearest places of the part.
     completed : (n,) bool
         Whether these lie on surface that the nominal part did not have, and that closes it.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> found = sh.deviation(np.array([[0.0, 0.0, 1.1], [0.0, 0.9, 0.0]]), sh.samples.sphere(5))
+    >>> found.distances.round(2), round(found.rms, 2), found.within(0.05)
+    (array([ 0.1, -0.1]), 0.1, 0.0)
     """
 
     scan: PointCloud | TriangleMesh | PolygonMesh

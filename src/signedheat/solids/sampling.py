@@ -99,6 +99,16 @@ class Samples:
         ------
         FileFormatError
             If the name does not end with ``.npz``, or the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import samples, signed_distance
+        >>> taken = sample(signed_distance(samples.sphere(2), resolution=16), 10)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     taken.save(f"{folder}/ball.npz")
+        ...     np.load(f"{folder}/ball.npz")["points"].shape
+        (10, 3)
         """
         files.save_samples(self, path, layout)
 

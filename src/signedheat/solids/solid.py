@@ -131,6 +131,12 @@ class Solid(Frozen, ShortRepr):
         ------
         GeometryError
             If a point is not finite.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> complete(samples.sphere(3)).distance([[0.0, 0.0, 0.5], [0.0, 0.0, 2.0]]).round(2)
+        array([-0.5,  1. ])
         """
         places = _checked(points)
         result = np.empty(len(places))
@@ -140,7 +146,14 @@ class Solid(Frozen, ShortRepr):
         return result
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) whether (n, 3) points are inside."""
+        """(n,) whether (n, 3) points are inside.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> complete(samples.without_faces(samples.sphere(3), 0.2)).inside([[0.0, 0.0, 0.5], [0.0, 0.0, 2.0]])
+        array([ True, False])
+        """
         return self.windings.inside(_checked(points))
 
     def closest(self, points: ArrayLike) -> Closest:
@@ -150,6 +163,13 @@ class Solid(Frozen, ShortRepr):
         ------
         GeometryError
             If a point is not finite.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> found = complete(samples.sphere(3)).closest([[0.0, 0.0, 2.0]])
+        >>> found.points.round(3).tolist(), found.gradients.round(3).tolist()
+        ([[0.0, 0.0, 1.0]], [[0.0, 0.0, 1.0]])
         """
         places = _checked(points)
         order = order_in_space(places)
@@ -316,7 +336,17 @@ class Solid(Frozen, ShortRepr):
         return dense_field(self, where, progress).contour(height)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a ``.npz`` file, without notes; `signedheat.io.load` reads it, and nothing is completed again."""
+        """Write to a ``.npz`` file, without notes; `signedheat.io.load` reads it, and nothing is completed again.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import complete, io, samples
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     complete(samples.sphere(2)).save(f"{folder}/ball.npz")
+        ...     io.load(f"{folder}/ball.npz").inside([[0.0, 0.0, 0.0]])
+        array([ True])
+        """
         files.save_solid(self, path)
 
     def _in_order(self, points: NDArray[np.float64], function) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
