@@ -76,6 +76,19 @@ def test_what_belongs_nowhere_is_left_out_or_told(damage, seed):
     assert told or wrong_share(drawing, phi.values) < 0.06
 
 
+@pytest.mark.parametrize("copies", [0, 1])
+def test_a_stroke_that_contradicts_itself_is_announced_unless_drawn_again(copies):
+    """A straight stroke closes the open end of a U, and goes on for as long as that; or the whole U is drawn again."""
+    mesh = disk(24, 2)
+    u = np.array([[-0.3, 0.4, 0], [-0.3, -0.3, 0], [0.3, -0.3, 0], [0.3, 0.4, 0]])
+    cap = np.array([[0.3, 0.4, 0], [-0.3, 0.4, 0]]) if copies else np.array([[0.9, 0.4, 0], [-0.3, 0.4, 0]])
+    given = [mesh.polyline(line) for line in (u, cap, *([u + 0.01] * copies))]
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        sh.signed_distance(given, mesh)
+    assert bool(told) != bool(copies)
+
+
 @pytest.mark.parametrize(("gone", "guessed"), [(0.1, False), (0.2, False), (0.48, True), (0.6, True)])
 def test_a_wide_gap_of_a_single_stroke_is_told(gone, guessed):
     """Most of a star on hills: what is shortest and what heat does differ where two of its arms are missing."""

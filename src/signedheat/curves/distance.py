@@ -127,11 +127,12 @@ def warn_of_guesses(decision: Decision, field: VertexField[Surface], curves: Seq
             InexactWarning,
         )
         return
-    ambiguous = decision.ambiguous()
-    if len(ambiguous):
+    contradictory = decision.contradictory()
+    if len(contradictory):
         warn_user(
-            f"{named(ambiguous)} may as well be left out, or run the other way: what is bounded then is nearly as "
-            "likely. Turn or remove them, or draw more; as_oriented=True takes curves as they are",
+            f"a part of {named(contradictory)} bounds something together with the others, and another part does not: "
+            "what is bounded is a guess. Remove what belongs to no curve, turn what faces the wrong way, or draw more; "
+            "as_oriented=True takes curves as they are",
             InexactWarning,
         )
         return

@@ -146,7 +146,7 @@ class Strokes:
         return symmetric
 
     def inside(self, signs: NDArray[np.float64]) -> Inside:
-        """The sides of least energy for strokes with these directions: a minimum cut."""
+        """The sides of least energy for strokes with these directions, 0 if one is left out: a minimum cut."""
         key = signs.tobytes()
         if key not in self._found:
             self._found[key] = self._least(signs)
