@@ -1,5 +1,7 @@
 """Point clouds as a domain: local triangulations, and distance on them."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
@@ -288,6 +290,32 @@ def test_left_on_a_thin_plate_is_that_of_its_normals_wherever_curves_start_and_i
         assert np.isfinite(values).all(), name
         values = values[np.argsort(order)] if positions is not points else values
         assert (np.sign(values) == sign * np.sign(points[:, 0]))[far].all(), name
+
+
+def both_sides(thickness, spacing=0.05):
+    """Points on a hollow ball, spread evenly over either side for itself, and normals."""
+    random = np.random.default_rng(1)
+    points, normals = [], []
+    for side in (1, -1):
+        directions = random.normal(size=(8000, 3))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        kept = directions[spread_out(directions, np.full(len(directions), 0.8 * spacing))]
+        points.append(kept * (1 + side * thickness / 2))
+        normals.append(side * kept)
+    return np.concatenate(points), np.concatenate(normals)
+
+
+@pytest.mark.parametrize(
+    ("thickness", "given", "announced"), [(0.5, True, False), (0.5, False, True), (1, False, False), (0.3, True, True)]
+)
+def test_sides_nearer_than_points_are_apart_are_kept_apart_or_announced(thickness, given, announced):
+    points, normals = both_sides(thickness * 0.05)
+    cloud = sh.PointCloud(points, normals if given else None)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        agree = (cloud.surface_normals * normals).sum(axis=1) > 0
+    assert bool(caught) == announced
+    assert announced or max(agree.mean(), 1 - agree.mean()) > 0.98
 
 
 def test_without_normals_a_cloud_has_the_sides_that_orienting_it_gives():

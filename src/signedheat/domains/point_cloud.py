@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import GeometryError
+from ..errors import GeometryError, InexactWarning, warn_user
 from ..geometry.local_triangulations import LocalTriangulations, local_triangulations
 from ..geometry.outward_signs import outward_normals
+from ..geometry.plane_fits import are_two_sides
 from ..geometry.welding import same_rows
 from .exchange import Elements, Exchangeable
 from .surface import Surface
@@ -20,6 +21,10 @@ from .validation import coordinates, finite_rows, frozen, numbers, whole_number
 
 if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
+
+CONTRARY = 0.35
+"""Share of the normals given that may contradict the orientation of the points, if not all are inverted: .39 to .49
+where both sides of a plate are taken for one; where .3 of the normals are turned, that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,12 +146,27 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             raise GeometryError(
                 f"the point cloud has {len(ids)} distinct points, and a surface needs at least 3", element="points"
             )
-        found = local_triangulations(points, outward_normals(points, given)[0], self.n_neighbors, given)
+        normals, fits, _ = outward_normals(points, given)
+        found = local_triangulations(points, normals, self.n_neighbors, given)
         if len(found.faces) == 0:
             raise GeometryError(
                 "no triangles could be made of the point cloud: its points lie along a line or too far apart",
                 remedy="add points, or raise n_neighbors",
                 element="points",
+            )
+        if given is not None:
+            against = float(((normals * given).sum(axis=1) < 0).mean())
+            if min(against, 1 - against) > CONTRARY:
+                warn_user(
+                    f"{against:.0%} of the normals contradict the sides that the points show, as on plates "
+                    "thinner than half of the distance between points",
+                    InexactWarning,
+                )
+        elif are_two_sides(points, fits):
+            warn_user(
+                "the points look like those of both sides of a plate thinner than they are apart, which are taken for "
+                "one side with noise. Give normals, or more points",
+                InexactWarning,
             )
         return ids, found
 

@@ -70,7 +70,7 @@ def outward_normals(
     if given is None:
         fits, found = fitted_outward(points)
         return fits.axes * found.signs[:, None], fits, found
-    fits = fit_planes(points, noise_scale(points))
+    fits = fit_planes(points, noise_scale(points, given))
     found = outward_signs(fits, given, given=True)
     return given * found.signs[:, None], fits, found
 
