@@ -17,7 +17,7 @@ from ..domains.foreign import ForeignShape, converted
 from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import flag
-from ..errors import GeometryError, SourceError
+from ..errors import SourceError
 from ..fields.vertex_field import VertexField
 from ..geometry.components import connected_components
 from ..geometry.intrinsic_mesh import IntrinsicMesh
@@ -25,7 +25,7 @@ from ..lowering.surface.discretization import SurfaceDiscretization
 from ..progress import Progress
 from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .distance import distance_to_pieces
-from .resolution import flattened, for_zero_set
+from .resolution import flattened, on_resolving_triangles
 
 ZERO = 1e-7
 """Value, in mean edge lengths, up to which φ is zero at a vertex of the rim."""
@@ -118,13 +118,8 @@ def conforming_distance(
             return distance_unwarned(solver, curves, constraint)
         return distance_to_pieces(solver, curves, constraint, every_piece)[0]
 
-    surface = cast("SurfaceDomain", converted(domain))
-    if isinstance(surface, TriangleMesh):
-        try:
-            return measured(for_zero_set(surface, diffusion, progress))
-        except GeometryError:
-            pass
-    return measured(SignedHeatSolver(surface, diffusion, progress))
+    solver = SignedHeatSolver(cast("SurfaceDomain", converted(domain)), diffusion, progress)
+    return on_resolving_triangles(measured, solver, curves, always=True)
 
 
 def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> None:

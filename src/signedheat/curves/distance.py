@@ -20,7 +20,6 @@ from ..domains.validation import flag
 from ..errors import (
     CancellingNormalsError,
     ConstraintError,
-    GeometryError,
     InexactWarning,
     warn_user,
 )
@@ -30,7 +29,7 @@ from ..sharpening.sharpen import sharpen
 from ..solver import SignedHeatSolver, as_list, distance_unwarned
 from .directions import Decision, Pieces, decide
 from .orientation import with_turned
-from .resolution import are_small, flattened, for_zero_set, surface_of, triangulated_once
+from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 
 WIDE = 0.4
 """Length of the widest gap, relative to that of all curves, from which its completion is a guess. Of 398 drawings of
@@ -194,20 +193,17 @@ def distance_to_curves(
     share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
     solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
     listed, left_out = given_curves(solver.domain, as_list(curves))
-    mesh = solver.domain if intrinsic == "auto" and isinstance(solver.domain, TriangleMesh) else None
 
     def measured(by: SignedHeatSolver[Any]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
         if as_oriented:
             return distance_unwarned(by, listed, constraint), listed
         return distance_to_pieces(by, listed, constraint, every_piece)
 
+    chosen = intrinsic == "auto"
     try:
-        small = mesh is not None and are_small(solver, listed)
-        field, taken = measured(for_zero_set(mesh, diffusion, share) if mesh is not None and small else solver)
-    except GeometryError:  # too thin to be triangulated anew
-        field, taken = measured(solver)
+        field, taken = on_resolving_triangles(measured, solver, listed) if chosen else measured(solver)
     except CancellingNormalsError:  # loops inside single faces
-        if mesh is None:
+        if not chosen or not isinstance(solver.domain, TriangleMesh):
             raise
         field, taken = measured(replace(solver, intrinsic=True))
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))

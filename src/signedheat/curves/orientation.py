@@ -8,18 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..discretization import discretize
 from ..domains.curves import Curve, CurveOrPoints
 from ..domains.foreign import ForeignShape, converted
 from ..domains.kinds import SurfaceDomain
-from ..domains.triangle_mesh import TriangleMesh
-from ..errors import GeometryError, UnsupportedTypeError
+from ..errors import UnsupportedTypeError
 from ..frozen import Frozen
-from ..lowering.surface.discretization import SurfaceDiscretization
 from ..reprs import ShortRepr
 from ..solver import SignedHeatSolver
 from .directions import Pieces, decide
-from .resolution import are_small, for_zero_set, surface_of, triangulated_once
+from .resolution import on_resolving_triangles, surface_of, triangulated_once
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,14 +88,18 @@ def curve_orientation(curves: Sequence[CurveOrPoints], domain: SurfaceDomain | F
     >>> curve_orientation(pieces, mesh).turned
     array([False,  True, False, False])
     """
-    surface = discretize(converted(domain))
-    if not isinstance(surface, SurfaceDiscretization):
+    surface = converted(domain)
+    if not isinstance(surface, SurfaceDomain):
         raise UnsupportedTypeError(
             f"curves are oriented on surfaces, not on a {type(domain).__name__}", element="domain"
         )
     listed = list(curves)
     turned, agreement = np.zeros(len(listed), dtype=bool), np.ones(len(listed))
-    pieces = Pieces.of(surface_for(surface, listed), listed)
+
+    def seen(solver: SignedHeatSolver[SurfaceDomain]) -> Pieces | None:
+        return Pieces.of(surface_of(triangulated_once(solver, listed)), listed)
+
+    pieces = on_resolving_triangles(seen, SignedHeatSolver(surface), listed)
     if pieces is not None:
         decision = decide(pieces)
         turned = decision.turned(len(listed))
@@ -116,14 +117,3 @@ def _turned(curve: CurveOrPoints) -> CurveOrPoints:
     if curve.normals is None:
         return curve.reversed()
     return Curve(curve.faces, curve.barycentric, curve.closed, curve.oriented, -curve.normals)
-
-
-def surface_for(surface: SurfaceDiscretization, curves: list[CurveOrPoints]) -> SurfaceDiscretization:
-    """Triangles on which the curves are seen: those that there are, or smaller ones."""
-    mesh = surface.domain
-    if not isinstance(mesh, TriangleMesh) or not are_small(SignedHeatSolver(mesh), curves):
-        return surface
-    try:
-        return surface_of(triangulated_once(for_zero_set(mesh, 1.0), curves))
-    except GeometryError:  # too thin to be triangulated anew
-        return surface

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import Any, TypeVar
@@ -11,7 +11,8 @@ from ..discretization import discretize
 from ..domains.curves import CurveOrPoints, CurvesAndPoints
 from ..domains.kinds import SurfaceDomain
 from ..domains.triangle_mesh import TriangleMesh
-from ..errors import SourceError
+from ..errors import GeometryError, SourceError
+from ..extrapolation import Diffusion
 from ..lowering.surface.curve_groups import CurveGroups
 from ..lowering.surface.discretization import SurfaceDiscretization
 from ..lowering.surface.intrinsic import Retriangulated, RetriangulatedForZeroSet
@@ -22,6 +23,37 @@ SHORT = 16.0
 """Length of a curve, or of all its pieces, in h, below which triangles are made for them."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
+Found = TypeVar("Found")
+
+
+def on_resolving_triangles(
+    measure: Callable[[SignedHeatSolver[Any]], Found],
+    solver: SignedHeatSolver[Any],
+    curves: CurvesAndPoints,
+    always: bool = False,
+) -> Found:
+    """What is measured on triangles that resolve the curves: those of the mesh, or smaller ones for small curves.
+
+    Meshes that are too thin to be triangulated anew, and other surfaces, are taken as they are.
+
+    Parameters
+    ----------
+    measure : callable
+        Takes a solver.
+    solver : SignedHeatSolver
+        For the triangles of the mesh.
+    curves : Curve, SurfacePoints or a sequence of them
+        What is to be resolved.
+    always : bool
+        Whether triangles are made for all curves, large ones too.
+    """
+    mesh = solver.domain
+    if isinstance(mesh, TriangleMesh) and (always or are_small(solver, curves)):
+        try:
+            return measure(for_zero_set(mesh, solver.diffusion, solver.progress))
+        except GeometryError:
+            pass
+    return measure(solver)
 
 
 def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
@@ -70,7 +102,7 @@ def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
 
 
 def for_zero_set(
-    mesh: TriangleMesh, diffusion: float, progress: Progress | None = None
+    mesh: TriangleMesh, diffusion: Diffusion | None, progress: Progress | None = None
 ) -> SignedHeatSolver[TriangleMesh]:
     """A solver with ``intrinsic=True``, and with diffusion times that suit the pieces, however small they are."""
     solver = SignedHeatSolver(mesh, diffusion, progress, intrinsic=True)
