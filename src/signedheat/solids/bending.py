@@ -18,7 +18,7 @@ REACH = 0.25
 """Share of an opening's width in which the surface behind its rim is looked at."""
 SHARP = 0.7
 """Cosine between the normals of two faces below which the edge between them is sharp."""
-SAMPLES = 4
+SAMPLES = 3
 """Samples across that strip."""
 MOST = 4096
 """Samples around a rim at most, or nearly."""

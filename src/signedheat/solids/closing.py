@@ -119,7 +119,7 @@ def _lid(
     rim, cut = lids.SmoothRim.of(corners), lids.cut_to_pieces(corners)
     pattern, smooth = _spanned(rim, cut)
     width, points = bending.width_of(smooth), smooth.vertices[: smooth.n_rim]
-    near = bending.samples_near(own, tree, patches, scipy.spatial.cKDTree(cut), bending.REACH * width)
+    near = bending.samples_near(own, tree, patches, scipy.spatial.cKDTree(points), bending.REACH * width)
     normals, curvatures, held = bending.continuation(smooth, near, ends[rim.edges_at(points)], width)
     bent = lids.plate(smooth, normals, curvatures, held) if held.any() else None
     if bent is not None:
