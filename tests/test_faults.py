@@ -164,29 +164,24 @@ sys.exit(main(["info", "ball.stl"]))
     assert {p.name for p in (tmp_path / "run").iterdir()} == {"ball.stl", "phi.npz"}
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_while_python_runs_text(tmp_path, number):
+def test_a_signal_while_python_runs_text(tmp_path):
     """As where classes are made and kernels compiled: the status is that of the signal all the same."""
     code = f"""
 import os, sys
 from signedheat.cli import main, reports
 def halfway(path):
-    exec("os.kill(os.getpid(), {int(number)})\\nimport time; time.sleep(5)", globals())
+    exec("os.kill(os.getpid(), {int(signal.SIGTERM)})\\nimport time; time.sleep(5)", globals())
 reports.read = halfway
 sys.exit(main(["info", "ball.stl"]))
 """
     (ready(tmp_path / "run") / "own.py").write_text(code)
     done = subprocess.run([sys.executable, "-m", "own"], cwd=tmp_path / "run", capture_output=True, text=True)
-    assert (done.returncode, done.stderr.count("\n")) == (128 + number, 1), done.stderr
+    assert (done.returncode, done.stderr.count("\n")) == (128 + signal.SIGTERM, 1), done.stderr
 
 
 @pytest.mark.parametrize(
     "variables",
-    [
-        {"NUMBA_NUM_THREADS": "0"},
-        {"NUMBA_NUM_THREADS": "many"},
-        {"SIGNEDHEAT_BACKEND": "foo"},
-    ],
+    [{"NUMBA_NUM_THREADS": "many"}, {"SIGNEDHEAT_BACKEND": "foo"}],
     ids=str,
 )
 def test_environments_that_make_no_sense(tmp_path, variables):
@@ -242,11 +237,10 @@ def test_forked_processes_after_use(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no way to choose processors")
-@pytest.mark.parametrize("threads", ["1", "3"])
-def test_one_processor_and_numbers_of_threads_give_the_same_bits(tmp_path, threads):
+def test_one_processor_and_more_threads_give_the_same_bits(tmp_path):
     code = "import sys, numpy as np, signedheat as sh\nfrom signedheat import samples\nball = samples.sphere(2)\n"
     code += "np.save(sys.argv[1], sh.signed_distance(ball, resolution=12).values)"
-    environment = {**os.environ, "NUMBA_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
+    environment = {**os.environ, "NUMBA_NUM_THREADS": "3", "OMP_NUM_THREADS": "3"}
     one = {min(os.sched_getaffinity(0))}
     command = [sys.executable, "-c", code, str(tmp_path / "values.npy")]
     subprocess.run(command, check=True, env=environment, preexec_fn=lambda: os.sched_setaffinity(0, one))

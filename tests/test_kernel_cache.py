@@ -138,13 +138,13 @@ def test_full_disk(cache, tmp_path, shifted):
 
 def test_several_processes_at_once_for_several_kinds_of_arguments(cache, tmp_path, shifted):
     shifted()
-    code = "import shifting, sys; a = int(sys.argv[1])\nprint(shifting.shifted([3, 3.0, 3j, True][a]))"
+    code = "import shifting, sys; a = int(sys.argv[1])\nprint(shifting.shifted([3, 3.0, 3j][a]))"
     jobs = [
         subprocess.Popen([sys.executable, "-c", code, str(n)], cwd=tmp_path, stdout=subprocess.PIPE)
-        for n in (0, 1, 2, 3, 0, 1)
+        for n in (0, 1, 2, 0)
     ]
-    right = [b"7.0\n", b"7.0\n", b"(1+6j)\n", b"3.0\n"]
-    assert [job.communicate(timeout=200)[0] for job in jobs] == right + right[:2]
+    right = [b"7.0\n", b"7.0\n", b"(1+6j)\n"]
+    assert [job.communicate(timeout=200)[0] for job in jobs] == right + right[:1]
     assert not list(cache.rglob("*.tmp*")) and not (cache / "lock").exists()
 
 
