@@ -34,7 +34,7 @@ def tank(n: int) -> sh.TetMesh:
 def main(folder: Path) -> float:
     ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
     keep = np.random.default_rng(0).random(len(ball.faces)) > 1 / 3
-    phi = sh.signed_distance(sh.TriangleMesh(ball.vertices + CENTER, ball.faces[keep]), tank(14))
+    phi = sh.signed_distance(sh.TriangleMesh(ball.vertices + CENTER, ball.faces[keep]), tank(10))
     plane = sh.Grid((0.0, 0.0), 0.01, (301, 201))
     x, y = np.moveaxis(plane.points, -1, 0)
     middle = np.stack([x, y, 0.5 + 0 * x], axis=-1).reshape(-1, 3)

@@ -16,7 +16,7 @@ EXPECTED = (1.0, 0.08)
 def main(folder: Path) -> float:
     """Write the hollow duck and a picture; return its volume over area times thickness."""
     scan = samples.without_patches(samples.duck(40), 5, 0.2, seed=3)
-    wall = sh.morphology.shell(scan, -0.1, 0.0, resolution=96)
+    wall = sh.morphology.shell(scan, -0.1, 0.0, resolution=72)
     wall.save(folder / "hollow.stl")
 
     grid = sh.Grid.around(wall.bounds, resolution=80, padding=0.15)

@@ -17,13 +17,13 @@ EXPECTED = (2 * np.pi**2 * 0.4**2, 0.12)
 
 def main(folder: Path) -> float:
     """Write a picture; return the volume of the surface."""
-    cloud = sh.PointCloud(samples.oriented_points(samples.torus(1.0, 0.4), 8000).points)
+    cloud = sh.PointCloud(samples.oriented_points(samples.torus(1.0, 0.4), 5000).points)
     phi = sh.signed_distance(cloud, resolution=72)
     surface = phi.contour()
 
     view.save_row(
         folder / "points_without_normals.png",
-        ("in: 8000 points", cloud, {"view": (40, -58)}),
+        ("in: 5000 points", cloud, {"view": (40, -58)}),
         ("signed distance", phi, {"shape": cloud, "across": (2,)}),
         ("out: closed", surface, {"view": (40, -58)}),
     )
