@@ -60,14 +60,14 @@ def wrong_share(drawing: strokes.Drawing, values: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("damage", ["gap", "pieces", "pieces_turned", "twice", "twice_turned", "overlapping", "bits"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_strokes_are_right_without_a_warning(damage, seed):
     drawing = strokes.drawing(np.random.default_rng(seed), damage, 3)
     assert wrong_share(drawing, sh.signed_distance(drawing.given, drawing.mesh).values) < 0.03
 
 
 @pytest.mark.parametrize("damage", ["long_strays", "scribbles", "loop_turned"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_belongs_nowhere_is_left_out_or_told(damage, seed):
     drawing = strokes.drawing(np.random.default_rng(seed), damage, 3)
     with warnings.catch_warnings(record=True) as told:

@@ -110,7 +110,7 @@ def test_small_holes_are_filled_and_outer_boundaries_stay():
 @pytest.mark.parametrize("name", CASES)
 def test_error_falls_and_is_below_the_peers(name):
     peers = pytest.importorskip("potpourri3d")
-    errors, sizes = [], [500, 2000, 8000]
+    errors, sizes = [], [500, 1500, 4500]
     for n in sizes:
         points, ids, exact = CASES[name](n)
         normals = outward(name, points)

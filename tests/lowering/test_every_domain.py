@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -25,9 +26,14 @@ class Ball:
         """At the vertices, or nodes, that have one."""
         return known(self.solver.distance(sources, constraint).values)
 
-    @property
+    @cached_property
     def source(self):
         return self.kind.source(self.domain)
+
+    @cached_property
+    def phi(self):
+        """Distance to the source, which many cases are compared with."""
+        return self.distance(self.source)
 
     def exact(self, height=0.3):
         return self.kind.exact(self.domain, height)[free(self.domain)]
@@ -54,17 +60,17 @@ def ball(request):
 
 
 def test_the_source_has_its_distance(ball):
-    assert cases.error(ball.distance(ball.source), ball.exact()) < 8e-3
+    assert cases.error(ball.phi, ball.exact()) < 8e-3
 
 
 def test_a_reversed_source_changes_the_sign_alone(ball):
     back = ball.kind.reversed(ball.source)
-    assert ball.distance(back) == pytest.approx(-ball.distance(ball.source), abs=1e-8)
+    assert ball.distance(back) == pytest.approx(-ball.phi, abs=1e-8)
 
 
 def test_the_same_input_gives_the_same_bits(ball):
     again = sh.SignedHeatSolver(ball.kind.make(1))
-    assert np.array_equal(known(again.distance(ball.source).values), ball.distance(ball.source))
+    assert np.array_equal(known(again.distance(ball.kind.source(ball.domain)).values), ball.phi)
 
 
 def test_a_broken_source_is_nearly_as_good(ball):
@@ -93,7 +99,7 @@ def test_several_sources_at_once_are_as_one_after_the_other(ball):
         assert known(field.values) == pytest.approx(ball.distance(sources), abs=1e-6)
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e-3, 8.0])
+@pytest.mark.parametrize("scale", [1e-3, 8.0])
 def test_rigid_motion_and_scale(ball, scale):
     shift = np.array([7.0, -3.0, 5.0]) * scale
     moved = ball.kind.moved(ball.domain, scale, shift)
@@ -102,9 +108,9 @@ def test_rigid_motion_and_scale(ball, scale):
     gap, same = cKDTree(positions(moved)).query(there[free(ball.domain)])
     assert gap.max() < 1e-9 * scale
     if ball.name == "points":  # among points nearly at one distance, rounding says which are neighbours
-        assert np.median(np.abs(phi[same] / scale - ball.distance(ball.source))) < 1e-9
+        assert np.median(np.abs(phi[same] / scale - ball.phi)) < 1e-9
     else:
-        assert phi[same] / scale == pytest.approx(ball.distance(ball.source), abs=ball.kind.deviation)
+        assert phi[same] / scale == pytest.approx(ball.phi, abs=ball.kind.deviation)
 
 
 @pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if kind.mixed])
