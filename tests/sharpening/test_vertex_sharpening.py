@@ -268,11 +268,10 @@ def segment_distance(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.nda
     return np.hypot(*(points - a - t[:, None] * (b - a)).T)
 
 
-@pytest.mark.parametrize("intrinsic", [False, True])
-@pytest.mark.parametrize("turned", [0.0, 0.4])
+@pytest.mark.parametrize(("intrinsic", "turned"), [(False, 0.0), (True, 0.4)])
 def test_sources_without_sides(intrinsic, turned):
     """Unoriented curves and points anywhere are measured from, beside oriented curves, with the sign of φ."""
-    mesh = disk(1000)
+    mesh = disk(700)
     flips = np.random.default_rng(0).random(mesh.n_faces) < turned
     mesh = sh.TriangleMesh(mesh.vertices, np.where(flips[:, None], mesh.faces[:, ::-1], mesh.faces))
     places = mesh.vertices[:, :2]
@@ -303,7 +302,7 @@ def test_sources_without_sides(intrinsic, turned):
         assert (mixed.values * plain.values >= 0).all()
         near = places[:, 0] > 0.5 * (0.45 - 0.3)
         nearest = np.minimum(exact, places[:, 0] + 0.3)
-        # The zero line of φ is the line up to the plain field's error on it, a fraction of the spacing of 0.05.
+        # The zero line of φ is the line up to the plain field's error on it, a fraction of the spacing of 0.06.
         assert np.abs(np.abs(mixed.values) - nearest)[near].max() < 0.02
         assert np.abs(np.abs(mixed.values) - exact)[exact < 0.15].max() < 1e-4
 
