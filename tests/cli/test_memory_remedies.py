@@ -37,7 +37,7 @@ def told_by(error):
         ("volume ball.ply -o out.npz", "--resolution 700", 95),
         ("volume holes.ply -o out.npz", "--resolution 700", 60),
         ("volume holes.ply -o out.npz --plain", "--spacing 1e-6", 60),
-        ("volume holes.ply -o out.vtu --tets", "--resolution 500", 200),
+        ("volume holes.ply -o out.vtu --tets", "--resolution 500", 120),
         ("volume holes.ply -o out.npz --band 0.02", "--spacing 1e-7", 120),
         ("volume ball.ply -o out.npz --band 0.02", "--spacing 2e-3", 145),
         ("sample holes.ply -o out.npz", "--resolution 700", 60),
