@@ -274,7 +274,7 @@ def smoothed(
     opened = cut_open(triangles, pairs, cut)
     owner = opened.corner_vertices.ravel()
     share = np.repeat(triangles.face_areas / 3.0, 3)
-    mass = np.asarray(np.bincount(owner, share), dtype=np.float64)
+    mass = opened.vertex_areas
     stiffness = cotan_matrix(opened)
     part = sparse.csgraph.connected_components(stiffness, directed=False)[1]
     squared = np.minimum(width**2, WIDEST**2 * np.bincount(part, mass))[part]

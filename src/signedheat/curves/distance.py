@@ -105,58 +105,53 @@ def distance_to_pieces(
     if turn.any() or len(left_out):
         note = CurvesTaken(np.flatnonzero(turn), left_out)
         field = replace(field, diagnostics=field.diagnostics.noting(note))
-    warn_of_guesses(decision, field, listed)
+    reason = guess(decision, field, listed)
+    if reason:
+        warn_user(reason, InexactWarning)
     return field, taken
 
 
-def warn_of_guesses(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> None:
-    """Warn if what the pieces bound is a guess."""
+def guess(decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints]) -> str:
+    """Why what the pieces bound is a guess, and what to do; empty if it is none."""
+    as_given = "as_oriented=True takes curves as they are"
     if decision.joined_but_bounds_nothing:
-        warn_user(
+        return (
             "most of the curves bound nothing together: which side is which away from them is a guess. Draw what is "
-            "missing, or turn curves that face the wrong way; as_oriented=True takes curves as they are",
-            InexactWarning,
+            f"missing, or turn curves that face the wrong way; {as_given}"
         )
-        return
     against = decision.turned_loops()
     if len(against):
-        warn_user(
+        return (
             f"{named(against)} as a whole ran against the others, and was turned: which of them are right is a guess. "
-            "as_oriented=True takes curves as they are",
-            InexactWarning,
+            f"{as_given}"
         )
-        return
     contradictory = decision.contradictory()
     if len(contradictory):
-        warn_user(
+        return (
             f"a part of {named(contradictory)} bounds something together with the others, and another part does not: "
             "what is bounded is a guess. Remove what belongs to no curve, turn what faces the wrong way, or draw more; "
-            "as_oriented=True takes curves as they are",
-            InexactWarning,
+            f"{as_given}"
         )
-        return
     strokes = decision.pieces.strokes
     gap = strokes.widest_gap(decision.best) / strokes.lengths.sum()
     if gap > WIDE:
-        warn_user(
+        return (
             f"the widest gap of the curves is {gap:.0%} as long as they are: how it is completed is a guess. Draw more "
-            "of them",
-            InexactWarning,
+            "of them"
         )
-    elif not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
-        return  # other curves and points have sides of their own
-    else:
-        surface = strokes.surface
-        chosen = slice(None) if surface.restriction is None else surface.restriction
-        areas, sides = strokes.areas[chosen], decision.best.sides[chosen]
-        near = np.abs(field.values) <= surface.triangles.lengths_of_edges.mean()
-        apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
-        if apart > APART:
-            warn_user(
-                f"the gaps of the curves are so wide that completing them in two ways differs on {apart:.0%} of the "
-                "surface. Draw more of them",
-                InexactWarning,
-            )
+    if not decision.all_bound or not all(isinstance(curve, Curve) and curve.oriented for curve in curves):
+        return ""  # other curves and points have sides of their own
+    surface = strokes.surface
+    chosen = slice(None) if surface.restriction is None else surface.restriction
+    areas, sides = strokes.areas[chosen], decision.best.sides[chosen]
+    near = np.abs(field.values) <= surface.triangles.lengths_of_edges.mean()
+    apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
+    if apart > APART:
+        return (
+            f"the gaps of the curves are so wide that completing them in two ways differs on {apart:.0%} of the "
+            "surface. Draw more of them"
+        )
+    return ""
 
 
 def named(numbers: NDArray[np.int64]) -> str:

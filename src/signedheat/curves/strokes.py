@@ -95,17 +95,17 @@ class Strokes:
         crossed = sparse.csr_matrix(tail.multiply(head.astype(bool)) - head.multiply(tail.astype(bool)))
         crossed.data = np.sign(np.rint(crossed.data))
         crossed.eliminate_zeros()
-        areas = areas_of_vertices(triangles)
+        areas = triangles.vertex_areas
         width = min(EDGES * edge, OF_ALL * float(lengths.sum()))
         around = widened(triangles, seen, width)
         left, right = (_means(around.multiply(around * side > 0), areas) for side in (1, -1))
         means = sparse.csr_matrix(0.5 * (left - right))
         return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width)
 
-    @cached_property
+    @property
     def areas(self) -> NDArray[np.float64]:
         """(n,) area that belongs to each vertex."""
-        return areas_of_vertices(self.surface.triangles)
+        return self.surface.triangles.vertex_areas
 
     @cached_property
     def graph(self) -> CutGraph:
@@ -180,15 +180,6 @@ class Strokes:
         """(e,) cost of each edge between these sides."""
         first, second = sides[self.surface.triangles.edges.vertices].T
         return np.where(first > second, falling, np.where(first < second, rising, 0.0))
-
-
-def areas_of_vertices(triangles: IntrinsicMesh) -> NDArray[np.float64]:
-    """(n,) a third of the area of the faces at each vertex."""
-    thirds = np.repeat(triangles.face_areas / 3, 3)
-    result: NDArray[np.float64] = np.bincount(triangles.corner_vertices.ravel(), thirds, triangles.n_vertices).astype(
-        np.float64
-    )
-    return result
 
 
 def fluxes_across(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:

@@ -121,6 +121,12 @@ class IntrinsicMesh(Frozen):
         return np.maximum(self.face_areas, FLATTEST * squares)
 
     @cached_property
+    def vertex_areas(self) -> NDArray[np.float64]:
+        """(n_vertices,) a third of the area of the faces at each vertex."""
+        thirds = np.repeat(self.face_areas / 3, 3)
+        return np.bincount(self.corner_vertices.ravel(), thirds, self.n_vertices).astype(np.float64)
+
+    @cached_property
     def corner_cotangents(self) -> NDArray[np.float64]:
         """(m, 3) cotangent of the angle at each corner."""
         leaving = self.edge_vectors
