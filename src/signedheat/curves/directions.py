@@ -21,23 +21,29 @@ from ..parallel import n_threads
 from .strokes import Inside, Strokes
 
 AS_GIVEN = 0.5
-"""What turning a stroke costs, relative to its length."""
+"""What turning a stroke costs, relative to its length. Halved or doubled, one of 46 drawings changes (on more than 2 % of
+the area)."""
 WEAKLY = 0.02
 """The same if sides are smooth, for a stroke of mean length. Of two that follow each other, with a gap of half of their
-length, the energy is less by 0.05."""
+length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""
 MOST = 0.5
-"""Share of the length of all strokes that bounds nothing where none is left out."""
+"""Share of the length of all strokes that bounds nothing where none is left out: the greater part. Halved and doubled,
+none of 46 drawings changes."""
 EXPLAINED = 0.5
-"""How far a stroke is explained that bounds the inside."""
+"""How far a stroke is explained that bounds the inside: the greater part. Halved, none of 46 drawings changes, doubled
+two, and eleven more are announced."""
 ROUNDS = 20
 """Most cuts until the directions agree with the sides."""
 SINGLY = 16
-"""Strokes, the longest first, that are turned one by one where they explain nothing."""
+"""Strokes, the longest first, that are turned one by one where they explain nothing: for speed. Halved and doubled,
+none of 46 drawings changes."""
 FOLLOWING = 0.045
-"""How far strokes agree that follow each other with a gap as long as both, on a plane: ln(4/3) / 2π."""
+"""How far strokes agree that follow each other with a gap as long as both, on a plane: ln(4/3) / 2π. Halved and
+doubled, the same of 46 drawings are announced."""
 FEW = 0.3
 """Share of the length of all strokes below which whole loops are turned without a warning: three of ten circles are.
-Without it one of 302 drawings less is wrong in silence, and those circles are announced."""
+Without it one of 302 drawings less is wrong in silence, and those circles are announced; doubled, one of 46 drawings
+less is announced."""
 SPLIT = 0.06
 """Length of the lesser part of a stroke, relative to that of all, from which the parts contradict each other if one
 alone bounds the inside. Of 259 drawings, 21 of them wrong, 4 are wrong in silence and 12 right with a warning; halved 1

@@ -23,7 +23,8 @@ REWARD = 1.0
 From 0.8 to 1.0 the table of damaged curves stays as it is."""
 EDGES, OF_ALL = 2.0, 0.01
 """How far from a stroke sides count for whether it is explained, so that strokes drawn again next to it are one: in
-edges of the mesh, but no more of the length of all strokes."""
+edges of the mesh, but no more of the length of all strokes. Of 46 drawings none changes if they are halved, nor if the
+first is doubled; if the second is, one."""
 STAIRS = 0.92
 """Length of a line relative to that of the edges' duals that it cuts."""
 LEVEL = 1e-6

@@ -29,10 +29,12 @@ from .welding import distinct_rows
 
 OPPOSITE = -0.5
 """Cosine between the normals of two points below which they lie on different sides of a plate, if one is over the
-other."""
+other. Halved, no plate or bowl of .5 to 2.5 spacings changes; at -1, where no sides are kept apart, 5 to 94 % of bowls
+are wrong."""
 OVER = 0.05
 """Height over a point's tangent plane, relative to the reach of its neighbours, about three times their spacing, from
-which another one is over it: those in the plane lie on the same side, whatever their normals."""
+which another one is over it: those in the plane lie on the same side, whatever their normals.
+Halved and doubled, no plate or bowl of .5 to 2.5 spacings changes."""
 GIVEN = 1.0
 """Weight of a given normal, relative to that of a neighbour in the same plane, of which there are six."""
 _CHUNK = 65536

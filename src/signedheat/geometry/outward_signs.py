@@ -40,7 +40,8 @@ NEARBY = 8
 DIRECT_WEIGHT = 0.1
 """Weight of a link between neighbours, over that of a ball's; with noisy points they weigh the same."""
 UPWARD = np.array([0.01, 0.1, 1.0])
-"""Where out is if nothing decides it, as for points in a plane: up; on vertical planes along the second axis."""
+"""Where out is if nothing decides it, as for points in a plane: up; on vertical planes along the second axis. Each
+component halved or doubled, planes have the same sides."""
 _CHUNK = 4096
 
 
