@@ -21,8 +21,8 @@ from ..parallel import n_threads
 from .strokes import Inside, Strokes
 
 AS_GIVEN = 0.5
-"""What turning a stroke costs, relative to its length. Halved or doubled, one of 46 drawings changes (on more than 2 % of
-the area)."""
+"""What turning a stroke costs, relative to its length. Halved or doubled, one of 46 drawings changes, that is, on more
+than 2 % of the area."""
 WEAKLY = 0.02
 """The same if sides are smooth, for a stroke of mean length. Of two that follow each other, with a gap of half of their
 length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""

@@ -37,7 +37,8 @@ which up to a third is gone two have wider ones, with 0.3 six; of seven loops th
 whose ends are nearer than a fifth of what is left."""
 APART = 0.1
 """Share of the area on whose side the shortest completion and that by heat differ where neither can be trusted. Halved,
-no more of 259 drawings are announced; of 30 curves of which half is gone in twelve pieces, two that are wrong need it."""
+no more of 259 drawings are announced; two of 30 curves in twelve pieces, half gone, are so by it alone,
+both of them wrong."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
 
