@@ -34,7 +34,7 @@ def n_threads() -> int:
 
 
 def in_chunks(
-    function: Callable[[NDArray[np.float64]], tuple[NDArray[Any], ...]], rows: NDArray[np.float64]
+    function: Callable[[NDArray[Any]], tuple[NDArray[Any], ...]], rows: NDArray[Any]
 ) -> tuple[NDArray[Any], ...]:
     """Apply a function to chunks of rows on all threads, and put its arrays together again.
 

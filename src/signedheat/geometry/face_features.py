@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,35 +12,13 @@ from .components import by_first_use, connected_components, grouped, sums_of
 from .directions import unit
 from .edges import EdgeTable, edge_table
 from .nearest import triangle_rows
-from .welding import same_positions
+from .welding import coincident_faces, same_positions, same_rows
 
-Links: TypeAlias = tuple[
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.int32],
-    NDArray[np.int32],
-    NDArray[np.int32],
-    NDArray[np.int64],
-    NDArray[np.int32],
-    NDArray[np.bool_],
-]
-"""Attributes of `FaceFeatures` as kernels take them: see `FaceFeatures.links`."""
-Normals: TypeAlias = tuple[
-    NDArray[np.int32],
-    NDArray[np.int32],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.bool_],
-    NDArray[np.bool_],
-]
-"""See `FaceFeatures.normals`."""
 FOLD = 0.02
 """Where unit normals of two faces add up to less than this, the edge between them is a fold and decides no side."""
 
 
-@dataclass(frozen=True, eq=False)
-class FaceFeatures:
+class FaceFeatures(NamedTuple):
     """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
 
     An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
@@ -89,33 +66,6 @@ class FaceFeatures:
     trusted: NDArray[np.float32]
     ids: NDArray[np.int64]
 
-    @property
-    def links(self) -> Links:
-        """What a walk from face to face needs."""
-        return (
-            self.rows,
-            self.vertices,
-            self.faces,
-            self.across,
-            self.apexes,
-            self.vertex_starts,
-            self.vertex_corners,
-            self.vertex_regular,
-        )
-
-    @property
-    def normals(self) -> Normals:
-        """What decides the side of a place."""
-        return (
-            self.faces,
-            self.edges,
-            self.face_normals,
-            self.edge_normals,
-            self.vertex_normals,
-            self.edge_regular,
-            self.vertex_regular,
-        )
-
     @classmethod
     def of(
         cls, vertices: NDArray[np.float64], faces: NDArray[np.int64], trusted: NDArray[np.float32] | None = None
@@ -159,17 +109,8 @@ class FaceFeatures:
         edge_normals = sums_of(thrice, table.face_edges.ravel(), len(table.vertices))
         vertex_normals = sums_of(angles[:, None] * thrice, faces.ravel(), len(vertices))
 
-        edge_regular = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
-        mates = np.where(edge_regular[table.face_edges].ravel(), table.mates, -1)
+        edge_regular, vertex_regular, mates = _regular(faces, table, edge_normals, len(vertices))
         across = np.where(mates < 0, -1, mates // 3).reshape(-1, 3).astype(np.int32)
-        one = np.flatnonzero(mates >= 0)
-        following = np.roll(np.arange(len(mates)).reshape(-1, 3), -1, axis=1).ravel()
-        fans = connected_components(len(mates), one, following[mates[one]])  # both leave the same vertex
-        fan = np.empty(len(vertices), dtype=np.int64)
-        fan[faces.ravel()] = fans
-        vertex_regular = np.ones(len(vertices), dtype=bool)
-        vertex_regular[faces.ravel()[fans != fan[faces.ravel()]]] = False  # cones that touch are several
-        vertex_regular[table.vertices[~edge_regular]] = False
         return cls(
             corners,
             triangle_rows(corners),
@@ -190,14 +131,28 @@ class FaceFeatures:
         )
 
 
+def _regular(
+    faces: NDArray[np.int64], table: EdgeTable, edge_normals: NDArray[np.float64], n_vertices: int
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
+    """Which edges and vertices are regular; and (3 m,) the other halfedge of each at a regular edge, else −1."""
+    edges = (table.face_counts == 2) & (table.balance == 0) & ((edge_normals**2).sum(axis=1) > FOLD**2)
+    mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
+    one = np.flatnonzero(mates >= 0)
+    following = np.roll(np.arange(len(mates)).reshape(-1, 3), -1, axis=1).ravel()
+    fans = connected_components(len(mates), one, following[mates[one]])  # both leave the same vertex
+    corners, fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
+    fan[corners] = fans
+    vertices = np.ones(n_vertices, dtype=bool)
+    vertices[corners[fans != fan[corners]]] = False  # cones that touch are several
+    vertices[table.vertices[~edges]] = False
+    return edges, vertices, mates
+
+
 def _copies(faces: NDArray[np.int64], table: EdgeTable) -> NDArray[np.bool_]:
     """Which faces are there before, with the same corners in the same order of rotation."""
     copies = np.zeros(len(faces), dtype=bool)
     crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges].all(axis=1))
     if len(crowded):
-        some = faces[crowded]
-        turn = (some.argmin(axis=1)[:, None] + np.arange(3)) % 3
-        _, first = np.unique(np.take_along_axis(some, turn, axis=1), axis=0, return_index=True)
-        copies[crowded] = True
-        copies[crowded[first]] = False
+        first, reverse = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
+        copies[crowded] = same_rows(np.column_stack([first, reverse])) != np.arange(len(crowded))
     return copies

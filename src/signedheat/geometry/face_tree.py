@@ -9,8 +9,6 @@ foot lies on the rim of a face, faces on the other side of that rim may be neare
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,15 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..parallel import n_threads
+from ..parallel import in_chunks
 from .box_tree import LEAF, BoxTree
-from .face_features import FaceFeatures, Links, Normals
+from .face_features import FaceFeatures
 from .nearest import foot_on_triangle, nearest_faces
 
 RUN = 512
-"""Points after which a search starts anew."""
-PART = 8 * RUN
-"""Points that one thread takes at a time."""
+"""Points after which a search starts anew: a part of what a thread takes at a time."""
 DISC_LEVELS = 8
 """Levels of the tree, from the leaves up, that have discs."""
 FLAT = 0.5
@@ -58,6 +54,11 @@ class FaceTree:
         lower, upper = triangles.min(axis=1), triangles.max(axis=1)
         return cls(features, BoxTree.in_order(lower, upper, np.arange(len(triangles))))
 
+    @classmethod
+    def of_triangles(cls, triangles: NDArray[np.float64], trusted: NDArray[np.float32] | None = None) -> FaceTree:
+        """The tree of (m, 3, 3) triangles, of which one has area; corners at one position are one vertex."""
+        return cls.of(FaceFeatures.of(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), trusted))
+
     @cached_property
     def discs(self) -> NDArray[np.float64]:
         """(2 · leaves, 8) centre, normal, radius and half the thickness of what is below each node.
@@ -68,13 +69,7 @@ class FaceTree:
 
     def distances(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n,) distance of each of (n, 3) points to the nearest face."""
-        distances = np.empty(len(points))
-
-        def part(start: int) -> None:
-            here = slice(start, start + PART)
-            distances[here] = self._distances(points[here])
-
-        _on_threads(part, range(0, len(points), PART))
+        (distances,) = in_chunks(lambda chunk: (self._distances(chunk),), points)
         return distances
 
     def search(self, points: NDArray[np.float64]) -> NearestFaces:
@@ -109,12 +104,6 @@ class FaceTree:
     def nearest(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """Nearest faces of points, and the squares of their distances."""
         return nearest_faces(self.features.rows, self.tree, self.discs, points, RUN)
-
-
-def _on_threads(part: Callable[[int], None], starts: range) -> None:
-    with ThreadPoolExecutor(n_threads()) as pool:
-        for job in [pool.submit(part, start) for start in starts]:
-            job.result()
 
 
 @compiled
@@ -202,20 +191,21 @@ def search_from(
     n = len(points)
     faces, squares, places = np.empty(n, dtype=np.int32), np.empty(n), np.empty((n, 3))
     codes, cosines, regular = np.empty(n, dtype=np.int8), np.empty(n, dtype=np.float32), np.empty(n, dtype=np.bool_)
-    nearest_of_candidates(features.links, points, candidates, faces, squares, codes, places)
-    facing(features.normals, points, faces, codes, places, cosines, regular)
+    nearest_of_candidates(features, points, candidates, faces, squares, codes, places, cosines, regular)
     return NearestFaces(faces, np.sqrt(squares), places, codes, cosines, regular)
 
 
 @compiled
 def nearest_of_candidates(
-    links: Links,
+    features: FaceFeatures,
     points: NDArray[np.float64],
     candidates: NDArray[np.int32],
     out_faces: NDArray[np.int32],
     out_squares: NDArray[np.float64],
     out_features: NDArray[np.int8],
     out_places: NDArray[np.float64],
+    out_cosines: NDArray[np.float32],
+    out_regular: NDArray[np.bool_],
 ) -> None:
     """From the nearest of some faces, and the nearest place on it, to faces that are nearer, across their rims.
 
@@ -225,7 +215,9 @@ def nearest_of_candidates(
 
     All points in one call, since a call costs more than the way of one point.
     """
-    rows, places, faces, across, apexes, starts, around, vertex_regular = links
+    rows, places, faces, vertex_regular = features.rows, features.vertices, features.faces, features.vertex_regular
+    across, apexes = features.across, features.apexes
+    starts, around = features.vertex_starts, features.vertex_corners
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
         face, square, feature, fx, fy, fz = np.int64(-1), np.inf, 0, x, y, z
@@ -271,38 +263,21 @@ def nearest_of_candidates(
             face, square, feature, fx, fy, fz = other, s, which, u, v, w
         out_faces[p], out_squares[p], out_features[p] = face, square, feature
         out_places[p, 0], out_places[p, 1], out_places[p, 2] = fx, fy, fz
+        out_cosines[p], out_regular[p] = facing(features, face, feature, x - fx, y - fy, z - fz)
 
 
 @compiled
-def facing(
-    normals: Normals,
-    points: NDArray[np.float64],
-    which: NDArray[np.int32],
-    codes: NDArray[np.int8],
-    places: NDArray[np.float64],
-    out_cosines: NDArray[np.float32],
-    out_regular: NDArray[np.bool_],
-) -> None:
-    """Cosine between normal and direction to the point, at each nearest place; and whether that decides the side."""
-    faces, edges, face_normals, edge_normals, vertex_normals, edge_regular, vertex_regular = normals
-    for p in range(len(points)):
-        face, code = np.int64(which[p]), np.int64(codes[p])
-        out_cosines[p], out_regular[p] = 0.0, False
-        if face < 0:
-            continue
-        regular = True
-        if code == 0:
-            nx, ny, nz = face_normals[face, 0], face_normals[face, 1], face_normals[face, 2]
-        elif code <= 3:
-            e = edges[face, code - 1]
-            nx, ny, nz = edge_normals[e, 0], edge_normals[e, 1], edge_normals[e, 2]
-            regular = edge_regular[e]
-        else:
-            e = faces[face, code - 4]
-            nx, ny, nz = vertex_normals[e, 0], vertex_normals[e, 1], vertex_normals[e, 2]
-            regular = vertex_regular[e]
-        dx, dy, dz = points[p, 0] - places[p, 0], points[p, 1] - places[p, 1], points[p, 2] - places[p, 2]
-        lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + dz * dz))
-        if lengths > 0.0:
-            out_cosines[p] = (nx * dx + ny * dy + nz * dz) / lengths
-        out_regular[p] = regular
+def facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float) -> tuple[float, bool]:
+    """Cosine between the normal at a feature of a face and the way from there; and whether that decides the side."""
+    if face < 0:
+        return 0.0, False
+    normals, at, regular = features.face_normals, np.int64(face), True
+    if feature > 3:
+        normals, at = features.vertex_normals, np.int64(features.faces[face, feature - 4])
+        regular = features.vertex_regular[at]
+    elif feature > 0:
+        normals, at = features.edge_normals, np.int64(features.edges[face, feature - 1])
+        regular = features.edge_regular[at]
+    nx, ny, nz = normals[at, 0], normals[at, 1], normals[at, 2]
+    lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * (dx * dx + dy * dy + dz * dz))
+    return (nx * dx + ny * dy + nz * dz) / lengths if lengths > 0.0 else 0.0, regular

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..parallel import n_threads
+from ..parallel import in_chunks
 
 CLEAN_NEIGHBORS = 12
 """Neighbours that a plane is fitted to where there is no noise to average out."""
@@ -30,7 +29,6 @@ TWO_SIDES = 3**0.5 / 2
 is .93 to .97, with a noise of a tenth of their spacing .88; of uniform noise, whose limit this is, .81, of normal noise
 .80."""
 _TRIAL_HEIGHTS = (0.5, 0.5, 0.5)
-_CHUNK = 4096
 _TRIED = 2000
 Floats = NDArray[np.float64]
 
@@ -142,19 +140,16 @@ def planes_near(
     n_starts: int = 5,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Axes, centres, reaches and deviations of planes near chosen points."""
-    n = len(chosen)
-    axes, centers, deviations, reaches = np.zeros((n, 3)), points[chosen], np.zeros(n), np.zeros(n)
 
-    def fit(begin: int) -> None:
-        part = slice(begin, begin + _CHUNK)
-        distances, neighbors = tree.query(tree.data[chosen[part]], k=n_neighbors + 1)
-        neighbors[:, 0] = chosen[part]
-        kept = axes[part], centers[part], deviations[part]
-        robust_planes(points, neighbors, distances, np.array(heights), n_starts > 1, n_starts, *kept)
-        reaches[part] = distances[:, -1]
+    def fit(some: NDArray[np.int64]) -> tuple[Floats, Floats, Floats, Floats]:
+        distances, neighbors = tree.query(tree.data[some], k=n_neighbors + 1)
+        neighbors[:, 0] = some
+        axes, centers, deviations = np.zeros((len(some), 3)), points[some], np.zeros(len(some))
+        fitted = axes, centers, deviations
+        robust_planes(points, neighbors, distances, np.array(heights), n_starts > 1, n_starts, *fitted)
+        return axes, centers, distances[:, -1], deviations
 
-    with ThreadPoolExecutor(n_threads()) as pool:
-        list(pool.map(fit, range(0, n, _CHUNK)))
+    axes, centers, reaches, deviations = in_chunks(fit, chosen)
     return axes, centers, reaches, deviations
 
 

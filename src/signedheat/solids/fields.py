@@ -21,7 +21,7 @@ from ..errors import MemoryLimitError, OutsideError, UnsupportedTypeError
 from ..fields.grid_field import GridField
 from ..fields.solid_queries import SolidQueries
 from ..geometry.face_tree import FaceTree
-from ..lowering.grid.discretization import refuse_beyond_memory
+from ..lowering.grid.discretization import refuse_large_grid
 from ..memory import available_memory, libraries
 from ..operators.grid.blocks import NODES, SIDE, Blocks
 from ..parallel import n_threads
@@ -70,7 +70,7 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Grid
         If it cannot fit in memory; nothing has been allocated then.
     """
     refuse_walls(grid)
-    refuse_beyond_memory(grid, BYTES_PER_NODE, BYTES_AT_WORK)
+    refuse_large_grid(grid, BYTES_PER_NODE, BYTES_AT_WORK)
     values, confidence = np.empty(grid.shape), np.empty(grid.shape, dtype=np.float32)
     n_blocks = -(-np.array(grid.shape) // SIDE)
     firsts = np.stack(np.meshgrid(*(np.arange(0, n, EDGE) for n in n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)

@@ -20,7 +20,6 @@ from ..geometry.box_tree import BoxTree
 from ..geometry.components import element_components
 from ..geometry.conforming import conforming
 from ..geometry.cut_faces import cut_faces
-from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.self_intersections import self_intersections
 from .parts import parts_of
@@ -181,7 +180,7 @@ def _along(edges: NDArray[np.float64], step: float) -> NDArray[np.float64]:
 def _far(surface: TriangleMesh, triangles: NDArray[np.float64], distance: float) -> NDArray[np.float64]:
     """(n, 3) vertices and centres of a surface that are that far from all triangles."""
     points = np.concatenate([surface.vertices, surface.vertices[surface.faces].mean(axis=1)])
-    tree = FaceTree.of(FaceFeatures.of(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)))
+    tree = FaceTree.of_triangles(triangles)
     return points[tree.distances(points) > distance]
 
 

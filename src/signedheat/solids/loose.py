@@ -7,7 +7,6 @@ import scipy
 from numpy.typing import NDArray
 
 from ..geometry.components import connected_components
-from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.welding import same_positions
 from ..geometry.winding_tree import WindingTree
@@ -37,8 +36,7 @@ def without_copies(
     """(m,) triangles of pieces that are no copies of a body: pieces that lie on it, nearer than their own size."""
     if not len(bodies):
         return np.ones(len(triangles), dtype=bool)
-    corners = bodies.reshape(-1, 3)
-    tree = FaceTree.of(FaceFeatures.of(corners, np.arange(len(corners)).reshape(-1, 3)))
+    tree = FaceTree.of_triangles(bodies)
     n = int(labels.max()) + 1
     sizes, farthest = np.sqrt(np.bincount(labels, face_areas(triangles), n)), np.zeros(n)
     np.maximum.at(farthest, labels, tree.distances(triangles.reshape(-1, 3)).reshape(-1, 3).max(axis=1))

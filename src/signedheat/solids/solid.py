@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from typing import Literal
@@ -96,7 +96,7 @@ class Solid(Frozen, ShortRepr):
         edges, vertices = found.edge_regular.copy(), found.vertex_regular.copy()
         edges[found.edges[idle]] = False
         vertices[found.faces[idle]] = False
-        return replace(found, edge_regular=edges, vertex_regular=vertices)
+        return found._replace(edge_regular=edges, vertex_regular=vertices)
 
     @cached_property
     def tree(self) -> FaceTree:

@@ -22,7 +22,6 @@ from ..cache import fingerprint
 from ..diagnostics import Note
 from ..domains.grid import Grid
 from ..errors import FileFormatError, SignedHeatError
-from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..operators.grid.blocks import SIDE, Blocks
 from ..packages import lazy_module
@@ -128,9 +127,8 @@ def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, ND
     """What the tiles of a folder are computed from; once in each process."""
     with np.load(Path(folder) / "plan.npz", allow_pickle=False) as file:
         plan = dict(file)
-    corners = plan["corners"]
-    features = FaceFeatures.of(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), plan["trusted"])
-    return FaceTree.of(features), Windings(plan["closing"]), Grid(plan["origin"], plan["spacing"], plan["shape"]), plan
+    tree = FaceTree.of_triangles(plan["corners"], plan["trusted"])
+    return tree, Windings(plan["closing"]), Grid(plan["origin"], plan["spacing"], plan["shape"]), plan
 
 
 def solve_into(folder: str, key: str, number: int) -> int:

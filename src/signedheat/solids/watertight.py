@@ -9,7 +9,6 @@ from ..domains.grid import Grid
 from ..domains.triangle_mesh import TriangleMesh
 from ..errors import GeometryError, SourceError
 from ..geometry.components import element_components
-from ..geometry.face_features import FaceFeatures
 from ..geometry.face_tree import FaceTree
 from ..geometry.self_intersections import self_intersections
 from .keeping import given_surface, unjoined
@@ -74,7 +73,7 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
     given, made = solid.triangles[bounds & (solid.origins >= 0)], solid.triangles[bounds & (solid.origins < 0)]
     closest = solid.closest(_places(corners))
     off = np.abs(closest.distances - level)[~closest.completed]
-    back = _tree(corners).distances(_places(given)) - level if len(given) else np.zeros(1)
+    back = FaceTree.of_triangles(corners).distances(_places(given)) - level if len(given) else np.zeros(1)
     return {
         "bodies": int((np.bincount(parts, volumes) > 0).sum()),
         "vertices": surface.n_vertices,
@@ -92,10 +91,6 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
 def _places(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     places: NDArray[np.float64] = np.einsum("pk,mkj->mpj", PARTS, triangles).reshape(-1, 3)
     return places
-
-
-def _tree(triangles: NDArray[np.float64]) -> FaceTree:
-    return FaceTree.of(FaceFeatures.of(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)))
 
 
 def _openings(completion: NDArray[np.float64]) -> int:
