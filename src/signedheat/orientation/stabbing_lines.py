@@ -84,7 +84,9 @@ def stabbing_lines(
     found, fixed = [], read_only(triangles)
     for k in range(n_directions):
         shift = 0.5 * (shapes[k] - 1) + 0.5 * np.modf((k + 1) * np.array([2**0.5, 3**0.5]))[0] - 0.25
-        found.append(_draw(vertices, fixed, frames[k], center, pixel, shift, shapes[k], int(first_lines[k])))
+        found.append(
+            crossings_at_pixels(vertices, fixed, frames[k], center, pixel, shift, shapes[k], int(first_lines[k]))
+        )
     return _in_order(found, int(first_lines[-1]))
 
 
@@ -130,7 +132,9 @@ def aimed_lines(
 
 def _in_order(found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]], n_lines: int) -> LineCrossings:
     ids, entering, places = (np.concatenate(columns) for columns in zip(*found, strict=True))
-    order, starts = _by_line(ids, np.argsort(places[:, 0]), n_lines)
+    by_depth = np.argsort(places[:, 0])
+    starts, members = grouped(ids[by_depth, 0], n_lines)  # which keeps the order within each line
+    order = by_depth[members]
     places = places[order]
     return LineCrossings(starts, ids[order, 1], entering[order], places[:, 0], places[:, 1])
 
@@ -163,7 +167,7 @@ def line_frames(n: int) -> NDArray[np.float64]:
 
 
 @compiled
-def _draw(
+def crossings_at_pixels(
     vertices: NDArray[np.float64],
     triangles: NDArray[np.int64],
     frame: NDArray[np.float64],
@@ -173,7 +177,12 @@ def _draw(
     shape: NDArray[np.int64],
     first_line: int,
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_], NDArray[np.float64]]:
-    """Crossings of the lines through a picture's pixels; a row's pixels from one side on to before the next."""
+    """Crossings of the lines through a picture's pixels: lines and triangles, whether they enter, depths and cosines.
+
+    A row's pixels from one side of a triangle on to before the next. Line `first_line` is that of the first pixel, the
+    next one is to its right; pixels are `pixel` apart in the plane of the first two rows of the frame, and the first
+    one lies `shift` pixels before the center.
+    """
     n = len(vertices)
     at, cells = np.empty((n, 3)), np.empty((n, 2), dtype=np.int32)
     for v in range(n):
@@ -300,22 +309,3 @@ def _doubled(
         more[1][k] = entering[k]
         more[2][k, 0], more[2][k, 1] = places[k, 0], places[k, 1]
     return more
-
-
-@compiled
-def _by_line(
-    ids: NDArray[np.int32], order: NDArray[np.int64], n_lines: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Stable counting sort, by line, of crossings already in order of depth."""
-    line = ids[:, 0]
-    starts = np.zeros(n_lines + 1, dtype=np.int64)
-    for k in range(len(line)):
-        starts[line[k] + 1] += 1
-    for k in range(n_lines):
-        starts[k + 1] += starts[k]
-    at = starts[:-1].copy()
-    result = np.empty(len(line), dtype=np.int64)
-    for k in order:
-        result[at[line[k]]] = k
-        at[line[k]] += 1
-    return result, starts

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
+from ..frozen import read_only
+from ..orientation.stabbing_lines import crossings_at_pixels
 
 SIZE = 900
 """Pixels along the longer side."""
@@ -96,34 +97,16 @@ def rasterize(
     depth, face, value : (height, width) arrays
         Those of the nearest triangle at each pixel; face −1 and value NaN where there is none.
     """
-    depth = np.full((height, width), -np.inf)
-    face = np.full((height, width), -1, dtype=np.int64)
-    shown = np.full((height, width), np.nan)
-    _fill(corners, values, depth, face, shown)
-    return depth, face, shown
-
-
-@compiled
-def _fill(
-    corners: NDArray[np.float64],
-    values: NDArray[np.float64],
-    depth: NDArray[np.float64],
-    face: NDArray[np.int64],
-    shown: NDArray[np.float64],
-) -> None:
-    height, width = depth.shape
-    for f in range(len(corners)):
-        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[f]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if area == 0.0:
-            continue
-        for row in range(max(int(np.ceil(min(ay, by, cy))), 0), min(int(max(ay, by, cy)), height - 1) + 1):
-            for column in range(max(int(np.ceil(min(ax, bx, cx))), 0), min(int(max(ax, bx, cx)), width - 1) + 1):
-                u = ((column - ax) * (cy - ay) - (row - ay) * (cx - ax)) / area
-                v = ((bx - ax) * (row - ay) - (by - ay) * (column - ax)) / area
-                if u < 0.0 or v < 0.0 or u + v > 1.0:
-                    continue
-                z = az + u * (bz - az) + v * (cz - az)
-                if z > depth[row, column]:
-                    depth[row, column], face[row, column] = z, f
-                    shown[row, column] = (1 - u - v) * values[f, 0] + u * values[f, 1] + v * values[f, 2]
+    vertices, triangles = corners.reshape(-1, 3), read_only(np.arange(3 * len(corners)).reshape(-1, 3))
+    shape, none = np.array([width, height]), np.zeros(3)
+    ids, _, places = crossings_at_pixels(vertices, triangles, np.eye(3), none, 1.0, none[:2], shape, 0)
+    order = np.argsort(places[:, 0], kind="stable")  # the nearest is written last
+    depth, face, shown = np.full(height * width, -np.inf), np.full(height * width, -1), np.full(height * width, np.nan)
+    depth[ids[order, 0]], face[ids[order, 0]] = places[order, 0], ids[order, 1]
+    pixels = np.flatnonzero(face >= 0)
+    a, b, c = (corners[face[pixels], k, :2] @ [1, 1j] for k in range(3))
+    away = pixels % width + 1j * (pixels // width) - a
+    area = (np.conj(b - a) * (c - a)).imag
+    u, v = (np.conj(away) * (c - a)).imag / area, (np.conj(b - a) * away).imag / area
+    shown[pixels] = (np.stack([1 - u - v, u, v], axis=1) * values[face[pixels]]).sum(axis=1)
+    return depth.reshape(height, width), face.reshape(height, width), shown.reshape(height, width)
