@@ -25,6 +25,7 @@ from ..geometry.intrinsic.history import History
 from ..geometry.intrinsic.refinement import refine_all
 from ..geometry.intrinsic.transfer import ConformingRefinement, level_lines, transfer_segments
 from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.meshes import gradients_along
 from ..progress import Progress, Stopwatch
 from .curves import Curve, CurveOrPoints, CurvesAndPoints
 from .exchange import Displayed
@@ -369,20 +370,6 @@ def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
             remedy="remove faces that are all but flat, or scale the shape where it is squashed",
             element="faces",
         )
-
-
-def gradients_along(sides: NDArray[np.float64], rises: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(p, 3) gradients in the planes of two sides (p, 2, 3), along which a function rises by (p, 2); 0 if they are one.
-
-    Examples
-    --------
-    >>> gradients_along(np.array([[[2.0, 0, 0], [1, 1, 0]]]), np.array([[4.0, 1.0]])).tolist()
-    [[2.0, -1.0, 0.0]]
-    """
-    normals = np.cross(sides[:, 0], sides[:, 1])
-    square = np.einsum("pd,pd->p", normals, normals)
-    across = rises[:, :1] * sides[:, 1] - rises[:, 1:] * sides[:, 0]
-    return np.cross(across, normals) / np.where(square > 0, square, np.inf)[:, None]
 
 
 def triangle_mesh(domain: object) -> TriangleMesh:

@@ -22,6 +22,7 @@ from ..errors import GeometryError
 from ..frozen import Frozen
 from ..geometry.face_pairs import FacePairs, face_pairs, split_corners
 from ..geometry.intrinsic_mesh import IntrinsicMesh
+from ..geometry.meshes import gradients_along
 from ..geometry.surface_points import barycentric_in, locate_points
 from .arithmetic import Arithmetic
 from .vertex_field import VertexField
@@ -116,15 +117,8 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
     @property
     def face_gradients(self) -> NDArray[np.float64]:
         """(m, 3) ∇φ in each triangle, in space."""
-        a, b, c = (self.surface.vertices[self.surface.faces[:, k]] for k in range(3))
-        first, second = b - a, c - a
-        rise_first, rise_second = self.values[:, 1] - self.values[:, 0], self.values[:, 2] - self.values[:, 0]
-        e, f, g = (np.einsum("ij,ij->i", u, v) for u, v in ((first, first), (first, second), (second, second)))
-        area = e * g - f * f
-        area = np.where(area > 0, area, np.inf)
-        along_first = (g * rise_first - f * rise_second) / area
-        along_second = (e * rise_second - f * rise_first) / area
-        return along_first[:, None] * first + along_second[:, None] * second
+        corners = self.surface.vertices[self.surface.faces]
+        return gradients_along(corners[:, 1:] - corners[:, :1], self.values[:, 1:] - self.values[:, :1])
 
     def __call__(self, points: SurfacePoints) -> NDArray[np.float64]:
         """φ at points of the surface; on edges and at vertices, the value in the face through which the point is given.
@@ -273,9 +267,9 @@ class IntrinsicPiecewiseField(PiecewiseField):
         polygons, owners, where = subdivided(self.domain)
         sizes = [len(polygon) for polygon in polygons]
         node, face = np.concatenate(polygons), np.repeat(owners, sizes)
-        crossing = node >= n
-        at, on = np.flatnonzero(~crossing), np.flatnonzero(crossing)
+        at, on = np.flatnonzero(node < n), np.flatnonzero(node >= n)  # corners at vertices; where edges cross
 
+        # values at all corners, and keys: corners with the same key become one vertex
         owner = self.split_vertices[0]
         means = np.bincount(owner, self.values.ravel()) / np.bincount(owner)
         at_corners = means[owner].reshape(-1, 3)
@@ -288,6 +282,7 @@ class IntrinsicPiecewiseField(PiecewiseField):
         values[on] = (at_corners[face[on]] * barycentric_in(triangles, face[on], places)).sum(axis=1)
         keys[on, 0], keys[on, 1] = 1 + node[on], np.where(on_cut[places.elements], face[on], -1)
 
+        # a vertex for each key, and the polygons between these
         _, first, vertex = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         space = np.concatenate([self.domain.vertices, positions(self.domain, where)])
         ends = np.cumsum([0, *sizes])

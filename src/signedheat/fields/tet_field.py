@@ -218,16 +218,7 @@ class TetField(Displayed, Combinable, Frozen):
 
     @cached_property
     def _vertex_gradients(self) -> NDArray[np.float64]:
-        tets, n = self.mesh.tets, self.mesh.n_vertices
-        volumes = np.maximum(self.mesh.tet_volumes, 0)
-        gradients = self.tet_gradients
-        finite = ~np.isnan(gradients).any(axis=1)
-        vertices = tets[finite].ravel()
-        sums = np.stack(
-            [np.bincount(vertices, np.repeat((volumes * g)[finite], 4), minlength=n) for g in gradients.T], axis=1
-        )
-        total = np.bincount(vertices, np.repeat(volumes[finite], 4), minlength=n)
-        return np.where(total[:, None] > 0, sums / np.where(total > 0, total, 1)[:, None], np.nan)
+        return self.mesh.geometry.mean_gradients(self.values, self.mesh.tets, self.mesh.n_vertices)
 
     @cached_property
     def _planes(self) -> Planes:

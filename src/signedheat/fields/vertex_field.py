@@ -25,6 +25,7 @@ from ..domains.triangle_mesh import TriangleMesh
 from ..domains.validation import array_of, finite_number, finite_rows
 from ..errors import OutsideError
 from ..frozen import Frozen
+from ..geometry.meshes import gradients_along
 from ..packages import lazy_module
 from .booleans import Combinable, Rule
 
@@ -140,14 +141,8 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         """
         field = self._embedded
         mesh = field.domain.triangulation
-        rise = field.domain.on_triangulation(field.values)[mesh.faces]
-        corners = mesh.vertices[mesh.faces]
-        opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-        doubled = 2 * mesh.face_area_vectors
-        square = np.einsum("ij,ij->i", doubled, doubled)
-        turned = np.cross(doubled[:, None], opposite)
-        sums = np.einsum("ik,ikj->ij", rise, turned)
-        return sums / np.where(square > 0, square, np.inf)[:, None]
+        values, corners = field.domain.on_triangulation(field.values)[mesh.faces], mesh.vertices[mesh.faces]
+        return gradients_along(corners[:, 1:] - corners[:, :1], values[:, 1:] - values[:, :1])
 
     def contour(self, level: float = 0.0) -> list[Curve]:
         """The level set φ = level, as curves on the surface.

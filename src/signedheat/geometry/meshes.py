@@ -1,4 +1,4 @@
-"""Protocol of triangle meshes: the arrays that algorithms need of them."""
+"""Triangle meshes in space: the arrays that algorithms need of them, and gradients on their faces."""
 
 from __future__ import annotations
 
@@ -36,3 +36,17 @@ class Triangles(Protocol):
     @property
     def bounds(self) -> NDArray[np.float64]:
         """(2, 3) lower and upper corner of the box around the faces."""
+
+
+def gradients_along(sides: NDArray[np.float64], rises: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(p, 3) gradients in the planes of two sides (p, 2, 3), along which a function rises by (p, 2); 0 if they are one.
+
+    Examples
+    --------
+    >>> gradients_along(np.array([[[2.0, 0, 0], [1, 1, 0]]]), np.array([[4.0, 1.0]])).tolist()
+    [[2.0, -1.0, 0.0]]
+    """
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    square = np.einsum("pd,pd->p", normals, normals)
+    across = rises[:, :1] * sides[:, 1] - rises[:, 1:] * sides[:, 0]
+    return np.cross(across, normals) / np.where(square > 0, square, np.inf)[:, None]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..geometry.components import sums_of
 from ..geometry.tet_shapes import TetShapes
 
 THIN = 1e-2
@@ -88,12 +89,13 @@ class Tetrahedra(TetShapes):
         return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
 
     def mean_gradients(self, values: NDArray[np.float64], corners: NDArray[np.int64], n: int) -> NDArray[np.float64]:
-        """(n, 3) gradients at vertices: volume-weighted means over the tets around each."""
-        weights = self.weights / -3
-        sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * weights[:, None]
-        volumes = np.bincount(corners.ravel(), np.repeat(self.weights * self.volumes, 4), n)
-        totals = [np.bincount(corners.ravel(), np.repeat(column, 4), n) for column in sums.T]
-        return np.asarray(np.stack(totals, axis=1) / np.where(volumes > 0, volumes, 1)[:, None])
+        """(n, 3) gradients at vertices: volume-weighted means over the tets around each that have values, else NaN."""
+        sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * (self.weights / -3)[:, None]
+        finite = np.isfinite(sums).all(axis=1)
+        ids, volumes = corners[finite].ravel(), (self.weights * self.volumes)[finite]
+        total = np.bincount(ids, np.repeat(volumes, 4), n)
+        totals = sums_of(np.repeat(sums[finite], 4, axis=0), ids, n)
+        return totals / np.where(total > 0, total, np.nan)[:, None]
 
 
 def _assemble(

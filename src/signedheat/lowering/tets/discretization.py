@@ -109,7 +109,7 @@ class TetDiscretization(DiffusesEach):
         return TetIntegration(matrix, factorize=from_first, spring=1e4, strength=strength, gradients=self._gradients)
 
     def _gradients(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns)
+        return np.nan_to_num(self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns))
 
     def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
         """The discretisation itself: sources need not conform to the tets."""
