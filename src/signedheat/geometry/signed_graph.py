@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.linalg import eigh
 
 from ..compiled import compiled
@@ -55,19 +56,6 @@ class Links:
         return total / max(float(np.abs(self.weights).sum()), np.finfo(float).tiny)
 
 
-@dataclass(frozen=True, eq=False)
-class _Graph:
-    """Symmetric weights in rows: neighbours and weights of node i are those from starts[i] to starts[i + 1]."""
-
-    starts: NDArray[np.int64]
-    neighbors: NDArray[np.int64]
-    weights: NDArray[np.float64]
-
-    @property
-    def n_nodes(self) -> int:
-        return len(self.starts) - 1
-
-
 def signs_of(links: Links, n_nodes: int) -> NDArray[np.float64]:
     """(n,) signs s that make Σ w s_tail s_head large: no sign gains by turning alone, and hardly any group of them.
 
@@ -80,11 +68,11 @@ def signs_of(links: Links, n_nodes: int) -> NDArray[np.float64]:
     >>> signs_of(Links(np.array([0, 1, 0]), np.array([1, 2, 2]), np.array([-3.0, 2.0, 1.0])), 3)
     array([ 1., -1., -1.])
     """
-    levels = _contractions(_merged(links, n_nodes))
+    levels = _contractions(_weights(links, n_nodes))
     result = np.ones(int(levels[-1][1].max()) + 1 if levels else n_nodes)
-    for graph, groups, within in reversed(levels):
+    for weights, groups, within in reversed(levels):
         result = result[groups] * within
-        turn_where_better(graph.starts, graph.neighbors, graph.weights, result, _ROUNDS)
+        turn_where_better(weights.indptr, weights.indices, weights.data, result, _ROUNDS)
     return result
 
 
@@ -98,7 +86,7 @@ def nested_groups(links: Links, n_nodes: int) -> list[NDArray[np.int64]]:
     [[0, 0, 0, 0], [0, 0, 1, 1]]
     """
     levels, found = [], np.arange(n_nodes)
-    for _, groups, _ in _contractions(_merged(links, n_nodes)):
+    for _, groups, _ in _contractions(_weights(links, n_nodes)):
         found = groups[found]
         levels.append(found)
     return levels[::-1]
@@ -153,48 +141,44 @@ def _turned_in_groups(
     return found
 
 
-def _contractions(graph: _Graph) -> list[tuple[_Graph, NDArray[np.int64], NDArray[np.float64]]]:
-    """Each graph, the group of each of its nodes and the sign in it, until no link is left."""
+def _contractions(weights: sparse.csr_matrix) -> list[tuple[sparse.csr_matrix, NDArray[np.int64], NDArray[np.float64]]]:
+    """Each matrix of weights, the group of each of its nodes and the sign in it, until no link is left."""
     levels = []
-    while len(graph.neighbors):
-        groups, within = _contraction(graph)
-        levels.append((graph, groups, within))
-        rows = np.repeat(np.arange(graph.n_nodes), np.diff(graph.starts))
-        once = rows < graph.neighbors
-        tails, heads = rows[once], graph.neighbors[once]
-        weights = graph.weights[once] * within[tails] * within[heads]
-        graph = _merged(Links(groups[tails], groups[heads], weights), int(groups.max()) + 1)
+    while weights.nnz:
+        groups, within = _contraction(weights)
+        levels.append((weights, groups, within))
+        once = sparse.triu(weights, format="coo")
+        tails, heads = once.coords
+        between = Links(groups[tails], groups[heads], once.data * within[tails] * within[heads])
+        weights = _weights(between, int(groups.max()) + 1)
     return levels
 
 
-def _merged(links: Links, n_nodes: int) -> _Graph:
-    """Rows of the sums of weights between different nodes, those that cancel left out."""
-    tails, heads, weights = links.tails, links.heads, links.weights
-    apart = tails != heads
-    low, high = np.minimum(tails, heads)[apart], np.maximum(tails, heads)[apart]
-    pairs, which = np.unique(low * n_nodes + high, return_inverse=True)
-    total = np.bincount(which.ravel(), weights[apart], len(pairs))
-    size = np.bincount(which.ravel(), np.abs(weights[apart]), len(pairs))
-    clear = np.abs(total) > 1e-12 * size
-    low, high, total = pairs[clear] // n_nodes, pairs[clear] % n_nodes, total[clear]
-    rows, columns = np.concatenate([low, high]), np.concatenate([high, low])
-    order = np.lexsort((columns, rows))
-    starts = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n_nodes))])
-    return _Graph(starts, columns[order], np.concatenate([total, total])[order])
+def _weights(links: Links, n_nodes: int) -> sparse.csr_matrix:
+    """(n, n) symmetric sums of the weights between different nodes, those that cancel left out."""
+    apart = links.tails != links.heads
+    tails, heads, weights = links.tails[apart], links.heads[apart], np.tile(links.weights[apart], 2)
+    ends = np.concatenate([tails, heads]), np.concatenate([heads, tails])
+    total, sizes = (sparse.csr_matrix((each, ends), (n_nodes, n_nodes)) for each in (weights, np.abs(weights)))
+    total.data[np.abs(total.data) <= 1e-12 * sizes.data] = 0.0
+    total.eliminate_zeros()
+    return total
 
 
-def _contraction(graph: _Graph) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _contraction(weights: sparse.csr_matrix) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Group of each node, and its sign in it: pairs that are each other's strongest, and whose strongest is in one."""
-    rows = np.repeat(np.arange(graph.n_nodes), np.diff(graph.starts))
-    low, high = np.minimum(rows, graph.neighbors), np.maximum(rows, graph.neighbors)
-    order = np.lexsort((high, low, -np.abs(graph.weights), rows))  # ties go the same way from both ends
-    linked = np.flatnonzero(np.diff(graph.starts))
-    strongest = order[graph.starts[linked]]
-    nodes = np.arange(graph.n_nodes)
-    best, weight = nodes.copy(), np.ones(graph.n_nodes)
-    best[linked], weight[linked] = graph.neighbors[strongest], graph.weights[strongest]
+    n, neighbors = weights.shape[0], weights.indices
+    degrees = np.diff(weights.indptr)
+    rows = np.repeat(np.arange(n), degrees)
+    low, high = np.minimum(rows, neighbors), np.maximum(rows, neighbors)
+    order = np.lexsort((high, low, -np.abs(weights.data), rows))  # ties go the same way from both ends
+    linked = np.flatnonzero(degrees)
+    strongest = order[weights.indptr[linked]]
+    nodes = np.arange(n)
+    best, weight = nodes.copy(), np.ones(n)
+    best[linked], weight[linked] = neighbors[strongest], weights.data[strongest]
     mutual = best[best] == nodes
-    leader, sign = nodes.copy(), np.ones(graph.n_nodes)
+    leader, sign = nodes.copy(), np.ones(n)
     later = mutual & (best < nodes)
     leader[later], sign[later] = best[later], np.sign(weight[later])
     joins = ~mutual & mutual[best]
@@ -204,8 +188,8 @@ def _contraction(graph: _Graph) -> tuple[NDArray[np.int64], NDArray[np.float64]]
 
 @compiled
 def turn_where_better(
-    starts: NDArray[np.int64],
-    neighbors: NDArray[np.int64],
+    starts: NDArray[np.int32],
+    neighbors: NDArray[np.int32],
     weights: NDArray[np.float64],
     signs: NDArray[np.float64],
     rounds: int,
