@@ -7,7 +7,7 @@ import scipy
 from numpy.typing import NDArray
 
 from .edges import edge_table
-from .welding import welded
+from .welding import coincident_faces, welded
 
 MOST_ROUNDS = 64
 """Times that faces are divided: each halves the number of points on an edge."""
@@ -81,12 +81,9 @@ def _welded(points: NDArray[np.float64], tolerance: float) -> tuple[NDArray[np.f
 
 def _without_doubles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     """Faces without pairs on the same vertices that face opposite ways."""
-    first = faces.argmin(axis=1)[:, None]
-    turned = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
-    _, same, counts = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
-    same = same.ravel()
-    ways = np.bincount(same, np.where(turned[:, 1] < turned[:, 2], 1, -1))
-    return faces[~((counts == 2) & (ways == 0))[same]]
+    first, reverse = coincident_faces(faces.ravel(), np.arange(0, faces.size + 1, 3))
+    forth, back = (np.bincount(first[reverse == way], minlength=len(faces)) for way in (False, True))
+    return faces[~((forth == 1) & (back == 1))[first]]
 
 
 def _heights(corners: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..geometry.components import sums_of
 from ..geometry.dual_cells import DualCells, dual_cells, separate_triangles
 
 STAY = 0.003
@@ -82,9 +83,9 @@ def _rooms(
     count = len(cells.owners)
     crossed = nodes + 0.5 * np.eye(3)[axes]
     degrees = np.bincount(cells.quads.ravel(), minlength=count)
-    sums = [np.bincount(cells.quads.ravel(), np.repeat(crossed[:, k], 4), count) for k in range(3)]
+    sums = sums_of(np.repeat(crossed, 4, axis=0), cells.quads.ravel(), count)
     alone = (np.bincount(cells.owners)[cells.owners] == 1)[:, None]
-    middles = np.where(alone, cells.places[cells.owners] + 0.5, np.stack(sums, axis=1) / degrees[:, None])
+    middles = np.where(alone, cells.places[cells.owners] + 0.5, sums / degrees[:, None])
     return middles, np.where(alone, REACH, 0.0)
 
 

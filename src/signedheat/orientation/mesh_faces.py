@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..domains.polygon_mesh import PolygonMesh
 from ..domains.triangle_mesh import TriangleMesh
+from ..geometry.components import sums_of
 from ..geometry.triangle_kernels import areas_and_volumes
 from .surface_parts import SurfaceParts
 
@@ -57,7 +58,8 @@ class MeshFaces:
         if len(areas) == len(self.offsets) - 1:
             return areas, volumes
         n = len(self.offsets) - 1
-        return _sums(self.triangle_faces, areas, n), _sums(self.triangle_faces, volumes, n)
+        areas, volumes = sums_of(np.stack([areas, volumes], axis=1), self.triangle_faces, n).T
+        return areas, volumes
 
     @cached_property
     def surface(self) -> SurfaceParts:
@@ -69,7 +71,7 @@ class MeshFaces:
         a, b, c = (self.positions[self.triangles[:, k]] for k in range(3))
         vectors = np.cross(b - a, c - a)
         if len(vectors) != len(turned):
-            vectors = np.stack([_sums(self.triangle_faces, column, len(turned)) for column in vectors.T], axis=1)
+            vectors = sums_of(vectors, self.triangle_faces, len(turned))
         lengths = np.linalg.norm(vectors, axis=1)
         return vectors * (np.where(turned, -1, 1) / np.where(lengths > 0, lengths, 1))[:, None]
 
@@ -78,7 +80,3 @@ class MeshFaces:
         """(p, 3) means of the faces' corners."""
         sums = np.add.reduceat(self.positions[self.corners], self.offsets[:-1], axis=0)
         return sums / np.diff(self.offsets)[:, None]
-
-
-def _sums(owners: NDArray[np.int64], values: NDArray[np.float64], n: int) -> NDArray[np.float64]:
-    return np.bincount(owners, values, n).astype(np.float64)

@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..geometry.components import sums_of
 from ..geometry.outward_signs import outward_signs
 from ..geometry.plane_fits import fit_planes, noise_scale
 
@@ -112,7 +113,7 @@ def odds_at_corners(
     n_places = int(corners.max(initial=-1)) + 1
     for _ in range(16):
         weights = np.where(undecided, 0.0, np.tanh(0.5 * odds))[parts]
-        sums = np.stack([np.bincount(corners, weights * column, n_places) for column in normals.T], axis=1)
+        sums = sums_of(weights[:, None] * normals, corners, n_places)
         here = np.flatnonzero(undecided[parts])
         around = sums[corners[here]]
         balance = np.bincount(parts[here], np.einsum("ij,ij->i", around, normals[here]), len(odds))

@@ -18,11 +18,10 @@ from ..fields.piecewise_field import PiecewiseField
 from ..fields.tet_field import TetField
 from ..fields.vertex_field import VertexField
 from ..packages import lazy_module
-from .figures import INSIDE_TO_OUTSIDE, isolines_between
+from .figures import even_colors, isolines_between
 from .surfaces import INSIDE, OUTSIDE
 
 pyvista = lazy_module("pyvista", "windows")
-mpl_colors = lazy_module("matplotlib.colors", "pictures")
 
 BODY = "#d8d2c0"
 LINE = "#1a1a1a"
@@ -96,8 +95,8 @@ def _look(values: Any) -> dict[str, Any]:
     """Colours centred on zero, and isolines."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     reach = max(abs(low), abs(high), 1e-300)
-    colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
-    return {"reach": reach, "colors": colors, "levels": isolines_between(low, high)[0], "zero": low < 0 < high}
+    levels = isolines_between(low, high)[0]
+    return {"reach": reach, "colors": even_colors(reach).cmap, "levels": levels, "zero": low < 0 < high}
 
 
 def _add_colors(plotter: Any, mesh: Any, look: dict[str, Any], **options: Any) -> None:

@@ -14,6 +14,7 @@ from ...diagnostics import Note, OutsideMesh
 from ...domains.tet_mesh import TetMesh
 from ...errors import SourceError
 from ...frozen import Frozen
+from ...geometry.components import sums_of
 from ...geometry.directions import unit
 from ...geometry.tet_clipping import ClippedPolygons, Planes, barycentric, clip_triangles, containing_tets
 from ..area_elements import AreaElements, area_elements
@@ -171,8 +172,8 @@ def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> NDArray[np
     shares *= mean[0] / ahead + mean[1] * ahead
     shares /= (shares * (ahead + 1 / ahead)).sum(axis=1, keepdims=True) / 2
     faces, n = mesh.faces.tet_faces[polygons.tets].ravel(), len(mesh.faces.vertices)
-    columns = [*polygons.area_vectors.T, polygons.areas]
-    return np.stack([np.bincount(faces, (shares * column[:, None]).ravel(), n) for column in columns], axis=1)
+    vectors = np.column_stack([polygons.area_vectors, polygons.areas])
+    return sums_of((shares[:, :, None] * vectors[:, None]).reshape(-1, 4), faces, n)
 
 
 def _patches(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from ...geometry.components import sums_of
 from ...parallel import n_threads
 from .node_sources import STRETCH, NodeSources
 from .stencil import solve_poisson
@@ -107,9 +108,8 @@ def blocks_of_dipoles(
     _, which = np.unique(which, return_inverse=True)
     weights = np.linalg.norm(vectors, axis=1) + 1e-300
     total = np.bincount(which, weights)
-    means = np.stack([np.bincount(which, weights * positions[:, d]) / total for d in range(dimension)], axis=1)
-    sums = np.stack([np.bincount(which, vectors[:, d]) for d in range(dimension)], axis=1)
-    return means.astype(np.float64), sums.astype(np.float64)
+    n = len(total)
+    return sums_of(weights[:, None] * positions, which, n) / total[:, None], sums_of(vectors, which, n)
 
 
 def _sources(
