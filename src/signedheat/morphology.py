@@ -36,7 +36,7 @@ from .geometry.face_features import FaceFeatures
 from .geometry.face_tree import FaceTree
 from .geometry.nearest import weights_in
 from .lowering.area_elements import area_elements, bounds_around
-from .lowering.grid.discretization import refuse_beyond_memory
+from .lowering.grid.discretization import refuse_large_grid
 from .progress import Progress
 from .sharpening.sharpen import sharpen
 from .signed_distance import signed_distance
@@ -433,7 +433,7 @@ def thicken(
         )
     grid = _grid(_room(sheet, reach, resolution) if domain is None else domain)
     _refuse_thin(grid, above + below)
-    refuse_beyond_memory(grid, BYTES_PER_NODE)
+    refuse_large_grid(grid, BYTES_PER_NODE)
     depth = _unsigned_distance(sheet, grid) - reach
     if above != below:
         phi = _sided(grid, sheet).values

@@ -36,7 +36,7 @@ def level_set(mesh: Triangles, values: NDArray[np.float64], level: float) -> lis
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         along = np.clip((level - tail) / (head - tail), 0.0, 1.0)
     oriented = is_consistent(mesh)
-    normals = None if oriented else gradients(mesh, values, crossed)
+    normals = None if oriented else gradient_directions(mesh, values, crossed)
     curves = []
     for order, backwards, closed in assemble_polylines(on_edges[:, 0], on_edges[:, 1], directed=oriented):
         first = np.where(backwards, sides[order, 1], sides[order, 0])
@@ -95,7 +95,7 @@ def snapped(values: NDArray[np.float64], ends: NDArray[np.int64], level: float) 
     return np.where(np.abs(values - level) <= SNAP * steepest, level, values)
 
 
-def gradients(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def gradient_directions(mesh: Triangles, values: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
     """(k, 3) gradients of a piecewise linear function on some faces, up to a positive factor each."""
     corners = mesh.vertices[mesh.faces[faces]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -5,6 +5,9 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 
+EPSILON = 2.0**-52
+"""Distance from 1 to the next larger number."""
+
 
 @compiled
 def find_edges(
@@ -55,9 +58,10 @@ def find_edges(
 def areas_of_polygons(
     vertices: NDArray[np.float64], corners: NDArray[np.int64], offsets: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """(p,) areas of faces; and which have none, to roundoff, or name a vertex twice.
+    """(p,) areas of polygons; and which are degenerate: without area, to roundoff, or with a vertex twice.
 
     An area is none if it is below what moving the corners by a few units in the last place of the coordinates makes.
+    Polygon f has the corners from ``offsets[f]`` to ``offsets[f + 1]``.
     """
     n = len(offsets) - 1
     areas, degenerate = np.empty(n), np.zeros(n, dtype=np.bool_)
@@ -79,9 +83,9 @@ def areas_of_polygons(
                 away[d], after[d] = vertices[here, d] - middle[d], vertices[there, d] - middle[d]
                 radius = max(radius, abs(away[d]))
             for d in range(3):
-                normal[d] += away[d - 2] * after[d - 1] - away[d - 1] * after[d - 2]
+                normal[d] += away[d - 2] * after[d - 1] - away[d - 1] * after[d - 2]  # a cross product, cyclically
         areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-        degenerate[f] |= areas[f] <= 4.0 * 2.220446049250313e-16 * radius * largest
+        degenerate[f] |= areas[f] <= 4.0 * EPSILON * radius * largest
     return areas, degenerate
 
 

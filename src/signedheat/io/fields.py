@@ -22,7 +22,7 @@ from ..fields.grid_field import GridField
 from ..fields.tet_field import TetField
 from ..fields.to_field import Field
 from ..fields.vertex_field import VertexField, on_simple_surface
-from ..lowering.grid.discretization import refuse_beyond_memory
+from ..lowering.grid.discretization import refuse_large_grid
 from ..operators.grid.blocks import SIDE, Blocks
 from .arrays import names_in_npz, read_npz, write_npz
 from .files import PathLike, contents, damaged, ensure_writable, extension, format_for, reading, replacing
@@ -240,7 +240,7 @@ def _write_for_vtk(field: GridField, path: Path) -> None:
     grid, convention = field.grid, CONVENTION
     values: dict[str, NDArray[np.floating]] = {NAME: field.values}
     if field.blocks is not None:
-        refuse_beyond_memory(grid, BYTES_PER_NODE, 0.0)
+        refuse_large_grid(grid, BYTES_PER_NODE, 0.0)
         values, convention = {NAME: whole_values(field)}, CLIPPED
     elif field.confidence is not None:
         values[CONFIDENCE] = field.confidence

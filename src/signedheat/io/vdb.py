@@ -293,7 +293,10 @@ class _Stream:
         return found
 
     def file(self, kind: str | None = None) -> VdbGrid:
-        """Header and description; then the grid of that kind, or the first float grid that is found."""
+        """The whole file. With a kind, a header and this grid as a grid of that kind are written.
+
+        Without, the header is read, and then grids, until one holds floats; this is returned.
+        """
         is_written = kind is not None
         magic, version = self.numbers("qI", *([MAGIC, FILE_VERSION] if is_written else []))
         if magic != MAGIC or version < 222:

@@ -139,7 +139,10 @@ class SurfaceParts:
 
     @cached_property
     def copies(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(p,) how many faces run as each first face does, itself included, and how many the other way round."""
+        """(p,) numbers of faces on the corners of each first face: in the same order, itself included, and reversed.
+
+        Zero, both, for a face that is not the first on its corners.
+        """
         all_first = bool(self.is_first.all())
         if all_first:
             return np.ones(self.n_faces, dtype=np.int64), np.zeros(self.n_faces, dtype=np.int64)

@@ -185,12 +185,12 @@ class PausedSearch:
             return distance
         reached = np.flatnonzero(np.isfinite(distance))
         # merged windows may miss zero by their tolerance, and Dijkstra needs it
-        along = along_edges(self.triangles, reached, np.maximum(distance[reached], 0.0))
+        along = distances_along_edges(self.triangles, reached, np.maximum(distance[reached], 0.0))
         # where it has ended: on other parts, or past edges so short that windows on them are lost in rounding
         return np.where(np.isinf(distance), along, distance) if self.has_ended else along
 
 
-def along_edges(
+def distances_along_edges(
     triangles: IntrinsicMesh, vertices: NDArray[np.int64], offsets: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(n,) distance of every vertex along edges from vertices (k,) that have distances of their own; inf if none.

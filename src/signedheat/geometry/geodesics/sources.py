@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..components import members_of
+from ..components import grouped, members_of
 from ..curve_segments import CurveSegments, MergedSources
 from ..intrinsic_mesh import IntrinsicMesh
 from ..surface_points import (
@@ -133,7 +133,7 @@ class PlacedSegments:
         rows: Ids,
     ) -> tuple[Ids, Ids, Points, Mask, Ids, Ids]:
         ends, edges, vectors = ends[rows], edges[rows], vectors[rows]
-        along = np.stack([along_edges(triangles, nodes[ends[:, k]], edges) for k in range(2)], axis=1)
+        along = np.stack([fractions_along_edges(triangles, nodes[ends[:, k]], edges) for k in range(2)], axis=1)
         loops = triangles.edges.vertices[edges, 0] == triangles.edges.vertices[edges, 1]
         vertex = nodes.kinds[ends] == VERTEX
         along[loops & vertex.all(axis=1)] = (0.0, 1.0)
@@ -184,9 +184,10 @@ class PlacedSegments:
         return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
 
     def _directions(self, triangles: IntrinsicMesh) -> tuple[Points, Points]:
-        """(s,) directions of two segments at each node: in the layout of the face, or in the frame of the edge.
+        """(s,) directions away from each node of the first and of the last segment that ends there.
 
-        0 for none, and at nonmanifold edges for segments inside faces, as straight on is not one direction there.
+        As complex numbers in the layout of the node's face, or in the frame of its edge; 0 where there is no segment.
+        At an edge of three faces or more, segments inside faces count as none: how they go on there is ambiguous.
         """
         nodes, kinds = self.nodes, self.nodes.kinds
         steps = self.positions[:, 1] - self.positions[:, 0]
@@ -206,13 +207,11 @@ class PlacedSegments:
         away[at_edge] = triangles.in_edge_frames(away[at_edge], faces, k)
         branching = (triangles.edges.face_counts[edges] > 2) & ~self.along_edge[seg[at_edge]]
         away[at_edge[branching]] = 0
-        row = np.flatnonzero(away != 0)
-        row = row[np.argsort(node[row], kind="stable")]
-        begin = np.searchsorted(node[row], np.arange(len(nodes)))
-        count = np.searchsorted(node[row], np.arange(len(nodes)), side="right") - begin
+        away, node = away[away != 0], node[away != 0]
+        starts, order = grouped(node, len(nodes))
+        has = np.flatnonzero(np.diff(starts))  # of a segment along an edge both copies have the same direction
         found = np.zeros((2, len(nodes)), dtype=np.complex128)
-        has = count > 0  # the first and the last: of a segment along an edge the two copies say the same
-        found[0, has], found[1, has] = away[row[begin[has]]], away[row[(begin + count - 1)[has]]]
+        found[0, has], found[1, has] = away[order[starts[has]]], away[order[starts[has + 1] - 1]]
         return found[0], found[1]
 
 
@@ -261,7 +260,7 @@ def on_sides(triangles: IntrinsicMesh, faces: Ids, sides: Ids, along: NDArray[np
     return triangles.corner_positions[faces, sides][:, None] + share * triangles.edge_vectors[faces, sides][:, None]
 
 
-def along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ids) -> NDArray[np.float64]:
+def fractions_along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ids) -> NDArray[np.float64]:
     """(n,) fraction of the way from tail to head at which point k lies on edge k."""
     return np.where(
         located.kinds == EDGE, located.along, (triangles.edges.vertices[edges, 0] != located.elements).astype(float)

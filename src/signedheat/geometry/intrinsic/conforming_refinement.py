@@ -66,9 +66,18 @@ def cut_along(
     unfit: Sequence[bool] | None = None,
     begin: NDArray[np.int64] | None = None,
 ) -> tuple[IntrinsicMesh, MergedSources, NDArray[np.bool_], NDArray[np.int64]]:
-    """Cut faces along the segments of sources that are unfit, all by default, and of those that these entail.
+    """Cut faces so that sources run along edges.
 
-    Which triangles a face is cut into may hang on the corner at which it begins: `begin` (m,), the first by default.
+    Parameters
+    ----------
+    triangles : IntrinsicMesh
+        The surface.
+    parts : sequence of CurveSegments
+        The sources.
+    unfit : sequence of bool, optional
+        Which of them must run along edges; all by default. Others are cut only in faces, and at edges, that these cut.
+    begin : (m,) int, optional
+        The corner at which each face begins, on which the triangles that it is cut into depend; the first by default.
 
     Returns
     -------
@@ -175,7 +184,7 @@ class FaceCutter:
         return self.node_at[vertex]
 
     def cut_along(self, p: int, edge: int) -> None:
-        """Cut a piece along a split edge at the points of the edge between its ends."""
+        """Replace segment p, which lies on an edge that was split, by one between each two of its new vertices."""
         merged, (vertices, at, place) = self.merged, self.along_edge(edge)
         a, b = (place[self.vertex_of[i]] for i in merged.ends[p].tolist())
         step = 1 if a < b else -1

@@ -63,7 +63,7 @@ def bytes_of_area(area: float, spacing: NDArray[np.float64], n_nodes: float) -> 
     return min(round(BYTES_PER_AREA * cells, 1), MOST_PER_NODE * n_nodes)
 
 
-def refuse_beyond_memory(
+def refuse_large_grid(
     grid: Grid,
     per_node: float | None = None,
     extra: float = 0.0,
@@ -124,7 +124,7 @@ class GridDiscretization(DiffusesEach):
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
         """X₀ and the rows that interpolate φ on the source: Eq. 11 in space, area vectors spread to the nodes."""
         samples = sample_on_grid(sources, self.grid, SAMPLE_SIZE)
-        refuse_beyond_memory(self.grid, area=float(samples.weights.sum()))
+        refuse_large_grid(self.grid, area=float(samples.weights.sum()))
         return GridSource(samples, self.grid, diffusion)
 
     def diffuse(self, source: GridSource) -> list[Level]:
@@ -145,7 +145,7 @@ class GridDiscretization(DiffusesEach):
 def _(domain: Grid) -> GridDiscretization | MaskedGridDiscretization:
     if domain.dimension > 4:
         raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}", element="domain")
-    refuse_beyond_memory(domain)
+    refuse_large_grid(domain)
     if domain.mask is not None:
         return MaskedGridDiscretization(domain)
     return GridDiscretization(domain)

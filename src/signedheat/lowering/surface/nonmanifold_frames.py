@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.curve_segments import CurveSegments
-from ...geometry.geodesics.exact import along_edges
+from ...geometry.geodesics.exact import distances_along_edges
 from ...geometry.intrinsic_mesh import IntrinsicMesh
 
 
@@ -83,7 +83,7 @@ def mirrored(part: CurveSegments, changed: NDArray[np.bool_]) -> CurveSegments:
 def from_sources(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> NDArray[np.float64]:
     """(n_vertices,) distance of every vertex from the sources along edges."""
     onto = [corner_distances(triangles, part) for part in parts]
-    return along_edges(triangles, *(np.concatenate(a) for a in zip(*onto, strict=True)))
+    return distances_along_edges(triangles, *(np.concatenate(a) for a in zip(*onto, strict=True)))
 
 
 def corner_distances(triangles: IntrinsicMesh, part: CurveSegments) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
