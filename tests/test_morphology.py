@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import scipy
@@ -21,9 +23,9 @@ def radii(mesh):
     return np.linalg.norm(mesh.vertices, axis=1)
 
 
+@cache
 def box_with_arms():
-    grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=96, padding=0.1)
-
+    grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=64, padding=0.1)
     arms = [distance_to_box(grid.points, -half, half) for half in np.array([[0.5, 0.5, 0.5], [1.5, 0.1, 0.1]])]
     return sh.GridField(grid, np.minimum(*arms)).contour(0.0)
 
@@ -41,7 +43,7 @@ def waved_sheet(n=20):
     [(sh.morphology.dilate, 1.4), (sh.morphology.erode, 0.6), (sh.morphology.opening, 1), (sh.morphology.closing, 1)],
 )
 def test_balls_stay_balls(operation, radius):
-    ball = operation(BALL, 0.4, resolution=64)
+    ball = operation(BALL, 0.4, resolution=48)
     assert_closed_manifold(ball)
     np.testing.assert_allclose(radii(ball), radius, atol=0.005)
     assert enclosed_volume(ball) > 0
@@ -58,7 +60,7 @@ def test_a_broken_ball_grows_as_if_it_were_whole():
 
 @pytest.mark.parametrize("operation", [sh.morphology.opening, sh.morphology.closing])
 def test_a_second_time_changes_nothing_beyond_a_cell(operation):
-    grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=80, padding=0.5)
+    grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=60, padding=0.5)
     once = operation(box_with_arms(), 0.2, grid)
     twice = operation(once, 0.2, grid)
     distance = sh.sharpen(sh.SignedHeatSolver(grid).distance(once))
@@ -73,7 +75,7 @@ def test_opening_takes_thin_arms_off():
 @pytest.mark.parametrize("sides", [(0.1,), (0.1, 0.0), (0.0, 0.1), (0.15, 0.1)])
 def test_a_sheet_gains_twice_its_area_times_the_distance(sides):
     sheet = waved_sheet()
-    solid = sh.morphology.thicken(sheet, *sides, resolution=96)
+    solid = sh.morphology.thicken(sheet, *sides, resolution=72)
     assert_closed_manifold(solid)
     above, below = sides if len(sides) == 2 else 2 * sides
     reach, rim = max(above, below), 8.2
