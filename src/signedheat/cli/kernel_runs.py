@@ -18,10 +18,12 @@ from ..domains.intrinsic_triangulation import intrinsic_delaunay
 from ..domains.point_cloud import PointCloud
 from ..domains.polyline import Polyline
 from ..domains.triangle_mesh import TriangleMesh
+from ..fields.redistancing import redistance
 from ..orientation.meshes import orientation
 from ..sharpening.methods import Convex, Geodesic
 from ..sharpening.sharpen import sharpen
 from ..signed_distance import signed_distance
+from ..solids.complete import complete
 from ..solids.sampling import sample
 from ..solids.thickness import thickness
 from ..solver import SignedHeatSolver
@@ -30,7 +32,7 @@ from ..view import draw_shape, new_figure
 
 
 def solids() -> None:
-    """Solids on grids: faces, points without normals, sharpening, samples."""
+    """Solids on grids: faces, points without normals, surfaces, sharpening, samples."""
     ball = samples.sphere(2)
     broken = samples.with_flipped_faces(samples.without_faces(samples.union(ball, samples.sphere(2, center=(1, 0, 0))),
                                                               0.1), 0.1)  # fmt: skip
@@ -41,7 +43,10 @@ def solids() -> None:
     signed_distance(ball, fine, band=3 * float(fine.spacing.max())).offset(0.0)
     points = PointCloud(ball.vertices)
     signed_distance(points, Grid.around(ball.bounds, 20))
-    sharpen(SignedHeatSolver(Grid.around(broken, 12)).distance(broken))
+    complete(samples.without_patches(ball, 1, 0.5)).surface(keep_faces=True)
+    field = SignedHeatSolver(Grid.around(broken, 12)).distance(broken)
+    sharpen(field)
+    redistance(field)
 
 
 def reports() -> None:
@@ -80,6 +85,7 @@ def surfaces() -> None:
     field.contour(0.1)
     for how in (None, Convex(), Geodesic()):
         sharpen(field) if how is None else sharpen(field, method=how)
+    sharpen(SignedHeatSolver(ball).distance(Curve(_curve(ball).faces, _curve(ball).barycentric, oriented=False)))
 
 
 def other_surfaces() -> None:
@@ -101,8 +107,9 @@ def intrinsic() -> None:
 
 
 def tets() -> None:
-    """Distance on tets."""
+    """Distance on tets, few and many: their systems are factorised or iterated."""
     ball = samples.sphere(1)
+    SignedHeatSolver(tetrahedralize(ball, resolution=7, grading=np.inf)).distance(ball)
     field = SignedHeatSolver(tetrahedralize(ball, resolution=5)).distance(ball)
     field.contour(0.1)
     sharpen(field)
